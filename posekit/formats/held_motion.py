@@ -19,7 +19,6 @@ from posekit.formats.motion.ground_up import FoundUp, against_stated_up, find_up
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.people_in_motion import people_apart
 from posekit.formats.own import Postures
-from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.formats.recognising import Recognised
 from posekit.formats.registry import formats
 from posekit.formats.skeleton_maps import SkeletonMap
@@ -102,7 +101,7 @@ def held_motion(
     InputError
         Where nobody's points are in it, or unit or up are not what the file says.
     """
-    motion = _within_reach(people_apart(motion))
+    motion = people_apart(motion)
     found = postures_of(motion, layout)
     if unit is None:
         size = body_unit(found.joints, motion.source, told="unit" in motion.told)
@@ -136,18 +135,6 @@ def held_motion(
         said=tuple(said),
         feet=size.metres * found.feet,
     )
-
-
-def _within_reach(motion: Motion) -> Motion:
-    """Refuse coordinates whose squares overflow."""
-    if len(motion) and np.nanmax(np.abs(motion.points), initial=0.0) > FARTHEST_COORDINATE:
-        frame, point, axis = np.argwhere(np.abs(motion.points) > FARTHEST_COORDINATE)[0]
-        got = f"a coordinate of {motion.points[frame, point, axis]:g} m"
-        where = f"frame {frame}: {motion.names[point]}"
-        raise refusal(
-            motion.source, where, got, f"at most {FARTHEST_COORDINATE:g} m", "correct it, or leave it out"
-        )
-    return motion
 
 
 def _odd_clips(joints: Array, motion: Motion) -> list[str]:

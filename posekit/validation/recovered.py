@@ -66,20 +66,12 @@ def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettin
             within = "tolerance." if kind == "given" else f"{kind}."
             most = MOST_UNDER_NOISE if kind in ("noisy", "refined") else 1.0
             metres, degrees = most * PHOTOGRAPH_TOLERANCE.rigid, most * PHOTOGRAPH_TOLERANCE.angle
-            stated = (
-                ("rigid", _number(said, "rigid", RIGID_TOLERANCE, within=within), metres, rigid),
-                ("angle", _number(said, "angle", EXACT_TOLERANCE.angle, within=within), degrees, angles),
-                ("contact", -_number(said, "contact", asked, within=within), metres, margins),
-            )
-            for name, value, bound, kept in stated:
-                if value > bound:
-                    warnings.warn(
-                        f"the result says that it was judged with {within}{name} of {value:.4g}, more than posekit "
-                        f"allows of itself: judged with {bound:.4g}; ask for more by an option if it is meant",
-                        UserWarning,
-                        stacklevel=2,
-                    )
-                kept.append((-1 if name == "contact" else 1) * min(value, bound))
+            bone = _number(said, "rigid", RIGID_TOLERANCE, within=within)
+            rigid.append(_believed(f"{within}rigid", bone, metres))
+            angle = _number(said, "angle", EXACT_TOLERANCE.angle, within=within)
+            angles.append(_believed(f"{within}angle", angle, degrees))
+            overlap = -_number(said, "contact", asked, within=within)
+            margins.append(-_believed(f"{within}contact", overlap, metres))
     margins[0] = max(margins[0], -PHOTOGRAPH_TOLERANCE.rigid)
     if decimals is not None:  # what was rounded may be off by that
         step = math.sqrt(3) * 10.0**-decimals
@@ -103,6 +95,18 @@ def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettin
         walkers=walkers,
         **({"ranges": ranges} if ranges in ("urdf", *NAMED_TABLES) else {}),
     )
+
+
+def _believed(name: str, stated: float, most: float) -> float:
+    """Return what a result states that it allowed, or the most that it is believed, with a warning."""
+    if stated > most:
+        warnings.warn(
+            f"the result says that it was judged with {name} of {stated:.4g}, more than posekit allows of itself: "
+            f"judged with {most:.4g}; ask for more by an option if it is meant",
+            UserWarning,
+            stacklevel=2,
+        )
+    return min(stated, most)
 
 
 def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:

@@ -139,10 +139,14 @@ def check_points(source: str | Path, name: str, values: NDArray[Any]) -> None:
     """Refuse coordinates that are infinite or too far, and points (..., 3) of which only a part is known."""
     if np.isinf(values).any():
         raise not_finite(source, name, values)
-    if (np.abs(values) > FARTHEST_COORDINATE).any():
-        far = float(values[np.abs(values) > FARTHEST_COORDINATE][0])
+    far = values[np.abs(values) > FARTHEST_COORDINATE]
+    if len(far):
         raise refusal(
-            source, name, f"{far:.3g} m", f"coordinates within {FARTHEST_COORDINATE:g} m", "check the unit"
+            source,
+            name,
+            f"{float(far[0]):.3g} m",
+            f"coordinates within {FARTHEST_COORDINATE:g} m",
+            "check the unit",
         )
     unknown = np.isnan(values)
     partly = unknown.any(axis=-1) & ~unknown.all(axis=-1)
