@@ -33,6 +33,10 @@ DEFAULT_RULES = (1, 2)
 LIMB_PARTS = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
 
 
+SLOWEST_WALK: Final = 0.3
+"""Metres a second below which nobody walks: half of what people walk slowly, several times the sway of who stands."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class WalkingThresholds:
     """When a swing is evidence, and what counts as parallel, flexed and vertical.

@@ -121,7 +121,7 @@ class PostureSequence:
 
     def configurations(self, up: str = "+z") -> Array:
         """Return the figure's configurations (N, nq), `up` up."""
-        return self.figure.configurations(self.turned(up)).q
+        return self.figure.inverse_kinematics(self.turned(up))
 
     def furthest(self, q: Array, up: str) -> tuple[float, str, int]:
         """Return how far a joint of configurations is from its point at most, metres; which joint, in which frame."""

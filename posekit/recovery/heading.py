@@ -8,15 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.validators.walking import SLOWEST_WALK
 
 HALF_WINDOW_SECONDS: Final = 0.5
 """Seconds before and after a frame whose frames tell its heading: together about a stride, over which sway cancels."""
 
 LEAST_SECONDS: Final = 0.3
 """Seconds that those must span at least."""
-
-SLOWEST_WALK: Final = 0.3
-"""Metres a second below which nobody walks: half of what people walk slowly, several times the sway of who stands."""
 
 FASTEST_WALK: Final = 3.0
 """Metres a second above which nobody walks."""

@@ -26,6 +26,7 @@ from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.strides import Strides
 from posekit.validators.motion.timeline import timeline_of
+from posekit.validators.walking import SLOWEST_WALK
 
 RULES_OVER_STRIDES: Final = (1, 2, 4)
 """Those that speak of motion; Rules 3 and 5 are of an instant."""
@@ -70,7 +71,7 @@ class WalkingPhases(MotionCheck):
     needs = ("time",)
 
     rules: str = "1,2,4"
-    slowest: float = 0.3
+    slowest: float = SLOWEST_WALK
     stride: float = 1.2
     swing: float = 0.03
     in_step: float = 0.0
