@@ -28,8 +28,8 @@ class ImageRows:
         The number of each in its recording, from 0.
     time : array (F,)
         Seconds.
-    points : array (F, 19, 2)
-        Joints and head points as `View` has them; NaN where one is not seen.
+    points : array (F, 19 + K, 2)
+        Joints, head points and those of the user's own as `View` has them; NaN where one is not seen.
     confidence : array (F, 19)
         How sure the detector is of each point; NaN where it does not say.
     root : array (F, 3)
@@ -52,7 +52,7 @@ class ImageRows:
         return cls(
             frame=np.arange(len(view)) if frame is None else frame,
             time=view.time,
-            points=np.concatenate([view.image, view.head_image], axis=1),
+            points=np.concatenate([view.image, view.head_image, view.own_head_image], axis=1),
             confidence=view.confidence,
             root=view.root,
         )
@@ -70,7 +70,7 @@ class ImageRows:
     def laid_out(self, frame: NDArray[np.int64], time: Array) -> ImageRows:
         """Lay the rows into a longer recording, whose other frames see nothing."""
         place = np.searchsorted(frame, self.frame)
-        laid = nothing_seen(frame, time)
+        laid = nothing_seen(frame, time, self.points.shape[1])
         laid.points[place] = self.points
         laid.confidence[place] = self.confidence
         laid.root[place] = self.root
@@ -101,19 +101,20 @@ class ImageRows:
             time=self.time,
             image=self.points[:, :N_IMAGE_POINTS],
             head_image=self.points[:, HEAD],
+            own_head_image=self.points[:, len(POINTS) :],
             confidence=self.confidence,
             root=self.root,
             truth=np.empty(0),
         )
 
 
-def nothing_seen(frame: NDArray[np.int64], time: Array) -> ImageRows:
+def nothing_seen(frame: NDArray[np.int64], time: Array, points: int = len(POINTS)) -> ImageRows:
     """Make rows in which nothing is seen."""
     count = len(frame)
     return ImageRows(
         frame=frame,
         time=time,
-        points=np.full((count, len(POINTS), 2), np.nan),
+        points=np.full((count, points, 2), np.nan),
         confidence=np.full((count, len(POINTS)), np.nan),
         root=np.full((count, 3), np.nan),
     )

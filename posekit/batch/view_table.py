@@ -1,7 +1,8 @@
 """Views as Parquet: image points in columns, a row a frame, read in pieces. What an archive is best kept in.
 
 Columns: ``frame`` (its number, ascending; the row's if absent), ``time`` (s; by the rate if absent), then for each of
-the 19 points, as ``neck`` or ``left_ear``: ``neck_u``, ``neck_v`` (as in ``posekit.view/1``'s memory: pixels, y down)
+the 19 points, as ``neck`` or ``left_ear``, and head points of the user's own: ``neck_u``, ``neck_v`` (as in
+``posekit.view/1``'s memory: pixels, y down)
 and ``neck_confidence``; then ``root_x``, ``root_y``, ``root_z`` (m, the neck in the camera's frame, where it is known).
 Null is what is not seen. The file's metadata may have camera and person under ``posekit.view``: a ``posekit.view/1``
 document whose only frame is the first.
@@ -9,6 +10,7 @@ document whose only frame is the first.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,14 +24,15 @@ from posekit.batch.image_rows import ImageRows, head_text
 from posekit.errors import InputError
 from posekit.formats.motion.parquet import opened
 from posekit.formats.own import View
+from posekit.formats.own.view import own_names
 from posekit.geometry import Array
 from posekit.safe_io import extra, refusal, replacing
 from posekit.skeleton import POINTS
 from posekit.views.person_view import ASSUMED_VIEW_RATE
 
 HEAD_KEY: Final = b"posekit.view"
-UV_COLUMNS: Final = tuple(f"{point}_{axis}" for point in POINTS for axis in "uv")
 CONFIDENCE_COLUMNS: Final = tuple(f"{point}_confidence" for point in POINTS)
+UV_COLUMNS: Final = tuple(f"{point}_{axis}" for point in POINTS for axis in "uv")
 ROOT_COLUMNS: Final = ("root_x", "root_y", "root_z")
 AT_ONCE: Final = 4096
 """Rows that are decoded together."""
@@ -79,7 +82,10 @@ def open_view_table(path: Path) -> ViewTable:
     pa = extra("pyarrow", "parquet", "reading Parquet")
     with opened(path, limit=MAX_INPUT_BYTES, buffer_bytes=BUFFER_BYTES) as file:
         schema, rows = file.schema_arrow, file.metadata.num_rows
-        for name in {*UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time"} & set(schema.names):
+        head = _head_of(schema)
+        for name in {*uv_columns(head), *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time"} & set(
+            schema.names
+        ):
             kind = schema.field(name).type
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
                 raise refusal(path, name, str(kind)[:60], "numbers", "write the column as numbers")
@@ -87,8 +93,26 @@ def open_view_table(path: Path) -> ViewTable:
             raise refusal(path, "", f"{rows:,} rows", "a row a frame, at least one", "give another file")
         if len(set(schema.names)) < len(schema.names):
             raise refusal(path, "columns", "a name twice", "each once", "rename one of the two")
-        head = (schema.metadata or {}).get(HEAD_KEY, b"").decode("utf-8", "replace")
         return ViewTable(path=path, rows=rows, head=head, names=tuple(schema.names))
+
+
+def uv_columns(head: str) -> tuple[str, ...]:
+    """Name the columns of image points: of the 19, then of the head points of the user's own that `head` tells."""
+    figure = parsed.get("figure") if isinstance(parsed := _parsed(head), dict) else None
+    points = figure.get("head_points") if isinstance(figure, dict) else None
+    own = own_names(points if isinstance(points, dict) else ())
+    return UV_COLUMNS + tuple(f"{point}_{axis}" for point in own for axis in "uv")
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text or "null")
+    except (ValueError, RecursionError):  # refused where the document is read
+        return None
+
+
+def _head_of(schema: Any) -> str:
+    return str((schema.metadata or {}).get(HEAD_KEY, b"").decode("utf-8", "replace"))
 
 
 def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> Iterator[ImageRows]:
@@ -106,14 +130,13 @@ def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> I
     """
     with opened(path, limit=MAX_INPUT_BYTES, buffer_bytes=BUFFER_BYTES) as file:
         there = set(file.schema_arrow.names)
+        uv = uv_columns(_head_of(file.schema_arrow))
         wanted = [
-            name
-            for name in (*UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time")
-            if name in there
+            name for name in (*uv, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time") if name in there
         ]
         found = start
         for columns, first in _pieces(path, file, wanted, start, stop):
-            rows = _rows(columns, first, rate)
+            rows = _rows(columns, first, rate, uv)
             found += len(rows)
             yield rows
     if found < stop:
@@ -171,9 +194,10 @@ def write_rows(file: BinaryIO, head: str, pieces: Iterable[ImageRows], *, group:
     """Write rows into an open file, with camera and person."""
     pa = extra("pyarrow", "parquet", "writing Parquet")
     pq = extra("pyarrow.parquet", "parquet", "writing Parquet")
+    uv = uv_columns(head)
     kinds = {
         "frame": pa.int64(),
-        **dict.fromkeys(("time", *UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS), pa.float64()),
+        **dict.fromkeys(("time", *uv, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS), pa.float64()),
     }
     schema = pa.schema(list(kinds.items()), metadata={HEAD_KEY: head.encode()})
     with pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=False) as writer:
@@ -182,7 +206,7 @@ def write_rows(file: BinaryIO, head: str, pieces: Iterable[ImageRows], *, group:
             flat = {
                 "frame": rows.frame,
                 "time": rows.time,
-                **dict(zip(UV_COLUMNS, rows.points.reshape(count, -1).T, strict=True)),
+                **dict(zip(uv, rows.points.reshape(count, -1).T, strict=True)),
                 **dict(zip(CONFIDENCE_COLUMNS, rows.confidence.T, strict=True)),
                 **dict(zip(ROOT_COLUMNS, rows.root.T, strict=True)),
             }
@@ -232,21 +256,19 @@ def _check_finite(path: Path, columns: dict[str, Array], first: int) -> None:
             raise refusal(path, f"{name}[{row}]", "an infinite number", "a number, or null", "correct it")
 
 
-def _rows(columns: dict[str, Array], first: int, rate: float | None) -> ImageRows:
+def _rows(columns: dict[str, Array], first: int, rate: float | None, uv: tuple[str, ...]) -> ImageRows:
     count = len(next(iter(columns.values())))
     unknown = np.full(count, np.nan)
     frame = columns.get("frame", np.arange(first, first + count, dtype=np.float64))
     numbers: NDArray[np.int64] = frame.astype(np.int64)
     timed = "time" in columns and rate is None
-    points = np.stack([columns.get(name, unknown) for name in UV_COLUMNS], axis=-1).reshape(
-        count, len(POINTS), 2
-    )
+    points = np.stack([columns.get(name, unknown) for name in uv], axis=-1).reshape(count, -1, 2)
     sure = np.stack([columns.get(name, unknown) for name in CONFIDENCE_COLUMNS], axis=-1)
     points = np.where(np.isnan(points).any(axis=-1, keepdims=True), np.nan, points)
     return ImageRows(
         frame=numbers,
         time=columns["time"] if timed else numbers / (rate or ASSUMED_VIEW_RATE),
         points=points,
-        confidence=np.where(np.isnan(points[..., 0]), np.nan, sure),
+        confidence=np.where(np.isnan(points[:, : len(POINTS), 0]), np.nan, sure),
         root=np.stack([columns.get(name, unknown) for name in ROOT_COLUMNS], axis=-1),
     )

@@ -16,7 +16,7 @@ from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.work import Work
 from posekit.formats.own import LeeChenModel, OpenCVModel, View
 from posekit.geometry import Array
-from posekit.skeleton import HEAD_POINTS, JOINTS, SIDES
+from posekit.skeleton import JOINTS, POINTS, SIDES
 from posekit.synthesis import Capture, clip_lengths
 from posekit.synthesis.viewpoints import to_camera
 
@@ -144,7 +144,8 @@ def of_view(view: View, method: Method, name: str = "view") -> Material:
         neck = view.truth[:, 0]
         view = replace(view, root=np.where(np.isnan(neck), view.root, neck))
     rng = np.random.default_rng((method.seed, 0))
-    draw = rng.standard_normal((len(view), len(JOINTS) + len(HEAD_POINTS), 2))
+    own = len(view.own_head_names)
+    draw = rng.standard_normal((len(view), len(POINTS) + own, 2))
     works = []
     for level, sigma in enumerate(method.noise):
         noisy = _noisy(view, sigma, draw)
@@ -186,7 +187,8 @@ def _noisy(view: View, sigma: float, draw: Array) -> View:
     return replace(
         view,
         image=image,
-        head_image=view.head_image + sigma * draw[:, len(JOINTS) :],
+        head_image=view.head_image + sigma * draw[:, len(JOINTS) : len(POINTS)],
+        own_head_image=view.own_head_image + sigma * draw[:, len(POINTS) :],
         deviation=float(np.hypot(sigma, view.deviation or 0.0)),
     )
 

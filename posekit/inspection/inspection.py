@@ -183,15 +183,16 @@ def _view(view: View) -> list[str]:
     kind = {OpenCVModel: "opencv", ScaledOrthographicModel: "scaled-orthographic"}.get(
         type(view.camera), "lee-chen"
     )
-    seen = np.isfinite(np.concatenate([view.image, view.head_image], axis=1)[..., 0])
-    missing = [name for name, there in zip(POINTS, seen.any(axis=0).tolist(), strict=True) if not there]
+    seen = np.isfinite(np.concatenate([view.image, view.head_image, view.own_head_image], axis=1)[..., 0])
+    points = (*POINTS, *view.own_head_names)
+    missing = [name for name, there in zip(points, seen.any(axis=0).tolist(), strict=True) if not there]
     known = {
         "root": np.isfinite(view.root[:, 0]).sum(),
         "truth": np.isfinite(view.truth).any(axis=(1, 2)).sum(),
         "confidence": np.isfinite(view.confidence).any(axis=1).sum(),
     }
     rows = [
-        (name, f"{share * 100:.0f} %") for name, share in zip(POINTS, seen.mean(axis=0).tolist(), strict=True)
+        (name, f"{share * 100:.0f} %") for name, share in zip(points, seen.mean(axis=0).tolist(), strict=True)
     ]
     more = ", ".join(f"{name} in {count}" for name, count in known.items())
     return [

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from posekit.cameras.head import HeadPose
     from posekit.cameras.neck import NeckPlacement
 
+ENOUGH_POINTS = 1 + len(HEAD_POINTS)
+"""Points of the head that tell its camera (Lee & Chen 1985, §2.1): neck, nose, eyes and ears, or others for them."""
+
 ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 """Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
 
@@ -114,9 +117,9 @@ def fit_camera(
     """
     n = len(view.time)
     shown = ~neckless(view)
-    image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
+    image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
     image[~shown] = np.nan
-    seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= 1 + len(HEAD_POINTS)
+    seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= ENOUGH_POINTS
     rooting = rooting or Rooting()
     # A neck that was put between the shoulders is no point of the head. Where all necks are given, it is only turned.
     trusted = rooting.trust_head or np.isfinite(view.root[shown]).all()
@@ -130,10 +133,10 @@ def fit_camera(
     for k in np.flatnonzero(~shown).tolist():
         reasons[k] = f"frames[{k}]: {why_neckless(view.image[k], view.derived)[0]}"
     if pose is not None:
-        neck = pose.points_cam[:, 0]
+        neck = pose.point("neck")
         unknown = np.isnan(root).any(axis=1)
         root[unknown] = neck[unknown]
-        head = pose.points_cam[:, 1 : 1 + len(HEAD)] - neck[:, None] + root[:, None]
+        head = figure.head_points[1:] @ np.swapaxes(pose.R_cam_head, -1, -2) + root[:, None]
     if isinstance(model, LeeChenModel) and model.f is None and pose is not None:
         root[~pose.found] = (
             np.nan
@@ -167,7 +170,7 @@ def fit_camera(
 def _head_pose(
     view: View, figure: Figure, image: Array, *, worth: bool
 ) -> tuple[PinholeCamera, HeadPose | None]:
-    """Find the camera, and where it sees the head (F, 6, 2) wherever that is worth it or tells the focal length."""
+    """Find the camera, and where it sees the head (F, 6 + K, 2) where that is worth it or tells the focal length."""
     model = view.camera
     if isinstance(model, ScaledOrthographicModel):
         raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
@@ -176,9 +179,19 @@ def _head_pose(
     if worth or unknown or view.head_points:
         from posekit.cameras.head import HeadPoints, calibrate, solve_pose
 
+        given = dict(view.head_points or {})
         names = ("neck", *HEAD_POINTS)
-        own = {name: figure.head_points[k] for k, name in enumerate(names)}
-        points = HeadPoints.from_mapping(own | dict(view.head_points or {}))
+        # The figure's points count from its neck, the view's from where they were measured.
+        origin = np.asarray(given.get("neck", np.zeros(3)))
+        every = {name: origin + at for name, at in zip(names, figure.head_points, strict=True)} | given
+        # Points that nobody measured nor sees are no part of this head: one of its own may lie there.
+        used = [
+            k
+            for k, name in enumerate(every)
+            if name in given or len(given) < ENOUGH_POINTS or np.isfinite(image[:, k, 0]).any()
+        ]
+        image = image[:, used]
+        points = HeadPoints.from_mapping({name: every[name] for k, name in enumerate(every) if k in used})
         if isinstance(model, LeeChenModel) and (worth or unknown):
             pose = calibrate(points, image, f=model.f, threads=n_threads())
         elif isinstance(model, OpenCVModel) and worth:

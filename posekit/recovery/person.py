@@ -27,6 +27,7 @@ def person_of(view: View, figure: Figure) -> Figure:
     head = {
         name: tuple(np.asarray(at, dtype=np.float64).tolist())
         for name, at in (view.head_points or {}).items()
+        if name not in view.own_head_names
     }
     return _person(figure, view.stature, tuple(view.lengths.items()), view.shoulders, tuple(head.items()))
 

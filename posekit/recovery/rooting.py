@@ -45,7 +45,7 @@ def place_roots(
     """
     from posekit.cameras.neck import place
 
-    detected = bool(view.derived)
+    detected, given = bool(view.derived), dict(view.head_points or {})
     deviation = (
         rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEFAULT_DEVIATION_PIXELS)
     )
@@ -59,7 +59,8 @@ def place_roots(
             PinholeCamera(K=K if K.ndim == 2 else K[rows], distortion=camera.distortion),
             figure,
             view.image[frames[rows]],
-            view.head_image[frames[rows]],
+            np.concatenate([view.head_image, view.own_head_image], axis=1)[frames[rows]],
+            own_head=[given[name] - given.get("neck", 0.0) for name in view.own_head_names],
             method=rooting.method,
             deviation=deviation,
             offset=offset,

@@ -303,7 +303,22 @@ BAD = [
     (("figure", "lengths", "pelvis-neck"), 5, "expected the name of a segment; did you mean neck-pelvis?"),
     (("figure", "lengths", "right_hip-knee"), 5, "did you mean right_hip-right_knee"),
     (("figure", "stature"), 0, "figure.stature: got 0; expected a number greater than 0"),
-    (("figure", "head_points"), {"chin": [1, 2, 3]}, 'figure.head_points.chin: got "chin"'),
+    (("figure", "head_points"), {"left_hip": [1, 2, 3]}, 'figure.head_points.left_hip: got "left_hip"'),
+    (
+        ("figure", "head_points"),
+        {"noze": [1, 2, 3]},
+        'figure.head_points.noze: got "noze"; expected the name of a head',
+    ),
+    (
+        ("figure", "head_points"),
+        {"c" * 61: [1, 2, 3]},
+        "expected the name of a head point; give a name of up to 60",
+    ),
+    (
+        ("figure", "head_points"),
+        {"\x07": [1, 2, 3]},
+        "expected the name of a head point; give a name of up to 60",
+    ),
     (("figure", "head_points"), {"nose": [1, 2]}, "figure.head_points.nose: got [1, 2]"),
     (("figure", "height"), 5, "figure.height: got 5; expected no field of this name"),
 ]
@@ -384,7 +399,11 @@ half_known[1, 3, 0] = 1.0
         ({"lengths": {"neck-pelvis": 0.0}}, "lengths.neck-pelvis: got 0.0; expected a positive length"),
         ({"lengths": {"neck-pelvis": np.nan}}, "lengths.neck-pelvis: got NaN"),
         ({"stature": -1.0}, "stature: got -1.0"),
-        ({"head_points": {"chin": np.zeros(3)}}, 'head_points: got "chin"'),
+        ({"head_points": {"left_hip": np.zeros(3)}}, 'head_points: got "left_hip"'),
+        (
+            {"head_points": {"chin": np.zeros(3)}, "own_head_image": np.zeros((2, 2, 2))},
+            "own_head_image: got shape",
+        ),
         ({"head_points": {"nose": np.zeros(2)}}, "head_points.nose: got"),
     ],
 )

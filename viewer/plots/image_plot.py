@@ -53,7 +53,7 @@ def plot_image(view: View, frames: Sequence[int] | None = None, *, result: Resul
     metric = isinstance(view.camera, LeeChenModel)
     scale = {"m": 1.0, "cm": 100.0, "mm": 1000.0}[view.unit] if metric else 1.0
     image = scale * view.image[chosen]
-    head = scale * view.head_image[chosen]
+    head = scale * np.concatenate([view.head_image, view.own_head_image], axis=1)[chosen]
     again = [np.empty((0, 2))] * len(chosen) if result is None else _reprojected(view, result, chosen, scale)
     with drawing() as kind:
         figure, axes = panels(kind, len(chosen), columns=6, size=(1.5, 2.9), what="frames", sharey=True)

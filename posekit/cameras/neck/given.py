@@ -44,6 +44,8 @@ class NeckSettings:
         Metres within which some neck shall be of any depth that is possible.
     most : int
         The most necks a frame; where they do not suffice, they are wider apart (`NeckPlacement.step`).
+    own_head : array (K, 3)
+        Points of the user's own on the head, from its neck, the head's frame, metres; `head_image` has them last.
     """
 
     method: RootMethod = "auto"
@@ -53,6 +55,7 @@ class NeckSettings:
     tangent: float | None = None
     reach: float = REACH_METRES
     most: int = MAX_NECKS
+    own_head: ArrayLike = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,7 +66,7 @@ class PlacementInput:
     ----------
     image : array (F, 14, 2)
         Joints, pixels.
-    head_image : array (F, 5, 2)
+    head_image : array (F, 5 + K, 2)
         Head points, pixels.
     root : array (F, 3)
         Necks that are known, metres.
@@ -104,9 +107,10 @@ class PlacementInput:
             raise InputError(
                 f"the camera has K for {len(camera.K)} frames, the image has {frames}; give one K, or one a frame"
             )
-        head = np.full((frames, len(HEAD_POINTS), 2), np.nan)
+        count = len(HEAD_POINTS) + len(np.reshape(settings.own_head, (-1, 3)))
+        head = np.full((frames, count, 2), np.nan)
         if head_image is not None:
-            head = _points("head_image", head_image, (len(HEAD_POINTS), 2), frames)
+            head = _points("head_image", head_image, (count, 2), frames)
         roots = np.full((frames, 3), np.nan)
         if root is not None:
             roots = _points("root", root, (3,), frames)

@@ -1,6 +1,6 @@
 """The neck's depth from the head: eyes, ears and nose behind a known camera.
 
-The five points alone give the head's pose: a detector's neck is the middle of the shoulders, which is not rigid with
+Four points or more, mostly these five, give its pose: a detector's neck is the middle of the shoulders, not rigid with
 the head (`posekit.cameras.head` needs a sixth point, because it finds f too). The neck is then the head's own, where
 the figure's head turns about; on a person it moves against the head by a centimetre or two when the head nods, which
 `offset` of the neck allows for. Meeting the neck's ray with the sphere of the neck's distance about the head would
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.body import Figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.pose import poses
 from posekit.cameras.neck.suggestion import PartSuggestion, suggest
@@ -21,7 +20,7 @@ from posekit.geometry import Array
 
 def head_suggestion(
     camera: PinholeCamera,
-    figure: Figure,
+    head: Array,
     head_image: Array,
     ray: Array,
     deviation: Array,
@@ -32,17 +31,19 @@ def head_suggestion(
 
     Parameters
     ----------
-    head_image : array (F, 5, 2)
+    head : array (P, 3)
+        Points of the head from its neck, the head's frame, metres.
+    head_image : array (F, P, 2)
         Pixels, NaN where not seen.
     ray : array (F, 3)
         Unit vectors to the neck's image.
-    deviation : array (F, 5)
+    deviation : array (F, P)
         Pixels.
-    offset : array (5,)
+    offset : array (P,)
         Metres by which the head's points may be elsewhere than on the figure's head.
     bent : float
         The same for its neck.
     """
-    placed = poses(camera, figure.head_points[1:], head_image, deviation, offset)
+    placed = poses(camera, head, head_image, deviation, offset)
     seen = np.isfinite(head_image).all(axis=-1).sum(axis=1)
     return suggest("head", placed, ray, seen, bent)

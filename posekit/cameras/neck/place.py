@@ -53,8 +53,8 @@ def place(
         With the person's lengths and head.
     image : array (F, 14, 2)
         The joints, pixels; NaN where not seen.
-    head_image : array (F, 5, 2), optional
-        Nose, eyes and ears, likewise.
+    head_image : array (F, 5 + K, 2), optional
+        Nose, eyes and ears, likewise, then points of the user's own on the head (`NeckSettings.own_head`).
     root : array (F, 3), optional
         The neck where it is known, camera frame, metres; NaN elsewhere.
     settings : NeckSettings
@@ -103,8 +103,20 @@ def _suggestions(
     """Ask the rigid parts that the method allows, in the order in which they are believed."""
     n, parts = len(JOINTS), []
     if method in ("auto", "head"):
-        of_head = given.deviation[:, n:], given.offset[n:], float(given.offset[0])
-        parts.append(head_suggestion(camera, figure, given.head_image, ray, *of_head))
+        # Points of the user's own are as far off as the head's others are on average.
+        own = np.asarray(given.settings.own_head, dtype=np.float64).reshape(-1, 3)
+        of_own = np.repeat(given.deviation[:, n:].mean(axis=1, keepdims=True), len(own), axis=1)
+        parts.append(
+            head_suggestion(
+                camera,
+                np.concatenate([figure.head_points[1:], own]),
+                given.head_image,
+                ray,
+                np.concatenate([given.deviation[:, n:], of_own], axis=1),
+                np.append(given.offset[n:], np.repeat(given.offset[n:].mean(), len(own))),
+                float(given.offset[0]),
+            )
+        )
     if method in ("auto", "torso"):
         of_torso = given.deviation[:, :n], given.offset[:n]
         parts.append(torso_suggestion(camera, figure, given.image, ray, *of_torso))

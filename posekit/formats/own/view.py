@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
@@ -15,14 +15,14 @@ from posekit.display.short_repr import short
 from posekit.display.stick_drawing import image_drawing
 from posekit.formats.own.camera_model import CameraModel, ScaledOrthographicModel
 from posekit.formats.own.units import FARTHEST_COORDINATE, Unit
-from posekit.formats.own.view_schema import HEAD_NAMES
+from posekit.formats.own.view_schema import HEAD_NAMES, is_head_name
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 Array = NDArray[np.float64]
 
-FRAME_ARRAYS: Final = ("time", "image", "head_image", "confidence", "root", "truth")
+FRAME_ARRAYS: Final = ("time", "image", "head_image", "own_head_image", "confidence", "root", "truth")
 """What a view has of each frame."""
 
 
@@ -46,6 +46,8 @@ class View(Pictured):
         scaled orthographic: postures hang on it.
     head_image : array (F, 5, 2), optional
         Head points as seen, in the order of `posekit.skeleton.HEAD_POINTS`.
+    own_head_image : array (F, K, 2), optional
+        Head points of the user's own as seen, in the order of `own_head_names`.
     confidence : array (F, 19), optional
         How sure the image points are, joints and head points, as the detector says it: mostly 0 to 1.
     root : array (F, 3), optional
@@ -65,7 +67,8 @@ class View(Pictured):
     derived : tuple of str
         Joints of `image` that no detector saw: they were put between others that it saw.
     head_points : mapping of str to array (3,), optional
-        The rigid head's points in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them.
+        The rigid head's points in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them,
+        and any number of others under names of their own (Lee & Chen 1985, §2.1, recommend more than six).
     unit : {"m", "cm", "mm"}
         The unit of its file; in memory all is metres.
 
@@ -84,6 +87,7 @@ class View(Pictured):
     time: Array
     image: Array
     head_image: Array = field(default_factory=_no_frames)
+    own_head_image: Array = field(default_factory=_no_frames)
     confidence: Array = field(default_factory=_no_frames)
     root: Array = field(default_factory=_no_frames)
     truth: Array = field(default_factory=_no_frames)
@@ -102,6 +106,7 @@ class View(Pictured):
             "time": (frames,),
             "image": (frames, len(JOINTS), 2),
             "head_image": (frames, len(HEAD_POINTS), 2),
+            "own_head_image": (frames, len(self.own_head_names), 2),
             "confidence": (frames, len(POINTS)),
             "root": (frames, 3),
             "truth": (frames, len(JOINTS), 3),
@@ -110,7 +115,9 @@ class View(Pictured):
             raise refusal("view", "time", "no frame", "at least one", "give every frame its time")
         for name, shape in shapes.items():
             given = np.array(getattr(self, name), dtype=np.float64)
-            values = np.full(shape, np.nan) if given.shape == (0,) else given
+            # No points of its own, of other frames: what a view is replaced from has them so.
+            absent = given.shape == (0,) or (name == "own_head_image" and not given.size)
+            values = np.full(shape, np.nan) if absent else given
             if values.shape != shape:
                 raise refusal("view", name, f"shape {values.shape}", f"{shape}", "give one row a frame")
             _check_points(name, values)
@@ -125,6 +132,11 @@ class View(Pictured):
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.time)
+
+    @property
+    def own_head_names(self) -> tuple[str, ...]:
+        """The head points beyond neck, nose, eyes and ears."""
+        return own_names(self.head_points or ())
 
     def take(self, rows: NDArray[np.intp] | Sequence[int] | slice) -> View:
         """Return some of its frames."""
@@ -174,7 +186,10 @@ class View(Pictured):
             return
         points = {}
         for name, value in self.head_points.items():
-            _check_name("head_points", name, HEAD_NAMES)
+            if not is_head_name(name):
+                raise refusal(
+                    "view", "head_points", shown(name), "the name of a head point", "give another name"
+                )
             points[name] = point = np.array(value, dtype=np.float64)
             if point.shape != (3,) or not np.isfinite(point).all():
                 raise refusal(
@@ -182,6 +197,11 @@ class View(Pictured):
                 )
             point.flags.writeable = False
         object.__setattr__(self, "head_points", points)
+
+
+def own_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of head points that are the user's own."""
+    return tuple(name for name in names if name not in HEAD_NAMES)
 
 
 def _check_points(name: str, values: Array) -> None:

@@ -13,7 +13,7 @@ from posekit.cameras.lee_chen import image_from_paper
 from posekit.errors import CameraError
 from posekit.formats.own.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
-from posekit.formats.own.view import View
+from posekit.formats.own.view import View, own_names
 from posekit.formats.own.view_schema import (
     VIEW_SCHEMA,
     LeeChenCamera,
@@ -63,7 +63,8 @@ def read_view(path: str | Path) -> View:
     file = validated(ViewFile, document, path)
     frames, unit, figure = file.frames, file.unit, file.figure
     image = _gather([frame.image for frame in frames], JOINTS, 2)
-    head_image = _gather([frame.head_image for frame in frames], HEAD_POINTS, 2)
+    own = own_names((figure.head_points if figure else None) or ())
+    head_image = _gather([frame.head_image for frame in frames], (*HEAD_POINTS, *own), 2)
     if isinstance(file.camera, LeeChenCamera):
         image = image_from_paper(to_metres(image, unit))
         head_image = image_from_paper(to_metres(head_image, unit))
@@ -72,7 +73,8 @@ def read_view(path: str | Path) -> View:
         camera=_camera(file, path),
         time=np.array([frame.time for frame in frames], dtype=np.float64),
         image=image,
-        head_image=head_image,
+        head_image=head_image[:, : len(HEAD_POINTS)],
+        own_head_image=head_image[:, len(HEAD_POINTS) :],
         confidence=_gather_numbers([frame.confidence for frame in frames], POINTS),
         root=to_metres(roots, unit),
         truth=to_metres(_gather([frame.truth for frame in frames], JOINTS, 3), unit),
@@ -112,13 +114,15 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
     unit = unit or view.unit
     plane = isinstance(view.camera, LeeChenModel)
     image = from_metres(image_from_paper(view.image), unit) if plane else view.image
-    head_image = from_metres(image_from_paper(view.head_image), unit) if plane else view.head_image
+    head_image = np.concatenate([view.head_image, view.own_head_image], axis=1)
+    if plane:
+        head_image = from_metres(image_from_paper(head_image), unit)
     truth = from_metres(view.truth, unit)
     root = from_metres(view.root, unit)
     frames = []
     for index in range(len(view)):
         frame: dict[str, Any] = {"time": float(view.time[index]), "image": _known(image[index], JOINTS)}
-        if head := _known(head_image[index], HEAD_POINTS):
+        if head := _known(head_image[index], (*HEAD_POINTS, *view.own_head_names)):
             frame["head_image"] = head
         if sure := _known_numbers(view.confidence[index], POINTS):
             frame["confidence"] = sure

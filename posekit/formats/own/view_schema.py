@@ -3,25 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, FailFast, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, FailFast, Field, model_validator
 
 from posekit.display.plural import plural
 from posekit.formats.own.camera_model import check_intrinsics, check_rotation
 from posekit.formats.own.units import Unit
+from posekit.safe_io.refusal import cut, nearest, shown
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.tables.file_model import FileModel, checked, named, refuse
 
 VIEW_SCHEMA = "posekit.view/1"
 HEAD_NAMES = ("neck", *HEAD_POINTS)
+LONGEST_NAME = 60
+"""Characters of the name of a head point of the user's own."""
+MISSPELT_LIKENESS = 0.75
+"""Likeness (`difflib`) to a usual head point's name from which an own point that is seen nowhere is a misspelling."""
 
 
 def _keys(names: tuple[str, ...], **more: Any) -> Any:
     """Say in the published schema which keys an object may have."""
     return Field(json_schema_extra={"propertyNames": {"enum": list(names)}, **more})
 
+
+def is_head_name(name: str) -> bool:
+    """Tell whether a head point can have this name: any short one that is no other joint's."""
+    return name in HEAD_NAMES or (
+        0 < len(name.strip()) <= len(name) <= LONGEST_NAME and name.isprintable() and name not in JOINTS
+    )
+
+
+def _head_named(value: Any) -> Any:
+    for name in value if isinstance(value, dict) else ():
+        if not is_head_name(name):
+            remedy = f"give a name of up to {LONGEST_NAME} characters that no joint has"
+            refuse("the name of a head point", remedy, at=cut(name), got=shown(name))
+    return value
+
+
+HEAD_NAMED = BeforeValidator(_head_named)
+_HEAD_KEYS = {"minLength": 1, "maxLength": LONGEST_NAME, "not": {"enum": list(JOINTS[1:])}}
 
 Point2 = Annotated[list[float], Field(min_length=2, max_length=2)]
 Point3 = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -31,11 +55,15 @@ Confidence = Annotated[float, Field(ge=0)]
 Pixels = Annotated[int, Field(gt=0, le=10**6)]
 
 Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), _keys(JOINTS)]
-HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
+HeadImage = Annotated[
+    dict[str, Point2],
+    HEAD_NAMED,
+    Field(json_schema_extra={"propertyNames": {**_HEAD_KEYS, "not": {"enum": list(JOINTS)}}}),
+]
 Sure = Annotated[dict[str, Confidence], named(POINTS, "joint or head point"), _keys(POINTS)]
 Derived = Annotated[list[Literal[JOINTS]], Field(max_length=len(JOINTS))]  # type: ignore[valid-type]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
-HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]
+HeadPoints = Annotated[dict[str, Point3], HEAD_NAMED, Field(json_schema_extra={"propertyNames": _HEAD_KEYS})]
 Lengths = Annotated[dict[str, Positive], named(SEGMENT_NAMES, "segment"), _keys(SEGMENT_NAMES)]
 
 
@@ -88,7 +116,8 @@ class FigureFields(FileModel):
     )
     stature: Positive | None = Field(default=None, description="Height of the person, in `unit`.")
     head_points: HeadPoints | None = Field(
-        default=None, description="Points of the rigid head in the head's frame, in `unit`."
+        default=None,
+        description="Points of the rigid head in the head's frame, in `unit`: neck, nose, eyes, ears, and any others.",
     )
 
 
@@ -100,7 +129,10 @@ class FrameFields(FileModel):
         description="Where each joint is seen; one that is not seen is left out. The neck is seen in one frame at "
         "least, unless the camera is scaled-orthographic."
     )
-    head_image: HeadImage | None = Field(default=None, description="Where each point of the head is seen.")
+    head_image: HeadImage | None = Field(
+        default=None,
+        description="Where each point of the head is seen: nose, eyes, ears, and others that `head_points` names.",
+    )
     confidence: Sure | None = Field(
         default=None, description="How sure each image point is, as its detector says it: mostly 0 to 1."
     )
@@ -164,6 +196,27 @@ class ViewFile(FileModel):
         description="Joints of `image` that no detector saw: they were put between others that it saw.",
     )
     frames: Annotated[list[FrameFields], Field(min_length=1), FailFast()]
+
+    @model_validator(mode="after")
+    def _head_is_known(self) -> ViewFile:
+        """Refuse names on one side only: an image point without its place, and a place that is a misspelt name."""
+        places = (self.figure.head_points if self.figure else None) or {}
+        known = {*HEAD_POINTS, *places} - {"neck"}
+        seen: set[str] = set()
+        for index, frame in enumerate(self.frames):
+            for name in frame.head_image or ():
+                if name not in known:
+                    remedy = f"{nearest(name, sorted(known))}; or give its place in figure.head_points"
+                    at = f"frames[{index}].head_image.{cut(name)}"
+                    refuse("the name of a head point", remedy, at=at, got=shown(name))
+            seen.update(frame.head_image or ())
+        for name in places.keys() - seen - set(HEAD_NAMES):
+            if meant := get_close_matches(name, HEAD_NAMES, n=1, cutoff=MISSPELT_LIKENESS):
+                remedy = f"did you mean {meant[0]}? or say in head_image where {cut(name)} is seen"
+                refuse(
+                    "the name of a head point", remedy, at=f"figure.head_points.{cut(name)}", got=shown(name)
+                )
+        return self
 
     @model_validator(mode="after")
     def _neck_is_seen(self) -> ViewFile:

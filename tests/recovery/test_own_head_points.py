@@ -1,0 +1,146 @@
+"""Heads of more than six points, under names of the user's own (Lee & Chen 1985, §2.1)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.batch.image_rows import ImageRows
+from posekit.batch.view_table import open_view_table, read_rows, write_view_table
+from posekit.cameras import PinholeCamera
+from posekit.cameras.head import TABLE_A2
+from posekit.cameras.neck import place
+from posekit.errors import HeadError
+from posekit.formats.own import LeeChenModel, OpenCVModel, View, read_view, write_view
+from posekit.recovery.fit_camera import fit_camera
+from posekit.skeleton import HEAD_POINTS
+
+OWN = {
+    "chin": (-0.302, 0.565, 0.0),
+    "forehead": (-0.310, 0.700, 0.010),
+    "left_temple": (-0.345, 0.655, -0.070),
+    "right_temple": (-0.345, 0.655, 0.070),
+    "back of the head": (-0.450, 0.620, 0.005),
+    "crown": (-0.380, 0.740, 0.0),
+    "jaw": (-0.330, 0.580, 0.050),
+    "left lobe": (-0.355, 0.580, -0.080),
+}
+
+
+@pytest.fixture(scope="module")
+def walk() -> View:
+    return posekit.builtin_view("seq1")
+
+
+def in_camera(view: View) -> np.ndarray:
+    """Place the own points (8, 3) where the walker's head is, which faces the camera."""
+    turned = np.array([[0, 0, -1], [0, -1, 0], [-1, 0, 0]])
+    return (np.array(list(OWN.values())) - TABLE_A2.points[0]) @ turned.T + view.truth[0, 0]
+
+
+def with_own(view: View, *, only: bool = False, f: float = 0.05) -> View:
+    """Add points of its own to the head of SEQ1, where the true head is; with `only`, the neck alone stays besides."""
+    cam = in_camera(view)
+    seen = f * cam[:, :2] / cam[:, 2:]
+    heads = {"neck": view.head_points["neck"]} if only else dict(view.head_points)
+    return replace(
+        view,
+        head_points=heads | {name: np.array(at) for name, at in OWN.items()},
+        head_image=view.head_image * (np.nan if only else 1.0),
+        own_head_image=np.repeat(seen[None], len(view), axis=0),
+    )
+
+
+@pytest.mark.parametrize("only", [False, True])
+def test_a_head_of_own_points_gives_the_certified_postures_of_the_usual_six(walk, only, tmp_path):
+    write_view(tmp_path / "view.json", with_own(walk, only=only))
+    view = read_view(tmp_path / "view.json")
+    assert view.own_head_names == tuple(OWN)
+    own, usual = posekit.recover(view), posekit.recover(walk)
+    for mine, theirs in zip(own.frames, usual.frames, strict=True):
+        np.testing.assert_allclose(mine.joints, theirs.joints, atol=1e-6)
+    np.testing.assert_allclose(fit_camera(view, own.figure).pose.f, 0.05, rtol=1e-6)
+
+
+def test_more_points_tell_a_noisy_camera_better(walk, rng):
+    """What the paper recommends them for."""
+    full = with_own(walk).take([0] * 100)
+    noisy = replace(
+        full,
+        head_image=full.head_image + 2e-6 * rng.standard_normal(full.head_image.shape),
+        own_head_image=full.own_head_image + 2e-6 * rng.standard_normal(full.own_head_image.shape),
+    )
+    fewer = replace(noisy, own_head_image=np.nan * noisy.own_head_image)
+    off = []
+    for view in (fewer, noisy):
+        pose = fit_camera(view, posekit.load_figure()).pose
+        off.append(np.median(np.abs(pose.f[pose.found] / 0.05 - 1)))
+    assert off[1] < 0.8 * off[0]
+
+
+def test_points_that_are_hidden_in_a_frame_are_left_out_of_it(walk):
+    view = with_own(walk)
+    head, own = view.head_image.copy(), view.own_head_image.copy()
+    head[0] = np.nan
+    own[1, :3] = np.nan
+    own[2] = np.nan
+    head[2, 1:] = np.nan
+    recovery = posekit.recover(
+        replace(view, head_image=head, own_head_image=own, camera=LeeChenModel(f=None))
+    )
+    assert [len(frame) > 0 for frame in recovery.frames] == [True, True, False, True, True]
+    assert "2 of 14 head points are known, at least 6 are needed" in recovery.frames[2].reason
+
+
+@pytest.mark.parametrize(
+    ("move", "text"),
+    [
+        ({"crown": OWN["chin"]}, "chin and crown coincide"),
+        ({name: (-0.34, y, z) for name, (_, y, z) in OWN.items()}, "lie in one plane"),
+    ],
+)
+def test_points_that_tell_no_camera_are_refused(walk, move, text):
+    view = with_own(walk, only=True)
+    points = view.head_points | {name: np.array(at) for name, at in move.items()}
+    if len(move) > 1:
+        points["neck"] = np.array([-0.34, *points["neck"][1:]])
+    with pytest.raises(HeadError, match=text):
+        posekit.recover(replace(view, head_points=points))
+
+
+def test_own_points_alone_place_the_neck_before_a_known_camera(walk):
+    K = np.array([[1000.0, 0, 500], [0, 1000, 500], [0, 0, 1]])
+    neck = walk.truth[0, 0]
+    image = PinholeCamera(K=K).project(np.concatenate([walk.truth[0], in_camera(walk)]))
+    head = np.full((1, len(HEAD_POINTS) + len(OWN), 2), np.nan)
+    head[0, len(HEAD_POINTS) :] = image[14:]
+    own = np.array(list(OWN.values())) - TABLE_A2.points[0]
+    figure = posekit.load_figure()
+    [placed] = place(
+        PinholeCamera(K=K), figure, image[None, :14], head, method="head", own_head=own, deviation=0.1
+    )
+    assert placed.method == "head"
+    assert abs(placed.estimate - neck[2]) < 0.01
+    view = View(
+        camera=OpenCVModel(K=K),
+        time=[0.0],
+        image=image[None, :14],
+        own_head_image=head[:, len(HEAD_POINTS) :],
+        head_points={"neck": TABLE_A2.points[0]} | OWN,
+        lengths=walk.lengths,
+        shoulders=walk.shoulders,
+    )
+    [frame] = posekit.recover(view).frames
+    assert np.abs(frame.joints - walk.truth[0]).max(axis=(1, 2)).min() < 1e-4
+
+
+def test_tables_of_views_keep_own_points(walk, tmp_path):
+    view = with_own(walk)
+    write_view_table(tmp_path / "walk.parquet", view)
+    assert {"chin_u", "back of the head_v"} <= set(open_view_table(tmp_path / "walk.parquet").names)
+    [rows] = read_rows(tmp_path / "walk.parquet", 0, len(view))
+    np.testing.assert_array_equal(rows.view(view).own_head_image, view.own_head_image)
+    laid = ImageRows.of_view(view).laid_out(np.arange(7), np.arange(7.0))
+    np.testing.assert_array_equal(laid.points[:5, 19:], view.own_head_image)
+    assert np.isnan(laid.points[5:]).all()
