@@ -9,6 +9,7 @@ import numpy as np
 from posekit.errors import ViewerError
 from posekit.formats.markdown import table_lines
 from posekit.papers.taylor_constrained import Constrained, constrained, constrained_lines
+from posekit.papers.taylor_random_views import RandomViews, random_views, random_views_lines
 from posekit.papers.taylor_study import Study, synthetic_study
 from posekit.recovery.taylor_figure.proportions import TABLE_1
 from posekit.safe_io.writing import write_json, write_lines
@@ -18,7 +19,7 @@ N_PICTURES = 100
 
 
 def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
-    """Write ``taylor.md`` and ``taylor.json`` into a folder, and the curves of Figs. 7b and 8b.
+    """Write ``taylor.md`` and ``taylor.json`` into a folder, the curves of Figs. 7b and 8b, and random views.
 
     Parameters
     ----------
@@ -33,6 +34,7 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         The lines of the report.
     """
     objects = constrained()
+    views = [random_views(one) for one in objects]
     study = synthetic_study(N_PICTURES)
     lines = [
         "# Taylor 2000, reproduced",
@@ -49,12 +51,23 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         "",
         *constrained_lines(objects),
         *(_curves(folder, objects) if pictures else ()),
+        "### From random directions",
+        "",
+        *random_views_lines(views),
+        *(_scatter(folder, views) if pictures else ()),
         *(f"#{line}" if line.startswith("#") else line for line in study.lines()),
     ]
     write_lines(folder / "taylor.md", lines)
     write_json(
         folder / "taylor.json",
-        {"table1": TABLE_1, "objects": [_plain(one) for one in objects], **_numbers(study)},
+        {
+            "table1": TABLE_1,
+            "objects": [
+                {**_plain(one), "random_views": more.plain()}
+                for one, more in zip(objects, views, strict=True)
+            ],
+            **_numbers(study),
+        },
     )
     return lines
 
@@ -80,6 +93,27 @@ def _curves(folder: Path, objects: list[Constrained]) -> list[str]:
             return [f"The curves of Figs. 7b and 8b are left out: {error}", ""]
         lines += [f"![The residual over the scale, as in the paper's {one.figure}b]({name})", ""]
     return lines
+
+
+def _scatter(folder: Path, views: list[RandomViews]) -> list[str]:
+    """Draw every view's error over what the noise allows."""
+    from posekit.viewer.plots import plot_noise_bound, save
+
+    studies = [
+        (
+            f"Like {one.constrained.figure}",
+            one.constrained.printed,
+            one.deviation,
+            one.worst,
+            one.solvable,
+        )
+        for one in views
+    ]
+    try:
+        save(plot_noise_bound(studies), folder / "taylor.views.png")
+    except ViewerError as error:
+        return [f"The picture of the views is left out: {error}", ""]
+    return ["![The largest error of each view over what the noise allows](taylor.views.png)", ""]
 
 
 def _plain(one: Constrained) -> dict[str, object]:

@@ -125,7 +125,7 @@ def _measure(
     exact = LinkageFamily(linkage=linkage, image=points[:, :2] * s)
     flips = exact.flips_of(points)
     nearer = name_nearer(linkage, flips)
-    triples = _triples(len(points), closed=constraint == "closure")
+    triples = triples_of(len(points), closed=constraint == "closure")
     true = joint_angles(points, triples)
     rng = np.random.default_rng(seed)
     worst = np.full(pictures, np.inf)
@@ -149,7 +149,7 @@ def _measure(
     )
 
 
-def _triples(n: int, *, closed: bool) -> list[tuple[int, int, int]]:
+def triples_of(n: int, *, closed: bool) -> list[tuple[int, int, int]]:
     """Return the points before, at and after each joint of a chain."""
     joints = range(n) if closed else range(1, n - 1)
     return [((k - 1) % n, k, (k + 1) % n) for k in joints]
