@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from posekit.errors import ViewerError
-from posekit.formats.own import Result, View
+from posekit.formats.own import Result, ResultFrame, View
 
-MAX_PANELS = 16
-"""Survivors of the first frame that are drawn one by one."""
+MAX_GROUPS = 64
+"""Groups of the first frame that are drawn one by one; where it has none, each survivor is one."""
 
 SCENE_GROUPS = 8
 """Groups of the first frame whose representatives stand side by side in the scene."""
@@ -29,8 +30,9 @@ def illustrate(
     Parameters
     ----------
     folder : Path
-        Where ``NAME.page.html``, ``NAME.image.png``, ``NAME.levels.png``, ``NAME.projections.png``,
-        ``NAME.tree.png`` and ``NAME.scene.png`` are written.
+        Where ``NAME.page.html``, ``NAME.image.png``, ``NAME.levels.png``, ``NAME.projections.png`` (one
+        survivor of each group), ``NAME.superposed.png`` (these in one drawing), ``NAME.tree.png``
+        and ``NAME.scene.png`` are written.
     result : Result
         Explained, for the tree.
     view : View
@@ -73,13 +75,19 @@ def _plots(
     printed_frames: Sequence[int],
 ) -> None:
     from posekit.viewer.plots import plot_image, plot_levels, plot_projections, plot_tree, save
+    from posekit.viewer.plots.projections import letter
 
     few = range(min(len(result.frames), 5))
     chosen = [result.frames[k] for k in (printed_frames or few)]
     first = next(frame for frame in result.frames if len(frame.joints))
     save(plot_image(view, list(few), result=result), folder / f"{name}.image.png")
     save(plot_levels(chosen, printed=printed), folder / f"{name}.levels.png")
-    save(plot_projections(first.joints[:MAX_PANELS]), folder / f"{name}.projections.png")
+    count = _group_sizes(first)
+    joints = first.joints[list(count)[:MAX_GROUPS]]
+    alone = len(count) == len(first.joints)
+    titles = None if alone else [f"{letter(k)} 1 of {size}" for k, size in enumerate(count.values())]
+    save(plot_projections(joints, titles=titles and titles[:MAX_GROUPS]), folder / f"{name}.projections.png")
+    save(plot_projections(joints, superposed=True), folder / f"{name}.superposed.png")
     if first.pruned is not None:
         save(plot_tree(first), folder / f"{name}.tree.png")
 
@@ -89,8 +97,11 @@ def _scene(folder: Path, name: str, result: Result, view: View) -> None:
 
     subject = subject_of(result, view)
     k = next(k for k, frame in enumerate(result.frames) if len(frame.joints))
-    groups = result.frames[k].groups
-    members = range(len(result.frames[k].joints)) if groups is None else groups.tolist()
-    firsts = [list(members).index(group) for group in dict.fromkeys(members)]
-    chosen = subject.frames[k].chosen(firsts[:SCENE_GROUPS])
+    chosen = subject.frames[k].chosen(list(_group_sizes(result.frames[k]))[:SCENE_GROUPS])
     write_picture(folder / f"{name}.scene.png", subject, [chosen], title=name)
+
+
+def _group_sizes(frame: ResultFrame) -> dict[int, int]:
+    """Return the first survivor of each group, and how many are in it."""
+    members = list(range(len(frame.joints))) if frame.groups is None else frame.groups.tolist()
+    return {members.index(group): size for group, size in Counter(members).items()}

@@ -31,7 +31,8 @@ FIGURES_TEXT = (
     "## The figures",
     "",
     "For SEQ1 and SEQ2 each, beside this file: `lee-chen.SEQ.image.png` (as Fig. A.1), `.projections.png` (as Figs. 6 "
-    "and 8), `.tree.png` (as Fig. 4), `.levels.png` (Tables 3 and 4, hollow marks are the print), `.scene.png` and "
+    "and 8: one survivor of each group of frame 1), `.superposed.png` (these as in Fig. 7, joints of several solutions "
+    "labelled), `.tree.png` (as Fig. 4), `.levels.png` (Tables 3 and 4, hollow marks are the print), `.scene.png` and "
     "`.page.html`.",
     "",
 )

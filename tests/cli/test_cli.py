@@ -276,7 +276,15 @@ def test_a_result_is_validated_as_it_was_recovered(run) -> None:
 def test_reproduce_writes_the_tables(run) -> None:
     outcome = run("reproduce", "lee-chen", "-o", "deep/tables")
     assert (outcome.code, outcome.err) == (0, "")
-    figures = ("image.png", "levels.png", "projections.png", "tree.png", "scene.png", "page.html")
+    figures = (
+        "image.png",
+        "levels.png",
+        "projections.png",
+        "superposed.png",
+        "tree.png",
+        "scene.png",
+        "page.html",
+    )
     expected = {f"lee-chen.{name}.{figure}" for name in ("seq1", "seq2") for figure in figures}
     written = {path.name for path in Path("deep/tables").iterdir()}
     assert written == expected | {"lee-chen.json", "lee-chen.md"}

@@ -16,6 +16,7 @@ from posekit.papers.lee_chen_printed import PRINTED_MOTION, PRINTED_PHYSICAL
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, SEGMENTS
+from posekit.viewer.illustrate import illustrate
 from posekit.viewer.plots.image_plot import plot_image
 from posekit.viewer.plots.levels import plot_levels
 from posekit.viewer.plots.plot_file import PLOT_STYLE, save
@@ -79,6 +80,46 @@ def test_each_survivor_has_its_panel_or_all_have_one():
         check_sticks(axes, 1)
     (together,) = plot_projections(joints, superposed=True).axes
     check_sticks(together, len(joints))
+
+
+def test_a_superposition_labels_the_solutions_of_a_joint_and_not_what_they_carry():
+    joints = np.repeat(first_frame().joints[:1], 4, axis=0)
+    knee, ankle, wrist = (JOINTS.index(name) for name in ("left_knee", "left_ankle", "right_wrist"))
+    joints[1::2, [knee, ankle], 2] += 0.1  # the ankle goes with the knee
+    joints[2:, wrist, 2] += 0.2
+    joints[3, wrist, 2] += 0.001  # a near-twin
+    (axes,) = plot_projections(joints, superposed=True).axes
+    assert axes.get_title() == "a right wrist, b left knee"
+    placed = {text.get_text(): text.xy for text in axes.texts}
+    assert sorted(placed) == ["a1", "a2", "b1", "b2"]
+    assert placed["b2"][0] - placed["b1"][0] == pytest.approx(0.1)
+    (alone,) = plot_projections(joints[:1], superposed=True).axes
+    assert (alone.get_title(), len(alone.texts)) == ("", 0)
+
+
+def test_one_of_each_group_is_drawn(tmp_path, monkeypatch):
+    view = builtin_view("seq2")
+    result = result_of(recover(view, group=0.05), unit="cm", explain=True)
+    groups = result.frames[0].groups.tolist()
+    drawn = []
+
+    def draw(joints, **options):
+        drawn.append((joints, options))
+        return plot_projections(joints, **options)
+
+    monkeypatch.setattr("posekit.viewer.plots.plot_projections", draw)
+    monkeypatch.setattr("posekit.viewer.illustrate._page", lambda *_: None)
+    monkeypatch.setattr("posekit.viewer.illustrate._scene", lambda *_: None)
+    assert list(illustrate(tmp_path, "walk", result, view)) == []
+    (apart, options), (together, _) = drawn
+    assert len(groups) > len(set(groups)) == len(apart)
+    np.testing.assert_array_equal(
+        apart, result.frames[0].joints[[groups.index(one) for one in sorted(set(groups))]]
+    )
+    np.testing.assert_array_equal(apart, together)
+    sizes = [groups.count(one) for one in sorted(set(groups))]
+    assert options["titles"] == [f"{letter(k)} 1 of {size}" for k, size in enumerate(sizes)]
+    assert (tmp_path / "walk.superposed.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_side_view_is_depth_and_height_and_a_far_eye_sees_the_same():

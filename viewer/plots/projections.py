@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINTS, PARENTS
 from posekit.viewer.plots.panels import panels, same_scale
 from posekit.viewer.plots.plot_file import drawing
 from posekit.viewer.plots.stick import add_key, draw_stick
@@ -16,9 +16,16 @@ from posekit.viewer.plots.stick import add_key, draw_stick
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+
+APART_METRES = 0.03
+"""Metres between two places of a joint from which each has its label."""
+
+NAMES_A_LINE = 3
+"""Joints named in a line of the title."""
 
 
 def side_view(joints: Array, eye: float | None = None) -> Array:
@@ -71,8 +78,8 @@ def plot_projections(
     joints : array (N, 14, 3)
         Postures, OpenCV camera frame, metres; NaN where a joint is not known.
     superposed : bool
-        All in one panel (Fig. 7), where two solutions of one joint are seen side by side, instead of a panel
-        each (Figs. 6 and 8).
+        All in one panel (Fig. 7), where two solutions of one joint are seen side by side, and labelled as there,
+        instead of a panel each (Figs. 6 and 8).
     titles : sequence of N str, optional
         By default (a), (b), …, as in the paper.
     eye : float, optional
@@ -109,12 +116,53 @@ def plot_projections(
         alpha = max(0.25, len(joints) ** -0.5) if superposed else 1.0
         for panel, posture in zip(axes, points, strict=True):
             draw_stick(panel, posture, extent=extent, alpha=alpha)
+        if superposed:
+            label_solutions(axes[0], points)
         # Nobody stands behind the centre of a camera: depth is then that of an uncalibrated picture.
         origin = "root" if bool((joints[..., 2] <= 0).any()) else "optical centre"
         figure.supxlabel(f"depth $z_c$ from the {origin} (m); the camera is to the left", fontsize=9)
         figure.supylabel("height $y_c$ (m)", fontsize=9)
         add_key(figure)
     return figure
+
+
+def label_solutions(axes: Axes, points: Array) -> None:
+    """Label joints (N, 14, 2) of several solutions, as Fig. 7 does: a1, a2, ..., b1; the title names the joints.
+
+    A joint that is only carried along by the one before it has one solution. Labels that would overlap are one.
+    """
+    named: list[str] = []
+    labels: list[tuple[str, Array, list[str]]] = []
+    for joint, parent in enumerate(PARENTS[1:], start=1):
+        offset = points[:, joint] - points[:, parent]
+        firsts: list[int] = []
+        for k in np.flatnonzero(~np.isnan(offset[:, 0])).tolist():
+            if all(np.hypot(*(offset[k] - offset[other])) > APART_METRES for other in firsts):
+                firsts.append(k)
+        if len(firsts) < 2:
+            continue
+        key = letter(len(named)).strip("()")
+        named.append(f"{key} {JOINTS[joint].replace('_', ' ')}")
+        for number, k in enumerate(sorted(firsts, key=lambda row: float(offset[row, 0])), start=1):
+            side, at = "left" if number == 1 else "right", points[k, joint]
+            near = (one for one in labels if one[0] == side and np.hypot(*(one[1] - at)) < 2 * APART_METRES)
+            label: tuple[str, Array, list[str]] = next(near, (side, at, []))
+            label[2].append(f"{key}{number}")
+            if len(label[2]) == 1:
+                labels.append(label)
+    for side, at, texts in labels:
+        axes.annotate(
+            " ".join(texts),
+            (float(at[0]), float(at[1])),
+            xytext=(-5 if side == "left" else 5, 0),
+            textcoords="offset points",
+            ha="right" if side == "left" else "left",
+            va="center",
+            fontsize=9,
+            gid="solution",
+        )
+    lines = [", ".join(named[k : k + NAMES_A_LINE]) for k in range(0, len(named), NAMES_A_LINE)]
+    axes.set_title("\n".join(lines), fontsize=8)
 
 
 def letter(index: int) -> str:
