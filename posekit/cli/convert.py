@@ -58,7 +58,11 @@ def convert(
     ] = "",
     view: Annotated[
         Path | None,
-        option("--view", "VIEW", "What a result was recovered from: puts it into its camera's world."),
+        option(
+            "--view",
+            "VIEW",
+            "What a result was recovered from: puts it into its camera's world (newer results hold theirs).",
+        ),
     ] = None,
     gaps: Annotated[
         str,

@@ -18,7 +18,7 @@ from posekit.following import bridge
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of
 from posekit.formats.motion.motion_axes import up_rotation
-from posekit.formats.own import OpenCVModel, Postures, Result, View
+from posekit.formats.own import CameraModel, OpenCVModel, Postures, Result, View
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
@@ -182,7 +182,8 @@ def sequence_of(
         Of a result: ``likeliest``, the number of a survivor from 0, ``path``, or ``all``; if empty the path where the
         frames were followed, else the likeliest.
     view : View, optional
-        What a result was recovered from: its camera's place in the world turns and moves the postures there.
+        What a result was recovered from: its camera's place in the world turns and moves the postures there. By default
+        the camera that the result holds does, unless `up` is given.
     skeleton : str
         Of motion capture: a skeleton map by name or file.
     up : str
@@ -240,7 +241,9 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         says.append(
             f"the likeliest posture of each frame, with a probability of {sure:.2g} (median); all: --posture all"
         )
-    points, up = _placed(points, view, stated, says)
+    points, up = _placed(
+        points, result.camera if view is None else view.camera, stated, says, told=view is not None
+    )
     values = {
         "probability": np.array([probability[k][row] for k, row in rows]),
         "rank": np.array(ranks, dtype=np.float64),
@@ -294,7 +297,9 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
         else "how sure is not asked (--follow 2)"
     )
     says = [f"the likeliest path, {sure}{bridged}"]
-    points, up = _placed(points, view, stated, says)
+    points, up = _placed(
+        points, result.camera if view is None else view.camera, stated, says, told=view is not None
+    )
     codes = [""] * len(time)
     for row, k in zip(place.tolist(), known.tolist(), strict=True):
         codes[row] = result.frames[k].branches[survivor[row]] if survivor[row] >= 0 else ""
@@ -327,17 +332,36 @@ def _evenly(time: Array) -> tuple[Array, NDArray[np.intp]]:
     return np.interp(every, place, time), place
 
 
-def _placed(points: Array, view: View | None, stated: str, says: list[str]) -> tuple[Array, str]:
-    """Put points of a result into the view's world, if there is one; say where they are and what is up."""
-    up = stated or CAMERA_UP
-    if view is not None:
-        points = _in_world(points, view)
-        up = stated or _guessed(points[:, :14], "the camera's world")
+def _placed(
+    points: Array, camera: CameraModel | None, stated: str, says: list[str], *, told: bool
+) -> tuple[Array, str]:
+    """Put points of a result into its camera's world, if that is known; say where they are and what is up.
+
+    Where a view is `told`, its camera must have a place in a world. Else an axis that is stated is the camera's.
+    """
+    if told and camera is not None:
+        points = _in_world(points, camera)
+        up = stated or _up_of(camera) or _guessed(points[:, :14], "the camera's world")
+    elif not stated and isinstance(camera, OpenCVModel) and camera.R is not None:
+        turned = replace(camera, t=np.zeros(3)) if camera.t is None else camera
+        moved = _in_world(points, turned)
+        try:
+            points, up = moved, camera.up or guess_up(moved[:, :14])
+        except InputError:
+            up = ""
+    else:
+        up = ""
+    if up:
         says.append(f"in the camera's world, where {up} is up")
     else:
+        up = stated or CAMERA_UP
         level = f"{up} up" if stated else "as if it were held level"
         says.append(f"in the camera's frame, {level}; with --view, in its world")
     return points, up
+
+
+def _up_of(camera: CameraModel) -> str:
+    return camera.up if isinstance(camera, OpenCVModel) and camera.R is not None else ""
 
 
 def _guessed(joints: Array, source: str) -> str:
@@ -357,8 +381,7 @@ def _number(posture: str, count: int, frame: int) -> int:
     return int(posture)
 
 
-def _in_world(points: Array, view: View) -> Array:
-    model = view.camera
+def _in_world(points: Array, model: CameraModel) -> Array:
     if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
         raise InputError("--view: its camera has no place in a world; expected R and t; leave the option out")
     return np.asarray((points - model.t) @ model.R)
@@ -373,8 +396,8 @@ def _of_truth(view: View, source: str, stated: str) -> PostureSequence:
     points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
     up = stated or CAMERA_UP
     if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
-        points = _in_world(points, view)
-        up = stated or _guessed(points[:, :14], source)
+        points = _in_world(points, view.camera)
+        up = stated or view.camera.up or _guessed(points[:, :14], source)
     return _recorded(points, view.time[known], up)
 
 

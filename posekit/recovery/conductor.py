@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
+from posekit.formats.own.camera_model import camera_fields
 from posekit.formats.own.units import PER_METRE
 from posekit.ranking import Up
 from posekit.recovery.body import FigureBody, LiftedBody, loaded
@@ -155,7 +156,7 @@ def recover(
     frames = _frames(view, trees, fit, asked.group, bare)
     _refuse_impossible(frames)
     up = up_of(view.camera)
-    record = {**_record(asked, tolerance, body, frames, noise, up), **_told(refiner, trees)}
+    record = {**_record(asked, tolerance, body, frames, noise, up), **_told(view, refiner, trees)}
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
 
 
@@ -236,10 +237,12 @@ def _record(
     return record | {"contact_margin": record["contact_margin"] + body.overlap}
 
 
-def _told(refiner: Refiner | None, trees: Mapping[int, FrameTrees]) -> dict[str, Any]:
-    """Return what results say of refinement: the one body of a clip, and the points that were not believed."""
+def _told(view: View, refiner: Refiner | None, trees: Mapping[int, FrameTrees]) -> dict[str, Any]:
+    """Return what results say of the camera, the one body of a clip, and the points that were not believed."""
     found = {str(k): list(one.outliers) for k, one in sorted(trees.items()) if one.outliers}
     said: dict[str, Any] = {"outliers": found} if found else {}
+    if isinstance(view.camera, OpenCVModel):
+        said["camera"] = camera_fields(view.camera, "m")
     return said if refiner is None or refiner.clip is None else said | {"one_body": refiner.clip.document()}
 
 

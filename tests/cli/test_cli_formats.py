@@ -451,7 +451,7 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
         tmp_path / "a.mot": ["motion (mot)", "19 points, +z up"],
         tmp_path / "a.glb": ["motion (glb)", "+y up"],
         tmp_path / "a.bvh": ["motion (bvh)", "+y up"],
-        tmp_path / "a.csv": ["motion (csv)", "-y is up by where heads and ankles are"],
+        tmp_path / "a.csv": ["motion (csv)", "+y is up by where heads and ankles are"],
     }
     for path, parts in expected.items():
         done = command("inspect", path)

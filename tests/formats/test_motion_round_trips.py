@@ -50,6 +50,9 @@ def recovered(walking: View, tmp_path_factory: pytest.TempPathFactory) -> Recove
     folder = tmp_path_factory.mktemp("result")
     recovery = posekit.recover(walking)
     result = result_of(recovery, unit="m")
+    files.write_result(folder / "held.npz", result)
+    settings = {name: value for name, value in result.settings.items() if name != "camera"}
+    result = replace(result, settings=settings)  # as those of earlier versions, which hold no camera
     files.write_result(folder / "result.npz", result)
     files.write_result(folder / "result.json", result)
     files.write_view(folder / "view.json", walking)
@@ -117,6 +120,39 @@ def read_npz(path: Path) -> tuple[Array, Array]:
 
 
 READERS = {"trc": read_trc, "c3d": read_c3d, "csv": read_table, "parquet": read_table, "npz": read_npz}
+
+
+@pytest.mark.parametrize("up", ["", "+y"])
+def test_a_result_stands_in_the_world_of_the_camera_that_it_holds(
+    up: str, recovered: Recovered, command: Callable[..., Any], tmp_path: Path
+) -> None:
+    held = files.read_result(recovered.folder / "held.npz")
+    held = replace(held, settings={**held.settings, "camera": {**held.settings["camera"], "up": up or None}})
+    files.write_result(tmp_path / "held.json", held)
+    done = command("convert", tmp_path / "held.json", tmp_path / "out.trc")
+    assert "in the camera's world, where +y is up" in done.out
+    points, _ = read_trc(tmp_path / "out.trc")
+    np.testing.assert_allclose(points, recovered.world, rtol=0, atol=TO_WORLD)
+    with_view = ("--view", recovered.folder / "view.json")
+    for words, name in (((), "without.bvh"), (with_view, "with.bvh")):
+        assert command("convert", tmp_path / "held.json", tmp_path / name, *words).code == 0
+    assert (tmp_path / "without.bvh").read_bytes() == (tmp_path / "with.bvh").read_bytes()
+    # An axis that is stated is that of the camera's frame.
+    done = command("convert", tmp_path / "held.json", tmp_path / "level.trc", "--input-up", "-y")
+    np.testing.assert_allclose(
+        read_trc(tmp_path / "level.trc")[0], held_level(recovered.ranked), rtol=0, atol=TO_WORLD
+    )
+
+
+def test_a_result_whose_camera_is_none_is_refused(
+    recovered: Recovered, command: Callable[..., Any], tmp_path: Path
+) -> None:
+    held = files.read_result(recovered.folder / "held.npz")
+    wrong = replace(held, settings={**held.settings, "camera": {"model": "opencv", "K": [[1, 2, 3]]}})
+    files.write_result(tmp_path / "wrong.json", wrong)
+    done = command("convert", tmp_path / "wrong.json", tmp_path / "out.bvh")
+    assert done.code == 2
+    assert "settings.camera of the result" in done.err
 
 
 @pytest.mark.parametrize("name", READERS)

@@ -381,6 +381,11 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
         error = capsys.readouterr().err
         assert said in error
         assert error.count("\n") == 1
+    assert render(monkeypatch, result, "--over", film, "-o", tmp_path / "held.png", "--frame", "1") == 0
+    held = posekit.read_result(result)
+    settings = {name: value for name, value in held.settings.items() if name != "camera"}
+    posekit.write_result(result, replace(held, settings=settings))
+    capsys.readouterr()
     assert render(monkeypatch, result, "--over", film, "-o", tmp_path / "no.png") == 2
     assert "--view VIEW" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()

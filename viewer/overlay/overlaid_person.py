@@ -55,7 +55,7 @@ def overlaid_person(
     given : Result or View
         The survivors; of a view its truth.
     view : View, optional
-        What the result was recovered from: its camera and image points. Of an uncalibrated result it may be left out.
+        What the result was recovered from: its image points, and the camera where the result does not hold it.
     name : str
         What errors call it.
     frames : sequence of Shown, optional
@@ -81,10 +81,11 @@ def overlaid_person(
         frames = numbered(opening_frames(subject, given, every, moving=True, most=None), every)
     if seen is None and not any(one.sight is not None for one in frames):
         raise InputError(
-            f"{name}: a result does not hold the camera that it was recovered with; give the view beside it: "
+            f"{name}: the result does not hold the camera that it was recovered with; give the view beside it: "
             "--view VIEW"
         )
-    size = seen.camera.size if seen is not None and isinstance(seen.camera, OpenCVModel) else None
+    camera = seen.camera if seen is not None else given.camera
+    size = camera.size if isinstance(camera, OpenCVModel) else None
     return OverlaidPerson(
         name=name,
         frames=frames,

@@ -12,7 +12,7 @@ from posekit.body import Figure, load_figure, with_head
 from posekit.errors import FigureError, ViewerError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion.motion_axes import up_rotation
-from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultFrame, View
+from posekit.formats.own import CameraModel, Inferred, OpenCVModel, Postures, Result, ResultFrame, View
 from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
@@ -161,10 +161,12 @@ def subject_of(given: Result | Postures | HeldPostures | View, view: View | None
         if view is not None:
             check_camera(given, view)
         figure = _figure_of(given)
-        frames = [_of_frame(frame, figure, view, k) for k, frame in enumerate(given.frames)]
+        frames = [_of_frame(frame, figure, view, k, given.camera) for k, frame in enumerate(given.frames)]
     if not any(len(frame) for frame in frames):
         raise ViewerError("there is no posture in any frame; nothing can be drawn; was everything rejected?")
-    return DrawnSubject(figure=figure, frames=frames, R_cam_world=_rotation(view))
+    held = given.camera if isinstance(given, Result) else None
+    camera = held if view is None else view.camera
+    return DrawnSubject(figure=figure, frames=frames, R_cam_world=_rotation(camera))
 
 
 def _of_postures(given: Postures) -> Shown:
@@ -199,7 +201,9 @@ def _configurations(frame: ResultFrame, figure: Figure, points: Array) -> Array:
     return q
 
 
-def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int) -> Shown:
+def _of_frame(
+    frame: ResultFrame, figure: Figure, view: View | None, index: int, camera: OpenCVModel | None
+) -> Shown:
     points = with_head(np.asarray(frame.joints)).copy()
     q = _configurations(frame, figure, points) if frame.q.shape[1] == figure.model.nq else None
     if q is not None and len(q):
@@ -212,7 +216,7 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
         points=points,
         q=q,
         groups=frame.groups,
-        sight=sight_of(frame, view, index),
+        sight=sight_of(frame, view, index, camera),
         scales=frame.scales,
         inferred=frame.inferred or (),
         probability=frame.probability,
@@ -260,7 +264,7 @@ def _of_view(view: View) -> DrawnSubject:
         )
     figure = load_figure()
     figure = figure if view.stature is None else figure.from_stature(view.stature)
-    return DrawnSubject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
+    return DrawnSubject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view.camera))
 
 
 def _figure_of(result: Result) -> Figure:
@@ -274,5 +278,7 @@ def _figure_of(result: Result) -> Figure:
         raise ViewerError(f"settings.lengths of the result: {error}") from None
 
 
-def _rotation(view: View | None) -> Array | None:
-    return view.camera.R if view is not None and isinstance(view.camera, OpenCVModel) else None
+def _rotation(camera: CameraModel | None) -> Array | None:
+    if not isinstance(camera, OpenCVModel) or camera.R is None:
+        return None
+    return camera.R @ up_rotation(camera.up, "+z").T if camera.up else camera.R

@@ -15,8 +15,22 @@ ON_RAY = 1e-6
 """Metres across the image within which all positions of a joint are one image point."""
 
 
-def sight_of(frame: ResultFrame, view: View | None, index: int) -> ImageSight | None:
-    """Return what a frame's camera sees: the view's image, or without a view that of the survivors."""
+def sight_of(
+    frame: ResultFrame, view: View | None, index: int, camera: OpenCVModel | None = None
+) -> ImageSight | None:
+    """Return what a frame's camera sees: the view's image, or without a view that of the first survivor.
+
+    Parameters
+    ----------
+    frame : ResultFrame
+        The survivors.
+    view : View, optional
+        What they were recovered from.
+    index : int
+        The frame's number in the view.
+    camera : OpenCVModel, optional
+        The calibrated camera that the result holds.
+    """
     f = frame.camera["f"]
     scale = float(frame.scales[0]) if frame.scales is not None and len(frame.scales) else None
     if view is not None:
@@ -27,12 +41,15 @@ def sight_of(frame: ResultFrame, view: View | None, index: int) -> ImageSight | 
         image = uncalibrated.project(frame.joints[:1])[0]
         image[[JOINT[name] for name in hidden(frame)]] = np.nan
         return ImageSight(camera=uncalibrated, image=image)
+    if camera is not None and len(frame.joints):
+        pinhole = PinholeCamera(K=camera.K, distortion=camera.distortion)
+        image = pinhole.project(frame.joints[:1])[0]
+        image[[JOINT[name] for name in hidden(frame)]] = np.nan
+        return ImageSight(camera=pinhole, image=image, size=camera.size)
     if f is None or len(frame.joints) == 0:
         return None
-    camera = lee_chen.pinhole(f)
-    return ImageSight(
-        camera=camera, image=camera.project(frame.joints[:1])[0]
-    )  # all survivors have one image
+    one = lee_chen.pinhole(f)
+    return ImageSight(camera=one, image=one.project(frame.joints[:1])[0])  # all survivors have one image
 
 
 def view_sight(view: View, image: Array, f: float | None, scale: float | None) -> ImageSight | None:

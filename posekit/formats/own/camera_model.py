@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.cameras import PinholeCamera
 from posekit.cameras.calibrated import UP_AXES
 from posekit.errors import CameraError
+from posekit.formats.own.units import PER_METRE, Unit, from_metres
 from posekit.safe_io import shown
 
 Array = NDArray[np.float64]
@@ -107,6 +109,29 @@ class ScaledOrthographicModel:
 
 
 CameraModel = LeeChenModel | OpenCVModel | ScaledOrthographicModel
+
+
+def camera_fields(camera: CameraModel, unit: Unit) -> dict[str, Any]:
+    """Return a camera as files spell it, with lengths in `unit`."""
+    fields: dict[str, Any]
+    if isinstance(camera, LeeChenModel):
+        return {"model": "lee-chen", "f": None if camera.f is None else float(from_metres(camera.f, unit))}
+    if isinstance(camera, ScaledOrthographicModel):
+        scale = camera.scale
+        fields = {"model": "scaled-orthographic", "scale": None if scale is None else scale / PER_METRE[unit]}
+        return fields if camera.aspect == 1 else {**fields, "aspect": camera.aspect}
+    fields = {"model": "opencv", "K": camera.K.tolist()}
+    if camera.distortion is not None:
+        fields["distortion"] = camera.distortion.tolist()
+    if camera.R is not None:
+        fields["R"] = camera.R.tolist()
+    if camera.t is not None:
+        fields["t"] = from_metres(camera.t, unit).tolist()
+    if camera.size is not None:
+        fields["size"] = [int(extent) for extent in camera.size]
+    if camera.up:
+        fields["up"] = camera.up
+    return fields
 
 
 def check_positive(name: str, value: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
 from posekit.skeleton import JOINTS
+
+if TYPE_CHECKING:
+    from posekit.formats.own.camera_model import OpenCVModel
 
 CAMERA_FIELDS: Final = ("f", "rotation", "position", "residual")
 LEVEL_FIELDS: Final = ("joint", "physical", "motion")
@@ -189,6 +192,19 @@ class Result(Pictured):
             for name in EVERYWHERE_COLUMNS:
                 if (getattr(frame, name) is None) != (getattr(first, name) is None):
                     raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
+
+    @cached_property
+    def camera(self) -> OpenCVModel | None:
+        """The calibrated camera that it was recovered with; None where it holds none.
+
+        Raises
+        ------
+        InputError
+            Where its settings hold what is no camera.
+        """
+        from posekit.formats.own.view_file import camera_of
+
+        return camera_of(self.settings)
 
     @property
     def written_decimals(self) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,13 @@ from numpy.typing import NDArray
 
 from posekit.cameras.lee_chen import image_from_paper
 from posekit.errors import CameraError
-from posekit.formats.own.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
+from posekit.formats.own.camera_model import (
+    CameraModel,
+    LeeChenModel,
+    OpenCVModel,
+    ScaledOrthographicModel,
+    camera_fields,
+)
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.formats.own.view import View, own_names
 from posekit.formats.own.view_schema import (
@@ -25,7 +32,7 @@ from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
-from posekit.tables.file_model import validated
+from posekit.tables.file_model import conforming, validated
 
 Array = NDArray[np.float64]
 
@@ -134,7 +141,7 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
     head_of_file: dict[str, Any] = {
         "schema": VIEW_SCHEMA,
         "unit": unit,
-        "camera": _camera_fields(view.camera, unit),
+        "camera": camera_fields(view.camera, unit),
     }
     if figure := _figure_fields(view, unit):
         head_of_file["figure"] = figure
@@ -199,26 +206,28 @@ def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicFields, 
     )
 
 
-def _camera_fields(camera: CameraModel, unit: Unit) -> dict[str, Any]:
-    fields: dict[str, Any]
-    if isinstance(camera, LeeChenModel):
-        return {"model": "lee-chen", "f": None if camera.f is None else float(from_metres(camera.f, unit))}
-    if isinstance(camera, ScaledOrthographicModel):
-        scale = camera.scale
-        fields = {"model": "scaled-orthographic", "scale": None if scale is None else scale / PER_METRE[unit]}
-        return fields if camera.aspect == 1 else {**fields, "aspect": camera.aspect}
-    fields = {"model": "opencv", "K": camera.K.tolist()}
-    if camera.distortion is not None:
-        fields["distortion"] = camera.distortion.tolist()
-    if camera.R is not None:
-        fields["R"] = camera.R.tolist()
-    if camera.t is not None:
-        fields["t"] = from_metres(camera.t, unit).tolist()
-    if camera.size is not None:
-        fields["size"] = [int(extent) for extent in camera.size]
-    if camera.up:
-        fields["up"] = camera.up
-    return fields
+def camera_of(settings: Mapping[str, Any]) -> OpenCVModel | None:
+    """Return the calibrated camera that a result's settings hold; None where they hold none.
+
+    Parameters
+    ----------
+    settings : mapping
+        Of a result: its ``camera`` is as `camera_fields` spells it, in metres.
+
+    Raises
+    ------
+    InputError
+        Where it is no camera.
+    """
+    fields = settings.get("camera")
+    if fields is None:
+        return None
+    where = "settings.camera of the result"
+    try:
+        model = _in_metres(conforming(OpenCVCamera, fields, where), "m")
+    except CameraError as error:
+        raise refusal(where, "", str(error), "a camera that can be", "recover it again") from None
+    return model if isinstance(model, OpenCVModel) else None
 
 
 def _figure_fields(view: View, unit: Unit) -> dict[str, Any]:
