@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.cameras.neck.given import with_own_head
 from posekit.compiled.compiling import expect
 from posekit.geometry import Array
 from posekit.ranking import deviation_of_noise
@@ -293,10 +294,16 @@ class Refiner:
         of the figure's head: in one frame of six some ear is ten deviations off.
         """
         view, seen = self.grower.view, lifted.seen
-        head = view.head_image[self.fit.frame[lifted.chosen]]
+        head = np.concatenate([view.head_image, view.own_head_image], axis=1)[self.fit.frame[lifted.chosen]]
         if not np.isfinite(head).any() or view.derived:
             return seen.sight
-        return replace(seen.sight, head_image=head, head_deviation=seen.deviation[:, len(JOINTS) :])
+        own = view.own_head()
+        return replace(
+            seen.sight,
+            head_image=head,
+            head_deviation=with_own_head(seen.deviation[:, len(JOINTS) :], len(own)),
+            own_head=own,
+        )
 
     def _trees(self, lifted: Lifted, outcomes: LeafOutcomes) -> dict[int, FrameTrees]:
         """Gather what is left of each frame."""

@@ -45,7 +45,7 @@ def place_roots(
     """
     from posekit.cameras.neck import place
 
-    detected, given = bool(view.derived), dict(view.head_points or {})
+    detected = bool(view.derived)
     deviation = (
         rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEFAULT_DEVIATION_PIXELS)
     )
@@ -60,7 +60,7 @@ def place_roots(
             figure,
             view.image[frames[rows]],
             np.concatenate([view.head_image, view.own_head_image], axis=1)[frames[rows]],
-            own_head=[given[name] - given.get("neck", 0.0) for name in view.own_head_names],
+            own_head=view.own_head(),
             method=rooting.method,
             deviation=deviation,
             offset=offset,

@@ -43,7 +43,7 @@ class HeadTerms(NamedTuple):
 def head_terms(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> HeadTerms:
     """Linearise the head."""
     n = state.root.shape[1]
-    offsets = head_points(state, problem.anatomy.head)
+    offsets = head_points(state, np.concatenate([problem.anatomy.head, problem.own_head]))
     residual, A = problem.linearised_head(state.root + offsets)
     chi2 = np.einsum("jcn,jcn->n", residual, residual)
     turn = cross(np.broadcast_to(offsets[:, None], A.shape), A, axis=-2)

@@ -48,7 +48,7 @@ class ObservedFrames:
     root : RootPrior, optional
         What is known of the neck besides its key point. A scaled orthographic camera leaves its depth open; it is then
         held where it is, and uncertainties are those relative to it.
-    head_image, head_deviation : array (F, 5, 2), float or array (F, 5), optional
+    head_image, head_deviation : array (F, 5 + K, 2), float or array (F, 5 + K), optional
         The head's key points; their deviation is a pixel unless told otherwise.
     length_deviation : float or mapping
         Relative standard deviation of all lengths, or by segment name ``a-b``; lengths are held where it is zero.
@@ -61,6 +61,8 @@ class ObservedFrames:
         Degrees; infinite for no limits.
     walls : Walls, optional
         Limits of the limbs in place of those in `limits`: what couples angles, or is no angle of the figure's.
+    own_head : array (K, 3)
+        Points of the head besides the figure's, from its neck, the head's frame (x forward, y up, z right), metres.
 
     Raises
     ------
@@ -80,6 +82,7 @@ class ObservedFrames:
     limits: Limits | None = None
     limit_deviation: float = LIMIT_DEVIATION
     walls: Walls | None = None
+    own_head: ArrayLike = ()
 
     def points(self) -> Array:
         """Return the key points (F, 14, 2)."""
@@ -109,10 +112,11 @@ class ObservedFrames:
         held[2, 2] = 0.0 if optics.perspective else DEPTH_HOLD_PER_METRE
         known = np.asarray(np.isfinite(mean).all(axis=1))[frames]
         root = np.where(known[:, None], mean[frames], necks)
+        own = np.asarray(self.own_head, dtype=np.float64).reshape(-1, 3)
         head = head_weight = None
         if self.head_image is not None:
             head = np.clip(
-                numbers("head_image", self.head_image, (count, len(HEAD_POINTS), 2)),
+                numbers("head_image", self.head_image, (count, len(HEAD_POINTS) + len(own), 2)),
                 -MAX_COORDINATE_PIXELS,
                 MAX_COORDINATE_PIXELS,
             )
@@ -132,4 +136,5 @@ class ObservedFrames:
             shape_weight=shape_weight,
             limb_weight=limb_weight,
             walls=self.walls,
+            own_head=own[:, [0, 2, 1]] * [1.0, -1.0, 1.0],
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ class RefinementProblem:
         The camera, with the batch as its last axis.
     image, weight : array (14, 2, N), (14, N)
         Pixels, and one over their standard deviation; zero where a joint was not seen.
-    head_image, head_weight : array (5, 2, N), (5, N), optional
+    head_image, head_weight : array (5 + K, 2, N), (5 + K, N), optional
         Likewise the head's points.
     root, root_weight : array (3, N), (3, 3, N)
         Where the neck is known to be, and the whitening of its uncertainty: zero where nothing is known.
@@ -40,6 +40,8 @@ class RefinementProblem:
         Limits of the limbs in place of the anatomy's.
     trunk_only : bool
         Leave the limbs as they are, and unseen.
+    own_head : array (K, 3)
+        The head's points besides the anatomy's, from the neck, head link's frame, metres.
     """
 
     anatomy: FigureNumbers
@@ -56,6 +58,7 @@ class RefinementProblem:
     free: NDArray[np.bool_] | None = None
     walls: Walls | None = None
     trunk_only: bool = False
+    own_head: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     def take(self, rows: NDArray[np.intp] | slice) -> RefinementProblem:
         """Return the data of some postures."""
@@ -82,7 +85,7 @@ class RefinementProblem:
         return _residual(self.optics.image(points), self.image[joints], self.weight[joints])
 
     def linearised_head(self, points: Array) -> tuple[Array, Array]:
-        """Do for the head's points (5, 3, N) what `linearised_image` does for joints."""
+        """Do for the head's points (5 + K, 3, N) what `linearised_image` does for joints."""
         image, jacobian = self.optics.project(points)
         if self.head_image is None or self.head_weight is None:
             return np.zeros((0, 2, points.shape[2])), jacobian[:0]

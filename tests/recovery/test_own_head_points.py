@@ -14,7 +14,7 @@ from posekit.cameras.neck import place
 from posekit.errors import HeadError
 from posekit.formats.own import LeeChenModel, OpenCVModel, View, read_view, write_view
 from posekit.recovery.fit_camera import fit_camera
-from posekit.skeleton import HEAD_POINTS
+from posekit.skeleton import DOFS
 
 OWN = {
     "chin": (-0.302, 0.565, 0.0),
@@ -109,28 +109,38 @@ def test_points_that_tell_no_camera_are_refused(walk, move, text):
         posekit.recover(replace(view, head_points=points))
 
 
-def test_own_points_alone_place_the_neck_before_a_known_camera(walk):
+def before_a_known_camera(walk: View, turn: float = 0.0) -> View:
+    """See the walker's first frame and its own head points alone, the head turned by some degrees."""
+    angle, neck = np.radians(turn), walk.truth[0, 0]
+    about = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    cam = (in_camera(walk) - neck) @ about.T + neck
     K = np.array([[1000.0, 0, 500], [0, 1000, 500], [0, 0, 1]])
-    neck = walk.truth[0, 0]
-    image = PinholeCamera(K=K).project(np.concatenate([walk.truth[0], in_camera(walk)]))
-    head = np.full((1, len(HEAD_POINTS) + len(OWN), 2), np.nan)
-    head[0, len(HEAD_POINTS) :] = image[14:]
-    own = np.array(list(OWN.values())) - TABLE_A2.points[0]
-    figure = posekit.load_figure()
-    [placed] = place(
-        PinholeCamera(K=K), figure, image[None, :14], head, method="head", own_head=own, deviation=0.1
-    )
-    assert placed.method == "head"
-    assert abs(placed.estimate - neck[2]) < 0.01
-    view = View(
+    image = PinholeCamera(K=K).project(np.concatenate([walk.truth[0], cam]))
+    return View(
         camera=OpenCVModel(K=K),
         time=[0.0],
         image=image[None, :14],
-        own_head_image=head[:, len(HEAD_POINTS) :],
+        own_head_image=image[None, 14:],
         head_points={"neck": TABLE_A2.points[0]} | OWN,
         lengths=walk.lengths,
         shoulders=walk.shoulders,
     )
+
+
+def test_own_points_alone_place_the_neck_before_a_known_camera(walk):
+    view = before_a_known_camera(walk)
+    head = np.concatenate([view.head_image, view.own_head_image], axis=1)
+    [placed] = place(
+        PinholeCamera(K=view.camera.K),
+        posekit.load_figure(),
+        view.image,
+        head,
+        method="head",
+        own_head=view.own_head(),
+        deviation=0.1,
+    )
+    assert placed.method == "head"
+    assert abs(placed.estimate - walk.truth[0, 0, 2]) < 0.01
     [frame] = posekit.recover(view).frames
     assert np.abs(frame.joints - walk.truth[0]).max(axis=(1, 2)).min() < 1e-4
 
@@ -144,3 +154,22 @@ def test_tables_of_views_keep_own_points(walk, tmp_path):
     laid = ImageRows.of_view(view).laid_out(np.arange(7), np.arange(7.0))
     np.testing.assert_array_equal(laid.points[:5, 19:], view.own_head_image)
     assert np.isnan(laid.points[5:]).all()
+
+
+def test_own_points_alone_turn_the_head_of_noisy_views(walk, rng):
+    """What is refined under noise has the turn of the head that the points of its own show."""
+    at = posekit.load_figure().angle_index[DOFS.index("neck.rotation")]
+    turned = []
+    for degrees in (0.0, 30.0):
+        exact = before_a_known_camera(walk, degrees)
+        noisy = replace(
+            exact,
+            image=exact.image + 0.5 * rng.standard_normal(exact.image.shape),
+            own_head_image=exact.own_head_image + 0.5 * rng.standard_normal(exact.own_head_image.shape),
+            deviation=0.5,
+            length_deviation=0.0,
+        )
+        [frame] = posekit.recover(noisy).frames
+        off = np.linalg.norm(frame.joints - walk.truth[0], axis=-1).max(axis=1)
+        turned.append(np.degrees(frame.q[off.argmin(), at]))
+    assert abs(abs(turned[1] - turned[0]) - 30) < 8

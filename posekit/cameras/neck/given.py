@@ -135,6 +135,12 @@ class PlacementInput:
         )
 
 
+def with_own_head(deviations: Array, count: int) -> Array:
+    """Append deviations of points of the user's own to those of the head's five (..., 5): their mean."""
+    mean = deviations.mean(axis=-1, keepdims=True)
+    return np.concatenate([deviations, np.repeat(mean, count, axis=-1)], axis=-1)
+
+
 def _points(name: str, values: ArrayLike, shape: tuple[int, ...], frames: int | None = None) -> Array:
     """Check points (F, ...): NaN is not seen, half a point neither, infinite is refused."""
     points = np.array(values, dtype=np.float64)

@@ -14,7 +14,7 @@ from posekit.cameras.neck.allowance import NeckAllowance, allowances
 from posekit.cameras.neck.body import NeckRays, sight
 from posekit.cameras.neck.closure import RigidClosure
 from posekit.cameras.neck.cover import cover, meet
-from posekit.cameras.neck.given import NeckSettings, PlacementInput
+from posekit.cameras.neck.given import NeckSettings, PlacementInput, with_own_head
 from posekit.cameras.neck.head import head_suggestion
 from posekit.cameras.neck.placement import NeckPlacement
 from posekit.cameras.neck.search import NeckDepths, search
@@ -103,17 +103,15 @@ def _suggestions(
     """Ask the rigid parts that the method allows, in the order in which they are believed."""
     n, parts = len(JOINTS), []
     if method in ("auto", "head"):
-        # Points of the user's own are as far off as the head's others are on average.
         own = np.asarray(given.settings.own_head, dtype=np.float64).reshape(-1, 3)
-        of_own = np.repeat(given.deviation[:, n:].mean(axis=1, keepdims=True), len(own), axis=1)
         parts.append(
             head_suggestion(
                 camera,
                 np.concatenate([figure.head_points[1:], own]),
                 given.head_image,
                 ray,
-                np.concatenate([given.deviation[:, n:], of_own], axis=1),
-                np.append(given.offset[n:], np.repeat(given.offset[n:].mean(), len(own))),
+                with_own_head(given.deviation[:, n:], len(own)),
+                with_own_head(given.offset[n:], len(own)),
                 float(given.offset[0]),
             )
         )

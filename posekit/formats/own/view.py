@@ -138,6 +138,12 @@ class View(Pictured):
         """The head points beyond neck, nose, eyes and ears."""
         return own_names(self.head_points or ())
 
+    def own_head(self) -> Array:
+        """Return those points (K, 3) from the neck, the head's frame, metres."""
+        given = self.head_points or {}
+        neck = given.get("neck", np.zeros(3))
+        return np.array([given[name] - neck for name in self.own_head_names]).reshape(-1, 3)
+
     def take(self, rows: NDArray[np.intp] | Sequence[int] | slice) -> View:
         """Return some of its frames."""
         return replace(self, **{name: getattr(self, name)[rows] for name in FRAME_ARRAYS})
