@@ -80,8 +80,14 @@ class Allowance:
         )
 
     def ranges(self, ranges: Ranges) -> Ranges:
-        """Return joint ranges that begin where the person's skeleton has its pelvis."""
+        """Return joint ranges that begin where the person's skeleton has its pelvis.
+
+        That is told by frames of a recording alone: who is judged by the model's lengths, as the survivors of a result
+        are, has its pelvis.
+        """
         if self.person is None or self.settings.strict or not math.isfinite(self.person.hips_forward):
+            return ranges
+        if self.settings.lengths == "model":
             return ranges
         return ranges.with_hips(self.person.hips_forward, hips_outward(self.person.lengths))
 

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import posekit
 import pytest
+
+from posekit.body.measured import LEAST_FRAMES, hips_forward
+from posekit.geometry import Array
+from posekit.validation import recovered_with
+from posekit.validators import Validator
 
 
 @pytest.fixture
@@ -38,3 +46,22 @@ def test_a_limb_two_metres_off_is_not_valid_whatever_the_file_says(
     outcome = command("validate", result)
     assert outcome.code == 1, outcome
     assert "more than posekit allows of itself" in outcome.err
+
+
+def test_survivors_of_one_view_are_no_recording(command: Callable[..., Any], tmp_path: Path) -> None:
+    """A survivor is judged the same beside others as alone: their median frame says nothing of the skeleton's hips."""
+    view, path = tmp_path / "view.json", tmp_path / "result.npz"
+    assert command("synth", "random", "-o", view, "--uncalibrated", "--seed", 2).code == 0
+    assert command("recover", view, "-o", path, "--proportions", "taylor").code == 0
+    result = posekit.read_result(path)
+    own, settings = recovered_with(result)
+    joints = result.frames[0].joints
+    assert len(joints) > 2 * LEAST_FRAMES
+    assert not math.isnan(hips_forward(joints))
+
+    def margins(postures: Array) -> Array:
+        report = Validator(own, settings).check(postures)
+        return np.concatenate([one.margin for one in report.judgements if one.check == "joint_range"])
+
+    alone = [margins(one[None]) for one in joints]
+    np.testing.assert_allclose(margins(joints), np.concatenate(alone), rtol=0, atol=1e-9)
