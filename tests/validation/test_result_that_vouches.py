@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import posekit
 import pytest
 
+import posekit
 from posekit.body.measured import LEAST_FRAMES, hips_forward
 from posekit.geometry import Array
 from posekit.validation import recovered_with
