@@ -1,7 +1,7 @@
 """Image points as NumPy's arrays: ``image`` (F, 14, 2), and what else there is of `posekit.View`'s arrays.
 
-``head_image`` (F, 5, 2), ``confidence`` (F, 19), ``root`` (F, 3), ``time`` (F,), ``frame`` (F,); and ``view``, a text:
-camera and person, as in the metadata of `posekit.batch.view_table`.
+``head_image`` (F, 5, 2), ``own_head_image`` (F, K, 2), ``confidence`` (F, 19), ``root`` (F, 3), ``time`` (F,),
+``frame`` (F,); and ``view``, a text: camera and person, as in the metadata of `posekit.batch.view_table`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,12 @@ def read_view_arrays(path: Path, rate: float | None = None) -> tuple[ImageRows, 
 
         frame = archive.array("frame", "iu", (count,)) if "frame" in archive.names else np.arange(count)
         timed = rate is None and "time" in archive.names
-        points = np.concatenate([image, optional("head_image", (len(HEAD_POINTS), 2))], axis=1)
+        own = (
+            archive.array("own_head_image", "f", (count, None, 2)).astype(np.float64)
+            if "own_head_image" in archive.names
+            else np.empty((count, 0, 2))
+        )
+        points = np.concatenate([image, optional("head_image", (len(HEAD_POINTS), 2)), own], axis=1)
         rows = ImageRows(
             frame=frame.astype(np.int64),
             time=optional("time", ()) if timed else frame / (rate or ASSUMED_VIEW_RATE),

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.batch.image_rows import ImageRows
+from posekit.batch import run_batch
+from posekit.batch.image_rows import ImageRows, head_text
 from posekit.batch.view_table import open_view_table, read_rows, write_view_table
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head import TABLE_A2
@@ -154,6 +155,16 @@ def test_tables_of_views_keep_own_points(walk, tmp_path):
     laid = ImageRows.of_view(view).laid_out(np.arange(7), np.arange(7.0))
     np.testing.assert_array_equal(laid.points[:5, 19:], view.own_head_image)
     assert np.isnan(laid.points[5:]).all()
+
+
+def test_batches_recover_views_tables_and_arrays_alike(walk, tmp_path):
+    view = with_own(walk, only=True)
+    write_view(tmp_path / "a.json", view)
+    write_view_table(tmp_path / "b.parquet", view)
+    np.savez(tmp_path / "c.npz", image=view.image, own_head_image=view.own_head_image, view=head_text(view))
+    wanted = sum(len(frame.joints) for frame in posekit.recover(view).frames)
+    for name in ("a.json", "b.parquet", "c.npz"):
+        assert run_batch([tmp_path / name], tmp_path / f"{name}.out").survivors == wanted
 
 
 def test_own_points_alone_turn_the_head_of_noisy_views(walk, rng):

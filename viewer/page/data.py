@@ -442,11 +442,12 @@ def _settings(settings: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _image(frame: ResultFrame, shown: Shown, view: View | None, index: int) -> Json:
-    """Return the 19 image points, as wide as the view's pixels, and how far the likeliest posture's image is off."""
+    """Return the image points, as wide as the view's pixels, and how far the likeliest posture's image is off."""
     if view is None:
         return {} if shown.sight is None else {"image": _rows(shown.sight.image)}
     width = view.camera.aspect if isinstance(view.camera, ScaledOrthographicModel) else 1.0
-    found: Json = {"image": _rows(np.concatenate([view.image[index], view.head_image[index]]) * [width, 1.0])}
+    points = np.concatenate([view.image[index], view.head_image[index], view.own_head_image[index]])
+    found: Json = {"image": _rows(points * [width, 1.0])}
     if len(frame.joints) and not isinstance(view.camera, LeeChenModel):
         away = image_distances(frame.joints[0], shown.sight)
         if np.isfinite(away).any():
