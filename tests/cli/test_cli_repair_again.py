@@ -13,8 +13,9 @@ import pytest
 import posekit
 from posekit.body import load_figure
 from posekit.formats.motion import Motion, read_motion, write_motion
-from posekit.formats.own import read_report
+from posekit.formats.own import Postures, read_report, write_postures
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS
+from posekit.validators import Validator
 
 FRAMES = 60
 
@@ -107,3 +108,22 @@ def test_all_points_are_kept(run: Callable[..., Any], tmp_path: Path, suffix: st
     assert np.isfinite(repaired).all()
     apart = [np.linalg.norm(one[:, 19:] - one[:, foot_ankles], axis=-1) for one in (points, repaired)]
     np.testing.assert_allclose(apart[1], apart[0], rtol=0, atol=1e-3)
+
+
+def test_one_posture_that_passes_strictly_passes_when_it_is_judged_again(
+    run: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Knees that are straight by six degrees more are within their range, and no sign of exchanged sides."""
+    figure = load_figure()
+    q = np.zeros((1, figure.model.nq))
+    q[:, 6] = 1.0
+    angles = np.zeros(22)
+    angles[[9, 13]], angles[[14, 18]], angles[[17, 21]] = 0.3, 0.2, -0.1
+    angles[[6, 7, 8, 10, 11, 12]] = 0.35, 0.25, 0.1, -0.2, 0.3, 0.15
+    q[:, figure.angle_index] = angles
+    joints = figure.forward_kinematics(q)[:, : len(JOINTS)]
+    assert Validator(strict=True).check(joints).valid.all()
+    given, out = tmp_path / "given.json", tmp_path / "out.json"
+    write_postures(given, Postures(joints=joints))
+    assert "judged again, 1 of 1 frames are valid" in run("validate", given, "--strict", "--repair", out).out
+    assert "swap: it needs two frames" in run("validate", out, "--strict").out

@@ -81,9 +81,10 @@ def explained(clip: MotionClip) -> Explained:
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
     noise = max(clip.noise, usual_trembling(joints[kept]))
     follows = np.diff(timeline.slots[order][kept]) == 1
-    exchanged[kept] = exchanged_pairs(
-        joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, noise
-    )
+    if len(joints) > 1:  # of one posture the usual ranges judge which way a knee bends
+        exchanged[kept] = exchanged_pairs(
+            joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, noise
+        )
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints, clip.step)
     jumped = (jumps.joint > LEAST_JUMP) | (jumps.body > LEAST_JUMP)[:, None]

@@ -34,6 +34,10 @@ class Swap(MotionCheck):
         del clip
         return SIDE_PAIRS
 
+    def not_asked(self, clip: MotionClip) -> str:
+        """Ask nothing of one posture, whose knees may bend a little backward; see `MotionCheck`."""
+        return super().not_asked(clip) or ("it needs two frames" if len(clip) < 2 else "")
+
     def judge(self, clip: MotionClip) -> Findings:
         """Say 1 where a pair is exchanged and 0 where it is as labelled; see `MotionCheck`."""
         exchanged = explained(clip).exchanged.astype(np.float64)
