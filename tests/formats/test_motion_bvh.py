@@ -19,8 +19,8 @@ from posekit.body import Figure, load_figure
 from posekit.errors import InputError
 from posekit.formats.motion.bvh import BVH_FORMAT, examine_bvh, read_bvh, write_bvh
 from posekit.formats.motion.bvh_angles import continuous, euler_angles, euler_rotation
+from posekit.formats.motion.bvh_names import ANIMATION_NAMES
 from posekit.formats.motion.bvh_size import CMU_UNIT_METRES
-from posekit.formats.motion.bvh_writing import ANIMATION_NAMES
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
@@ -481,6 +481,13 @@ class TestWhatIsRead:
         assert found.derived == ()
         points = np.concatenate([found.joints, found.head], axis=1)
         assert np.abs(points - expected_points(FIGURE, q)).max() < EXACT
+
+
+def test_a_file_of_posekit_is_y_up_however_the_body_lies(tmp_path: Path) -> None:
+    q = np.zeros((12, FIGURE.model.nq))
+    q[:, 4] = q[:, 6] = np.sqrt(0.5)  # a quarter turn about y: the body lies along x
+    write_bvh(tmp_path / "lies.bvh", FIGURE, q, np.arange(12) / 30, up="+z")
+    assert read_bvh(tmp_path / "lies.bvh").up == "+y"
 
 
 def with_value(array: np.ndarray, at: Any, value: float) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from posekit.formats.motion.bvh_file import open_bvh
 from posekit.formats.motion.bvh_kinematics import points_of, positions_are_absolute
+from posekit.formats.motion.bvh_names import ANIMATION_NAMES
 from posekit.formats.motion.bvh_size import BvhUnit, guessed_unit, guessed_up
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
@@ -63,7 +64,7 @@ def examine_bvh(
         The file's, one of `posekit.formats.motion.motion_format.METRES_IN_UNIT`; told by the size of the body if not
         given.
     up : str, optional
-        ``+x`` … ``-z``; y if not given, unless the body stands along another axis.
+        ``+x`` … ``-z``; y if not given, unless the body stands along another axis in a file that posekit did not write.
     absolute : bool, optional
         Whether position channels stand in place of the offsets; told by the numbers if not given.
     as_recorded : bool
@@ -95,6 +96,8 @@ def examine_bvh(
     names = tuple(tree.names[k] for k in kept)
     points = points[:, kept]
     points *= scale.metres
+    if up is None and set(ANIMATION_NAMES.values()) <= set(names):
+        up = "+y"  # posekit wrote it
     motion = Motion(
         names=names,
         points=points,

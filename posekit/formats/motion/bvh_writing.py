@@ -10,36 +10,12 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.formats.motion.bvh_angles import AXIS_ORDER, continuous
+from posekit.formats.motion.bvh_names import ANIMATION_NAMES
 from posekit.formats.motion.bvh_tree import BODY_NODES, LEAF_NODES, checked, filled, offsets, place
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.geometry import Array
 from posekit.safe_io import refusal, replacing, shown
 
-ANIMATION_NAMES: Final = {
-    "pelvis": "Hips",
-    "torso": "Spine",
-    "neck": "NeckBase",
-    "head": "Head",
-    "nose": "Nose",
-    **{
-        f"{side}_{part}": f"{side.capitalize()}{name}"
-        for side in ("right", "left")
-        for part, name in (
-            ("shoulder", "Arm"),
-            ("elbow", "ForeArm"),
-            ("wrist", "Hand"),
-            ("hip", "UpLeg"),
-            ("knee", "Leg"),
-            ("ankle", "Foot"),
-            ("eye", "Eye"),
-            ("ear", "Ear"),
-        )
-    },
-}
-"""What animation programs call the figure's joints: by those names they find their own characters' joints.
-
-A file's Neck may lie anywhere between the shoulders and the head; NeckBase is the figure's, and is in no other file.
-"""
 STILL_FRAME_SECONDS: Final = 1 / 30
 """Seconds that a file of one frame says."""
 UNEVEN_STEP_SHARE: Final = 0.1
