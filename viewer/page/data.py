@@ -22,6 +22,7 @@ from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
 from posekit.viewer.page.answer_page import answer_data, answer_segments, image_distances
 from posekit.viewer.page.family_page import family_data, inferred_data, tree_of, walk
 from posekit.viewer.page.findings_page import PageFindings
+from posekit.viewer.page.hand_page import flips_of, units_of, verdicts
 from posekit.viewer.page.packed import branch_bits, origins, packed, steps
 from posekit.viewer.page.paths_page import paths_shown
 from posekit.viewer.page.rejected_page import rejected_shown
@@ -162,6 +163,11 @@ def _result_data(given: Result, view: View | None, title: str, frames: Sequence[
     for index in chosen:
         for reason in given.frames[index].rejected:
             reasons.setdefault(reason, len(reasons))
+    whole = [given.frames[index] for index in chosen]
+    pruned, judged = verdicts(whole, reasons)
+    arrays |= pruned
+    units = units_of(whole)
+    levels = result.frames[0].levels["joint"]
     return {
         **_of_figure(subject.figure, world, title),
         **told,
@@ -171,12 +177,13 @@ def _result_data(given: Result, view: View | None, title: str, frames: Sequence[
         "left": sum(kept.counts) - sum(len(row) for row in kept.rows),
         "refined": any(given.frames[index].refined is not None for index in chosen),
         "deviation": _deviation(given.settings),
-        "tree": tree_of(result.frames[0].levels["joint"]),
+        "tree": tree_of(levels),
+        "flips": flips_of(walk(levels), levels) | {"frames": len(given.frames)},
         "upright": "" if subject.R_cam_world is not None else "level" if R_cam_world is None else "trunks",
         "camera": _camera(world) | {"parallel": any(given.frames[k].family is not None for k in chosen)},
         "margins": _margins(result.frames[0]),
         "settings": _settings(given.settings),
-        "reasons": [list(reason.partition("/")[::2]) for reason in reasons],
+        "reasons": [[*reason.partition("/")[::2], units.get(reason, "")] for reason in reasons],
         "answerSegments": answer_segments(),
         "step": step,
         "packed": arrays,
@@ -187,6 +194,7 @@ def _result_data(given: Result, view: View | None, title: str, frames: Sequence[
                 "held": len(kept.rows[k]),
                 **starts[k],
                 **_frame(given.frames[index], kept.rows[k], reasons),
+                **judged[k],
                 **_uncalibrated(result.frames[index], shown[k], world),
                 **_image(result.frames[index], shown[k], view, index),
                 "examples": [reasons.get(reason, -1) for reason in rejected[k].reasons],

@@ -54,14 +54,30 @@ const lift = (() => {
   }
 
   // All points at scale s, camera axes, metres from the middle of the image; null where unknown.
-  function posture(frame, survivor, s) {
+  function posture(frame, survivor, s, signs = frame.family.signs[survivor]) {
     const { family } = frame, old = recovered(frame, survivor), placed = [];
     const root = DATA.tree.root;
     placed[root] = [...family.image[root].map((value) => value / s), family.roots[survivor]];
-    [...family.signs[survivor]].forEach((choice, step) => {
+    [...signs].forEach((choice, step) => {
       placed[DATA.tree.steps[step][0]] = end(family, step, choice, s, old, placed);
     });
-    // The head, and joints that are no part of the tree, follow the torso.
+    return followed(old, placed);
+  }
+
+  // The posture at its own scale, with some segments turned the other way: the depth along them changes its sign.
+  function flipped(frame, survivor, signs) {
+    const { family } = frame, old = recovered(frame, survivor), placed = [];
+    placed[DATA.tree.root] = old[DATA.tree.root];
+    DATA.tree.steps.forEach(([child, parent], step) => {
+      const from = old[child] && old[parent] && minus(old[child], old[parent]);
+      if (from && signs[step] !== family.signs[survivor][step]) from[2] = -from[2];
+      placed[child] = from && placed[parent] ? along(placed[parent], 1, from) : null;
+    });
+    return followed(old, placed);
+  }
+
+  // The head, and joints that are no part of the tree, follow the torso.
+  function followed(old, placed) {
     const [before, now] = [torso(old), torso(placed)];
     return old.map((point, node) => {
       if (placed[node] !== undefined) return placed[node];
@@ -72,10 +88,10 @@ const lift = (() => {
   }
 
   // The same in the page's world, without the middles.
-  function world(frame, survivor, s) {
+  function world(frame, survivor, s, signs) {
     const { anchor } = frame.family;
     const place = (point) => point && axes.reduce((sum, axis, k) => along(sum, point[k], axis), anchor);
-    return posture(frame, survivor, s).slice(0, DATA.points.length).map(place);
+    return (s === null ? flipped(frame, survivor, signs) : posture(frame, survivor, s, signs)).slice(0, DATA.points.length).map(place);
   }
 
   return { posture, recovered, world, scaleOf: (family, survivor) => family.scales[family.at[survivor]] };

@@ -22,6 +22,7 @@ PAGE_SCRIPTS = (
     "panel.js",
     "tables.js",
     "scale.js",
+    "hand.js",
     "sight.js",
     "scene.js",
     "play.js",

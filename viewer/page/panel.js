@@ -2,7 +2,7 @@
 // gave is set as text, never as HTML. scene.js draws what is chosen here; tables.js has the tabs.
 "use strict";
 const page = (() => {
-  const state = { frame: 0, survivor: 0, path: DATA.paths ? 0 : null, scale: null, example: null, sort: { key: "likeliest", down: false }, listed: 50, playing: false };
+  const state = { frame: 0, survivor: 0, path: DATA.paths ? 0 : null, scale: null, example: null, hand: null, sort: { key: "likeliest", down: false }, listed: 50, playing: false };
   const listeners = [];
   const byId = (id) => document.getElementById(id);
   const frame = () => DATA.frames[state.frame];
@@ -47,7 +47,7 @@ const page = (() => {
     state.frame = Math.min(Math.max(index, 0), DATA.frames.length - 1);
     if (state.path === null && DATA.paths) state.path = state.left ?? null;
     state.survivor = usual();
-    state.scale = state.example = null;
+    state.scale = state.example = state.hand = null;
     byId("frame").value = state.frame;
     refresh();
   }
@@ -57,7 +57,7 @@ const page = (() => {
     if (state.path !== null) state.left = state.path;
     state.path = null;
     state.survivor = index;
-    state.scale = state.example = null;
+    state.scale = state.example = state.hand = null;
     for (const made of byId("survivors-body").rows) {
       const chosen = Number(made.dataset.survivor) === index;
       made.setAttribute("aria-selected", chosen);
@@ -78,6 +78,16 @@ const page = (() => {
   function chooseScale(s) {
     if (s !== null && state.path !== null && state.survivor >= 0) [state.left, state.path] = [state.path, null];
     state.scale = s;
+    changed();
+  }
+
+  // Draws the chosen posture with its segments nearer (0) or farther (1) as these letters say.
+  function chooseFlips(signs) {
+    if (state.path !== null) [state.left, state.path] = [state.path, null];
+    state.hand = signs;
+    state.example = null;
+    document.querySelectorAll("#survivors-body tr").forEach((made) => made.setAttribute("aria-selected", false));
+    markAnswer();
     changed();
   }
 
@@ -131,6 +141,7 @@ const page = (() => {
       const share = pack.probability(here, survivor);
       said = DATA.kind === "motion" ? DATA.clips?.[here.clip] ?? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
     }
+    if (state.hand !== null) said = hand.said();
     if (state.example !== null) said += " – dashed: a rejected branch";
     byId("caption").textContent = said;
   }
@@ -165,7 +176,7 @@ const page = (() => {
   }
 
   function markAnswer() {
-    for (const made of document.querySelectorAll("#answer button")) made.setAttribute("aria-pressed", state.path === null && Number(made.dataset.at) === state.survivor);
+    for (const made of document.querySelectorAll("#answer button")) made.setAttribute("aria-pressed", state.path === null && state.hand === null && Number(made.dataset.at) === state.survivor);
   }
 
   function showVerdict(box, here) {
@@ -378,7 +389,7 @@ const page = (() => {
   if (DATA.left) byId("lead").textContent += ` The page holds the likeliest postures; ${DATA.left.toLocaleString("en")} more are in the file.`;
 
   return {
-    state, frame, chooseFrame, chooseSurvivor, choosePath, chooseScale, chooseExample, groupColour, findings, depth, unseen, about, example, sorted, refresh,
+    state, frame, chooseFrame, chooseSurvivor, choosePath, chooseScale, chooseExample, chooseFlips, groupColour, findings, depth, unseen, about, example, sorted, refresh,
     tools: { byId, element, row, words, percent, plural }, onChange: (listener) => listeners.push(listener),
   };
 })();

@@ -81,6 +81,7 @@ const play = (() => {
     2: () => byId("look-camera").hidden || scene.look("camera"),
     3: () => scene.look("side"),
     4: () => scene.look("above"),
+    f: () => byId("flips-tab").hidden || hand.open(),
     b: () => scene.show("bodies"),
     a: () => scene.show("others"),
     c: () => scene.show("rays"),

@@ -6,7 +6,7 @@ const scene = (() => {
   // Kept in the processor's memory, and opaque: without a graphics card that is several times as quick.
   const pen = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
   const { dot, minus, along, cross, unit } = sight.vectors;
-  const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16;
+  const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16, CLICK = 5;
   const { position: eye, forward, right, down } = DATA.camera, axes = [right, down, forward];
   // Several postures in the frames of a file are people: all are seen.
   const people = DATA.kind === "postures" && DATA.frames.length > 1;
@@ -22,7 +22,8 @@ const scene = (() => {
     const { survivor, scale: s, path } = page.state, frame = page.frame();
     if (path !== null) return pack.path(page.state.frame, path);
     if (!(survivor >= 0 && survivor < frame.held)) return null;
-    return s === null || !frame.family ? pack.points(frame, survivor) : lift.world(frame, survivor, s);
+    if (!frame.family || (s === null && !page.state.hand)) return pack.points(frame, survivor);
+    return lift.world(frame, survivor, s, page.state.hand ?? undefined);
   }
 
   function mean(all, indices) {
@@ -340,12 +341,30 @@ const scene = (() => {
     soon();
   }
 
+  // The segment under a finger that can be turned, by its number among the flips.
+  function segmentAt(x, y) {
+    let best = null, least = FINGER;
+    for (const [number, { joints }] of page.frame().family ? DATA.flips.segments.entries() : []) {
+      const [a, b] = joints.map((some) => mean(chosenNow ?? [], some)).map((point) => point && sight.project(point));
+      if (!a || !b) continue;
+      const along = [b[0] - a[0], b[1] - a[1]], part = ((x - a[0]) * along[0] + (y - a[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2 || 1);
+      const t = Math.min(Math.max(part, 0), 1), away = Math.hypot(x - a[0] - t * along[0], y - a[1] - t * along[1]);
+      if (away < least) [best, least] = [number, away];
+    }
+    return best;
+  }
+
   const fingers = new Map();
-  let apart = 0;
+  let apart = 0, moved = 0;
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
     apart = 0;
+    moved = fingers.size > 1 || event.button ? Infinity : 0;
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    const at = moved < CLICK ? segmentAt(event.offsetX, event.offsetY) : null;
+    if (at !== null) hand.click(at);
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
   canvas.addEventListener("pointermove", (event) => {
@@ -354,6 +373,7 @@ const scene = (() => {
     tell(null);
     fingers.set(event.pointerId, now);
     const [x, y] = [now[0] - before[0], now[1] - before[1]];
+    moved += Math.hypot(x, y);
     if (fingers.size > 1) {
       const [p, q] = [...fingers.values()], wide = Math.hypot(p[0] - q[0], p[1] - q[1]);
       if (apart) turned(() => sight.zoom(apart / Math.max(wide, 1)));
@@ -402,6 +422,7 @@ const scene = (() => {
 
   return {
     look, show, draw, pictures: 0,
+    points: () => chosen(),
     // What is drawn now, metres, and where in the picture, from -1 to 1; for tests and for the console.
     drawn: () => { const all = chosen(); return Array.from({ length: DATA.joints }, (_, k) => all?.[k] ?? null); },
     projected: () => { draw(); const { width, height } = sight.size(); return places.slice(0, DATA.joints).map((place) => place && [(2 * place[0]) / width - 1, 1 - (2 * place[1]) / height]); },

@@ -13,6 +13,7 @@ from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.survivor_columns import SurvivorColumns
+from posekit.viewer.page.hand_page import BRANCH_BYTES, branches_held
 
 POSTURE_BYTES: Final = 200
 """Bytes of one posture in a page: 19 points of 6 bytes, margins and the like, as text of 4 letters for 3 bytes."""
@@ -149,7 +150,7 @@ def _most(frames: Sequence[ResultFrame]) -> int:
     hidden = max((len(one) for frame in frames for one in (frame.inferred or ())[:1]), default=0)
     margins = 6 * max(len(frames[0].margins) - 4, 0)
     family = FAMILY_BYTES * any(frame.family is not None for frame in frames)
-    room = PAGE_BYTES - FRAME_BYTES * len(frames)
+    room = PAGE_BYTES - FRAME_BYTES * len(frames) - BRANCH_BYTES * branches_held(frames)
     return max(room, 0) // (POSTURE_BYTES + margins + family + INFERRED_BYTES * hidden)
 
 

@@ -142,6 +142,7 @@ const tables = (() => {
 
   function choose(name) {
     open = name;
+    if (name === "flips") hand.show();
     for (const tab of document.querySelectorAll("#tabs button")) {
       const on = tab.dataset.tab === name;
       tab.setAttribute("aria-selected", on);
@@ -167,6 +168,7 @@ const tables = (() => {
   }
   for (const tab of tabs) if (["levels", "rejected", "settings"].includes(tab.dataset.tab)) tab.hidden = DATA.kind !== "result";
   for (const tab of tabs) if (tab.dataset.tab === "findings") tab.hidden = DATA.kind !== "motion" || !DATA.judged;
+  byId("flips-tab").hidden = !DATA.frames.some((one) => one.family);
   byId("unseen-tab").hidden = !DATA.frames.some((one) => one.inferred?.some((joints) => Object.keys(joints).length));
   for (const [name, value] of DATA.settings) row(byId("settings").querySelector("tbody"), [text(words(name)), text(value, "text wrap")]);
   page.onChange(show);

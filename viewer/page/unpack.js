@@ -33,6 +33,8 @@ const pack = (() => {
     number: (frame, survivor) => value("number", frame, survivor),
     probability: (frame, survivor) => value("probability", frame, survivor),
     group: (frame, survivor) => value("groups", frame, survivor),
+    // A pruned branch of an uncalibrated frame: its choices, the number of its reason, what was found, and the bound.
+    pruned: (frame, index) => ["Branch", "Reason", "Value", "Bound"].map((name) => arrays[`pruned${name}`][frame.firstPruned + index]),
     margin: (frame, survivor, index) => value(`margin${index}`, frame, survivor),
     // Near (0) or far (1), segment by segment, as text; undefined where there is no such thing.
     branch: (frame, survivor) => value("branches", frame, survivor)?.toString(2).slice(1) || undefined,
