@@ -34,7 +34,7 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         The lines of the report.
     """
     objects = constrained()
-    views = [random_views(one) for one in objects]
+    views = [random_views(one, posed=posed) for posed in (False, True) for one in objects]
     study = synthetic_study(N_PICTURES)
     lines = [
         "# Taylor 2000, reproduced",
@@ -62,10 +62,8 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         folder / "taylor.json",
         {
             "table1": TABLE_1,
-            "objects": [
-                {**_plain(one), "random_views": more.plain()}
-                for one, more in zip(objects, views, strict=True)
-            ],
+            "objects": [_plain(one) for one in objects],
+            "random_views": [one.plain() for one in views],
             **_numbers(study),
         },
     )
@@ -101,7 +99,7 @@ def _scatter(folder: Path, views: list[RandomViews]) -> list[str]:
 
     studies = [
         (
-            f"Like {one.constrained.figure}",
+            f"{one.title[0].upper()}{one.title[1:]}",
             one.constrained.printed,
             one.deviation,
             one.worst,

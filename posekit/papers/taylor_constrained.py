@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from posekit.formats.markdown import table_lines
 from posekit.geometry import Array
@@ -24,6 +25,10 @@ DIAGONAL_MILLIMETRES = 140.0
 
 TURN_DEGREES = (50.0, 110.0, 110.0, 80.0)
 """Degrees by which the flat chain turns at its points of articulation."""
+
+
+MOST_TURN = 150.0
+"""Degrees by which a random chain turns at most: beyond, segments lie on each other."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,9 +72,23 @@ def constrained(pictures: int = 200, seed: int = 2000) -> list[Constrained]:
     four_bar, chain = load_linkage("four_bar"), load_linkage("planar_chain")
     return [
         _measure(
-            "Fig. 7", "closure", 1.0, four_bar, _turn(_folded(four_bar.lengths), 50, 220), pictures, seed
+            "Fig. 7",
+            "closure",
+            1.0,
+            four_bar,
+            _turn(_folded(four_bar.lengths, DIAGONAL_MILLIMETRES), 50, 220),
+            pictures,
+            seed,
         ),
-        _measure("Fig. 8", "coplanar", 2.0, chain, _turn(_laid(chain.lengths), 45, 60), pictures, seed),
+        _measure(
+            "Fig. 8",
+            "coplanar",
+            2.0,
+            chain,
+            _turn(_laid(chain.lengths, TURN_DEGREES), 45, 60),
+            pictures,
+            seed,
+        ),
     ]
 
 
@@ -155,24 +174,35 @@ def triples_of(n: int, *, closed: bool) -> list[tuple[int, int, int]]:
     return [((k - 1) % n, k, (k + 1) % n) for k in joints]
 
 
-def _folded(lengths: Array) -> Array:
+def random_posture(one: Constrained, rng: np.random.Generator) -> Array:
+    """Fold or lay the object at random, in a plane: any diagonal that closes it, any turns up to `MOST_TURN`."""
+    lengths = one.linkage.lengths
+    if one.constraint == "coplanar":
+        return _laid(lengths, rng.uniform(-MOST_TURN, MOST_TURN, len(lengths) - 1))
+    ab, bc, cd, da = lengths
+    # At either end a pair of bars lies straight, and its height is the root of zero.
+    shortest, longest = max(abs(ab - bc), abs(cd - da)), min(ab + bc, cd + da)
+    return _folded(lengths, shortest + rng.uniform(0.05, 0.95) * (longest - shortest))
+
+
+def _folded(lengths: Array, diagonal: float) -> Array:
     """Lay the four bars into a plane (4, 3), folded over their diagonal."""
     ab, bc, cd, da = lengths
-    b = (ab**2 - bc**2 + DIAGONAL_MILLIMETRES**2) / (2 * DIAGONAL_MILLIMETRES)
-    d = (da**2 - cd**2 + DIAGONAL_MILLIMETRES**2) / (2 * DIAGONAL_MILLIMETRES)
+    b = (ab**2 - bc**2 + diagonal**2) / (2 * diagonal)
+    d = (da**2 - cd**2 + diagonal**2) / (2 * diagonal)
     return np.array(
         [
             [0, 0, 0],
             [b, np.sqrt(ab**2 - b**2), 0],
-            [DIAGONAL_MILLIMETRES, 0, 0],
+            [diagonal, 0, 0],
             [d, np.sqrt(da**2 - d**2), 0],
         ]
     )
 
 
-def _laid(lengths: Array) -> Array:
+def _laid(lengths: Array, turns: ArrayLike) -> Array:
     """Lay the chain into a plane (6, 3), turning at each point of articulation."""
-    heading = np.radians(np.concatenate([[0.0], np.cumsum(TURN_DEGREES)]))
+    heading = np.radians(np.concatenate([[0.0], np.cumsum(turns)]))
     steps = lengths[:, None] * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1)
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 

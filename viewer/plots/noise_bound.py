@@ -57,8 +57,8 @@ def plot_noise_bound(studies: Sequence[tuple[str, float, Array, Array, NDArray[n
             panel.plot(SHOWN_DEGREES, SHOWN_DEGREES, color="0.5", lw=0.8, ls=":")
             panel.axhline(bound, color="0.2", lw=1.0)
             panel.set(xscale="log", yscale="log", xlim=SHOWN_DEGREES, ylim=SHOWN_DEGREES, title=title)
-            panel.set_xlabel("standard deviation of the worst angle (degrees)")
             panel.grid(visible=True)
             panel.legend(loc="upper left", fontsize=8)
-        axes[0].set_ylabel("largest error of an angle (degrees)")
+        figure.supxlabel("standard deviation of the worst angle by the noise (degrees)", fontsize=9)
+        figure.supylabel("largest error of an angle (degrees)", fontsize=9)
     return figure
