@@ -222,7 +222,7 @@ def _tell(report: ValidationReport) -> None:
         report.settings.get("recognised", ()), MAX_RECOGNISED, "such sentences in the report"
     ):
         say(line)
-    for line in summary_table(columns_of(report)):
+    for line in summary_table(columns_of(report), report.frames):
         say(line)
     for line in (*(clip_lines(report.clips) if report.clips else ()), *said_of(report)):
         say(line)

@@ -195,9 +195,10 @@ def _view(view: View) -> list[str]:
         (name, f"{share * 100:.0f} %") for name, share in zip(points, seen.mean(axis=0).tolist(), strict=True)
     ]
     more = ", ".join(f"{name} in {count}" for name, count in known.items())
+    derived = f"; placed from other points: {', '.join(view.derived)}" if view.derived else ""
     return [
         f"{plural(len(view), 'frame')}, camera {kind}; {more}",
-        f"never seen: {', '.join(missing) or 'nothing'}; derived: {', '.join(view.derived) or 'nothing'}",
+        f"never seen: {', '.join(missing) or 'nothing'}{derived}",
         "",
         *table_lines(("point", "seen"), rows),
     ]

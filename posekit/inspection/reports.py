@@ -19,7 +19,7 @@ def report_lines(report: ValidationReport) -> list[str]:
     """Describe verdicts, what checks reject, and settings."""
     clips = clip_lines(report.clips) if report.clips else []
     if report.checks is None or report.listed is None:
-        return [*summary_table(columns_of(report)), *clips, settings_line(report.settings)]
+        return [*summary_table(columns_of(report), report.frames), *clips, settings_line(report.settings)]
     counts = ", ".join(f"{count} {verdict}" for verdict, count in report.summary.items())
     return [
         f"{plural(len(report), 'posture')}: {counts}; listed are {report.listed}",

@@ -86,7 +86,7 @@ def _refined(result: Result) -> str:
     deviation = noise.get("deviation") if isinstance(noise, dict) else None
     of_points = f" with a deviation of {deviation:g} px" if isinstance(deviation, int | float) else ""
     size = noise.get("size") if isinstance(noise, dict) else None
-    of_lengths = f", of the body's size {size:g}" if isinstance(size, int | float) else ""
+    of_lengths = f", the body's size known to {size:.2g} of itself" if isinstance(size, int | float) else ""
     return f"refined in {plural(len(refined), 'frame')}{of_points}{of_lengths}{told}"
 
 
@@ -106,11 +106,13 @@ def _ranked(result: Result) -> str:
 
 def _paths(paths: FollowedPaths) -> str:
     count, frames = paths.survivor.shape
-    lead = ""
-    if count > 1:
-        lead = f"{path_words(distinct_paths(paths.joints, paths.share)[1].tolist())}; "
     certain = "certain to be" if paths.exact else "not certain to be"
+    sure = f"the first is {certain} the likeliest"
+    if count > 1:
+        sure = f"{path_words(distinct_paths(paths.joints, paths.share)[1].tolist())}; {sure}"
+    elif not paths.exact:
+        sure = "how sure is not asked (--follow 2)"
     return (
-        f"{plural(count, 'path')}: {lead}the first is {certain} the likeliest, "
+        f"{plural(count, 'path')}: {sure}, "
         f"{int((paths.survivor[0] < 0).sum())} of {plural(frames, 'frame')} bridged"
     )

@@ -37,7 +37,7 @@ def up_of(camera: CameraModel) -> Up:
     """Return which way is up in a camera's frame: as its calibration says, else as if it were held level."""
     if isinstance(camera, OpenCVModel) and camera.R is not None and camera.up:
         axis = np.eye(3)["xyz".index(camera.up[1])] * (-1.0 if camera.up[0] == "-" else 1.0)
-        return Up.of_camera(camera.R, axis, says=f"known: the calibration's {camera.up}")
+        return Up.of_camera(camera.R, axis, says=f"{camera.up}, as the calibration says")
     return Up.level()
 
 

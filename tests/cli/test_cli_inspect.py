@@ -104,11 +104,14 @@ def test_a_followed_and_refined_result(command: Run, tmp_path: Path, suffix: str
     assert "not recovered, 1 frame: the neck, from which the tree grows, is not seen" in text
     assert "judged as refined in 2 frames" in text
     assert (
-        "refined in 2 frames with a deviation of 2 px, of the body's size 0.015; chi2 a degree of freedom: median "
+        "refined in 2 frames with a deviation of 2 px, the body's size known to 0.015 of itself; chi2 a degree of freedom: median "
         in text
     )
     assert "ranked (up: " in text
     assert "2 paths: the first " in text
+    assert command("recover", view, "-o", out, "--follow", "1", "--length-deviation", "0.015").code == 0
+    assert "1 path: how sure is not asked (--follow 2), 1 of 3 frames bridged" in told(command, out)
+    assert "derived" not in told(command, view)
     assert "1 of 3 frames bridged" in text
     assert "; posekit " in text
 

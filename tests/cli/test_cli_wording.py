@@ -41,7 +41,7 @@ def test_the_worst_of_a_check_and_of_a_clip_is_the_value_that_was_found(
     """The table and the line of the clip say the same number, beside the same bound."""
     said = run("validate", samples / "jump.bvh").out
     of_clip = re.search(r"teleport/body, frame 70 .*, worst (\S+ m) in 70 (\(bound [^)]*\))", said)
-    of_check = re.search(r"\| posture 70: body (\S+ m) (\(bound [^)]*\))", said)
+    of_check = re.search(r"\| frame 70: body (\S+ m) (\(bound [^)]*\))", said)
     assert of_clip and of_check and of_clip.groups() == of_check.groups()
 
 

@@ -37,13 +37,17 @@ MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
 
 
-def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[str]:
+def summary_table(
+    columns: VerdictColumns, frames: ReportFrames | None = None, *, markdown: bool = False
+) -> list[str]:
     """Count the verdicts, and for each check what it rejects, where most, and the worst posture (from 0).
 
     Parameters
     ----------
     columns : VerdictColumns
         The verdicts, one a posture.
+    frames : ReportFrames, optional
+        Which frame each posture is, where they are motion.
     markdown : bool
         Whether names are escaped for Markdown, or for a terminal, where many checks that found nothing share a line.
     """
@@ -61,7 +65,7 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
             f"{count.rejected} ({count.rejected / total:.1%})",
             count.undecided,
             _most(check, count),
-            _worst(count),
+            _worst(count, frames),
         )
         for check, count in by_check.items()
         if check not in quiet
@@ -92,7 +96,7 @@ def markdown_lines(
     refused : sequence of str
         Files that could not be judged.
     """
-    lines = ["# Validation", "", *summary_table(columns, markdown=True)]
+    lines = ["# Validation", "", *summary_table(columns, frames, markdown=True)]
     if refused:
         lines += ["", "## Files that could not be judged", ""]
         lines += [f"- {no_markup(line)}" for line in refused[:MAX_SHOWN_CLIPS]]
@@ -213,11 +217,15 @@ def _most(check: str, count: CheckCount) -> str:
     return named + (f", and {len(places) - MAX_NAMED_PLACES} more" if len(places) > MAX_NAMED_PLACES else "")
 
 
-def _worst(count: CheckCount) -> str:
+def _worst(count: CheckCount, frames: ReportFrames | None) -> str:
     if count.worst is None:
         return ""
     index, judged = count.worst
-    return f"posture {index}: {_found(judged.place.where, judged)}"
+    where = f"posture {index}"
+    if frames is not None and frames.in_time:
+        clip, frame, _ = _of_frame(frames, index)
+        where = f"frame {frame}{f' of {clip}' if len(frames.clips) > 1 else ''}"
+    return f"{where}: {_found(judged.place.where, judged)}"
 
 
 def _at(judged: PlaceValue) -> str:
