@@ -104,8 +104,8 @@ def test_a_followed_and_refined_result(command: Run, tmp_path: Path, suffix: str
     assert "not recovered, 1 frame: the neck, from which the tree grows, is not seen" in text
     assert "judged as refined in 2 frames" in text
     assert (
-        "refined in 2 frames with a deviation of 2 px, the body's size known to 0.015 of itself; chi2 a degree of freedom: median "
-        in text
+        "refined in 2 frames with a deviation of 2 px, the body's size known to 0.015 of itself; "
+        "chi2 a degree of freedom: median " in text
     )
     assert "ranked (up: " in text
     assert "2 paths: the first " in text
