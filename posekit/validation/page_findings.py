@@ -1,9 +1,9 @@
-"""What a page says of the postures of a file: findings of the checks that judge each posture by itself."""
+"""What a page says of the postures of a file: what checks find in each of them, in motion those over time, too."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +11,11 @@ import numpy as np
 from posekit.errors import PosekitError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures
-from posekit.validators import Report, Validator
+from posekit.validation.files import AskedValidation
+from posekit.validation.over_time import judged_over_time
+from posekit.validation.people import Recording
+from posekit.validation.reading import ReadPostures
+from posekit.validators import Judgement, Validator
 from posekit.viewer.page.findings_page import PageFinding, PageFindings
 
 MOST_JUDGED: Final = 5000
@@ -33,22 +37,28 @@ def page_findings(given: Any) -> PageFindings | None:
     if len(joints) > MOST_JUDGED or not np.isfinite(joints).any():
         return None
     clip = given.clip if isinstance(given, HeldPostures) else np.zeros(len(joints), dtype=np.intp)
+    recordings = [Recording(np.flatnonzero(clip == one), None) for one in np.unique(clip).tolist()]
     found: dict[int, list[PageFinding]] = defaultdict(list)
-    validator = Validator()
+    moving: list[list[Judgement]] = [[] for _ in recordings]
     try:
-        for one in np.unique(clip).tolist():
-            rows = np.flatnonzero(clip == one)
+        if isinstance(given, HeldPostures):
+            validator = AskedValidation().validator(ReadPostures(given))
+            if given.in_time:
+                moving, _ = judged_over_time(given, recordings, validator)
+        else:
+            validator = Validator()
+        for (rows, _), over_time in zip(recordings, moving, strict=True):
             report = validator.check(joints[rows], None if head is None else head[rows], configured=False)
-            for row, finding in _findings(report):
+            for row, finding in _findings([*report.judgements, *over_time]):
                 found[int(rows[row])].append(finding)
     except PosekitError:
         return None
     return PageFindings(by_posture=dict(found))
 
 
-def _findings(report: Report) -> Iterator[tuple[int, PageFinding]]:
+def _findings(judgements: Sequence[Judgement]) -> Iterator[tuple[int, PageFinding]]:
     """List what was violated: the posture's row, and the finding."""
-    for judgement in report.judgements:
+    for judgement in judgements:
         for row, k in np.argwhere(judgement.violated).tolist():
             value, lower, upper = (
                 float(each[row, k]) for each in (judgement.value, judgement.lower, judgement.upper)

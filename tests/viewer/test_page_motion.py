@@ -9,8 +9,11 @@ import posekit
 from posekit.formats.held import HeldPostures
 from posekit.formats.own import Postures
 from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.report import columns_of
+from posekit.samples import write_samples
 from posekit.skeleton import JOINT, JOINTS
 from posekit.validation.page_findings import page_findings
+from posekit.validation.reading import StatedMotion, read_postures_of
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.page import write_page
 from tests.viewer.driving import wait_until
@@ -84,6 +87,22 @@ def test_a_motion_plays_and_says_what_checks_find(opened, motion):
     wait_until(tab, f"page.state.frame === {FRAMES - 1}")
     tab.click("#play")
     assert tab.is_hidden("#survivors")
+
+
+def test_what_checks_over_time_find_is_said_at_its_frames(opened, tmp_path):
+    write_samples(tmp_path)
+    jump = read_postures_of(tmp_path / "jump.bvh", StatedMotion()).postures
+    findings = page_findings(jump)
+    assert findings is not None
+    columns = columns_of(posekit.validate(jump))
+    places = [(place.check, place.where) for place in columns.places]
+    wanted = {(k, *places[place]) for k, place in zip(columns.posture.tolist(), columns.place, strict=True)}
+    found = {(k, one.check, one.where) for k, each in findings.by_posture.items() for one in each}
+    assert found == wanted
+    tab = opened(jump, findings=findings)
+    tab.evaluate("page.chooseFrame(70)")
+    assert "teleport, body: 293.6 mm (bound 60 mm)" in tab.inner_text("#answer")
+    assert "jitter" in tab.inner_text("#findings tbody")
 
 
 def test_what_is_too_much_to_be_judged_and_results_are_not(motion, walked):

@@ -63,7 +63,7 @@ class PageFindings:
             {
                 "check": check,
                 "where": where,
-                "unit": SHOWN_UNITS.get(unit, (1.0, ""))[1],
+                "unit": SHOWN_UNITS.get(unit, (1.0, unit))[1],
                 "joints": joints_of(f"{check}/{where}"),
             }
             for check, where, unit in self.places()

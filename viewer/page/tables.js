@@ -49,7 +49,7 @@ const tables = (() => {
       }
     });
     const all = [...spans].flatMap(([place, list]) => list.map((one) => ({ ...DATA.findings[place], ...one }))).sort((a, b) => b.end - b.start - a.end + a.start);
-    note.textContent = all.length ? "What each check finds, the longest first; choose one to see its worst frame." : "No check of single postures finds anything; posekit validate asks those over time, too.";
+    note.textContent = all.length ? "What each check finds, the longest first; choose one to see its worst frame." : "No check finds anything.";
     if (!all.length) return;
     row(head, ["frames", "check", "where", "worst", "bound"].map((title) => element("th", title, "text")));
     const number = (index) => DATA.frames[index].number;
