@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MAX_PANELS: Final = 64
 """Panels in one drawing."""
 
+LEAST_INCHES: Final = 5.0
+"""Width of a drawing at least: its key and the names of its axes are to be whole."""
+
 
 def panels(
     kind: type[Figure],
@@ -40,7 +43,9 @@ def panels(
         raise ViewerError(f"got {count} {what} to draw; expected 1 to {MAX_PANELS}; choose some of them")
     columns = min(columns, count)
     rows = math.ceil(count / columns)
-    figure = kind(figsize=(columns * size[0] + 0.4, rows * size[1] + extra), layout="constrained")
+    figure = kind(
+        figsize=(max(columns * size[0] + 0.4, LEAST_INCHES), rows * size[1] + extra), layout="constrained"
+    )
     grid = figure.subplots(rows, columns, squeeze=False, sharey=sharey).ravel()
     for empty in grid[count:]:
         empty.remove()
