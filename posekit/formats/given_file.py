@@ -81,6 +81,11 @@ class GivenFile:
             )
         return tuple(found)
 
+    @property
+    def alone(self) -> GivenFile | None:
+        """The one JSON file of a folder that has no other; None else."""
+        return GivenFile(self.files[0]) if self.is_folder and len(self.files) == 1 else None
+
     @cached_property
     def suffix(self) -> str:
         """The file's ending in lower case, as ``.json``; empty for a folder."""

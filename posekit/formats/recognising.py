@@ -150,9 +150,19 @@ def _of_folder(given: GivenFile) -> Recognised:
         found = tuple(one for one in known if one.holds is content and one.looks_like(given))
         if found:
             return Recognised(holds=content, formats=found)
+    if given.alone is not None and (inside := _inside(given.alone)) is not None:
+        return inside
     got = f"a folder whose first file, {cut(given.files[0].name)}, is {shown(given.document)}"
     expected = f"key points: {', '.join(names(Content.KEY_POINTS))}"
     raise refusal(given.path, "", got, expected, "say which with --format")
+
+
+def _inside(given: GivenFile) -> Recognised | None:
+    """Tell what the one file of a folder is, where it is a detector's of all pictures."""
+    found = tuple(one for one in with_suffix(given.suffix) if one.looks_like(given))
+    if not found or any(one.holds is not Content.KEY_POINTS for one in found):
+        return None
+    return Recognised(holds=Content.KEY_POINTS, formats=found)
 
 
 def _nothing_known(given: GivenFile) -> InputError:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.reading import read_keypoints
+from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from tests.detector_files import suiting, write_keypoints
 
@@ -356,3 +357,17 @@ def test_damaged_results_are_told_in_one_line(tmp_path: Path, content: object, s
     with pytest.raises(InputError, match=said) as caught:
         read_keypoints(save(tmp_path / "x.json", content), "coco-results")
     assert "\n" not in str(caught.value)
+
+
+def test_a_folder_of_one_file_is_read_as_the_file(tmp_path: Path) -> None:
+    folder = tmp_path / "annotations"
+    folder.mkdir()
+    file = save(folder / "coco.json", document([annotation(7, flags(np.random.default_rng(0)))]))
+    for format in (None, "coco"):
+        found, alone = read_keypoints(folder, format), read_keypoints(file, format)
+        np.testing.assert_array_equal(found.points, alone.points)
+        assert found.pictures == alone.pictures
+    assert [one.name for one in recognise(folder).formats] == ["coco"]
+    save(folder / "more.json", document([]))
+    with pytest.raises(InputError, match="a folder whose first file"):
+        read_keypoints(folder)

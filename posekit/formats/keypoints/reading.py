@@ -27,7 +27,7 @@ def read_keypoints(
     Parameters
     ----------
     path : path
-        A file, or a folder of one JSON file a picture.
+        A file, a folder of one JSON file a picture, or one with a single file of all pictures.
     format : str, optional
         One of `key_point_formats`, alone or with a layout as ``openpose-body_25b``; recognised by the structure if
         not given.
@@ -42,8 +42,11 @@ def read_keypoints(
     given = GivenFile(Path(path))
     if format is not None:
         one, named = chosen(format)
+        given = given if FOLDER_SUFFIX in suffixes_of(one) else given.alone or given
         return one.read(given, layout if layout is not None else named)
     candidates = _candidates(given)
+    if not candidates and given.alone is not None and (inside := _candidates(given.alone)):
+        given, candidates = given.alone, inside
     if len(candidates) == 1:
         return candidates[0].read(given, layout)
     if candidates:
