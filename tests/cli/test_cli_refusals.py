@@ -157,6 +157,18 @@ BAD_VIEWS: dict[str, tuple[Callable[[dict[str, Any]], Any], tuple[str, ...]]] = 
         },
         ("view.json: frames[0]: 5 of 6 head points are known", "missing: nose"),
     ),
+    "a head point without its place": (
+        lambda d: edited(d, *("frames", 1, "head_image", "chin"), value=[0.0, 0.7]),
+        ('view.json: frames[1].head_image.chin: got "chin"', "or give its place in figure.head_points"),
+    ),
+    "a misspelt head point": (
+        lambda d: edited(d, *("figure", "head_points", "right_eyes"), value=[-30.0, 60.0, 5.0]),
+        ('view.json: figure.head_points.right_eyes: got "right_eyes"', "did you mean right_eye?"),
+    ),
+    "a head point named as a joint": (
+        lambda d: edited(d, *("figure", "head_points", "left_hip"), value=[-30.0, 60.0, 5.0]),
+        ("view.json: figure.head_points.left_hip", "that no joint has"),
+    ),
     "no head and no root": (
         lambda d: {
             **deepcopy(d),
