@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +14,7 @@ from typing import Any
 
 from posekit.errors import InputError
 from posekit.safe_io import cut, open_file, open_npz, parse_json, read_bytes, read_toml, refusal
+from posekit.safe_io.regular_file import is_packed, plain_suffix
 from posekit.safe_io.text_file import decode
 
 MAX_BYTES = 500_000_000
@@ -88,8 +91,8 @@ class GivenFile:
 
     @cached_property
     def suffix(self) -> str:
-        """The file's ending in lower case, as ``.json``; empty for a folder."""
-        return "" if self.is_folder else self.path.suffix.lower()
+        """The file's ending in lower case, as ``.json``, packed or not; empty for a folder."""
+        return "" if self.is_folder else plain_suffix(self.path)
 
     @cached_property
     def text(self) -> str:
@@ -100,6 +103,8 @@ class GivenFile:
     def is_json(self) -> bool:
         """Whether the (first) file is JSON: by its ending, or because it begins like it."""
         first = self.files[0]
+        if is_packed(first):
+            return True
         with open_file(first, limit=MAX_BYTES, too_large=TOO_LARGE) as file:
             start = file.read(64).removeprefix(b"\xef\xbb\xbf")
         return first.suffix.lower() == ".json" or _JSON.match(start) is not None
@@ -167,8 +172,11 @@ def first_bytes(path: Path) -> bytes:
     """
     try:
         with open_file(path, limit=ANY_SIZE) as file:
-            return file.read(FIRST_BYTES)
-    except (InputError, OSError):
+            if not is_packed(path):
+                return file.read(FIRST_BYTES)
+            with gzip.GzipFile(fileobj=file) as packed:
+                return packed.read(FIRST_BYTES)
+    except (InputError, OSError, EOFError, zlib.error):
         return b""
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import os
 import stat
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
@@ -14,6 +17,10 @@ from typing import BinaryIO
 from posekit.errors import InputError
 from posekit.safe_io.refusal import cut, refusal
 
+PACKED_SUFFIX = ".json.gz"
+"""How the names of JSON files end that are packed by gzip."""
+MAX_UNPACKED = 100_000_000
+"""Bytes that may be packed in one."""
 MAX_NEIGHBOURS = 2000
 """Names of a folder among which a misspelt one is sought."""
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -32,10 +39,16 @@ def read_bytes(path: str | Path, *, limit: int, too_large: str = "split it") -> 
     too_large : str
         What to do about a file that is larger.
 
+    Returns
+    -------
+    bytes
+        The file; of one whose name ends in ``.json.gz`` what is packed in it, of at most `limit` bytes as well, and
+        of `MAX_UNPACKED`.
+
     Raises
     ------
     InputError
-        Where it is missing, not readable, no regular file, empty or larger.
+        Where it is missing, not readable, no regular file, empty or larger, or damaged where it is packed.
     """
     with open_file(path, limit=limit, too_large=too_large) as file:
         try:
@@ -44,7 +57,32 @@ def read_bytes(path: str | Path, *, limit: int, too_large: str = "split it") -> 
             raise unreadable(path, error) from None
     if len(data) > limit:
         raise _too_large(path, len(data), limit, too_large)
-    return data
+    return _unpacked(path, data, min(limit, MAX_UNPACKED), too_large) if is_packed(path) else data
+
+
+def is_packed(path: str | Path) -> bool:
+    """Tell by a file's name whether it is JSON that is packed by gzip."""
+    return Path(path).name.lower().endswith(PACKED_SUFFIX)
+
+
+def plain_suffix(path: str | Path) -> str:
+    """Return the ending of a file's name in lower case; of packed JSON ``.json``."""
+    return ".json" if is_packed(path) else Path(path).suffix.lower()
+
+
+def _unpacked(path: str | Path, data: bytes, limit: int, too_large: str) -> bytes:
+    """Unpack no more than is allowed: a thousand bytes may hold a million."""
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+            plain = file.read(limit + 1)
+    except (OSError, EOFError, zlib.error):
+        expected = "JSON that is packed by gzip"
+        raise refusal(path, "", "a damaged file, or none of gzip", expected, "pack it again") from None
+    if len(plain) > limit:
+        raise refusal(path, "", f"more than {limit:,} bytes unpacked", f"at most {limit:,}", too_large)
+    if not plain:
+        raise refusal(path, "", "nothing that is packed", "JSON", "pack it again")
+    return plain
 
 
 @contextmanager

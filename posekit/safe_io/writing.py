@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import secrets
@@ -14,6 +15,7 @@ from typing import Any, BinaryIO, Final
 from posekit.errors import InputError
 from posekit.safe_io.json_file import MAX_BYTES
 from posekit.safe_io.refusal import cut, refusal
+from posekit.safe_io.regular_file import is_packed
 
 MAX_STEM: Final = 80
 """Letters of a file's name that is made of a clip's."""
@@ -91,16 +93,26 @@ def check_target(path: str | Path) -> None:
 
 
 def write_text(path: str | Path, pieces: Iterable[str]) -> None:
-    """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all.
+    """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all; packed if named ``.json.gz``.
 
     The bound is that of `posekit.safe_io.read_json`: what is written can be read again.
     """
     written = 0
-    with replacing(path) as file:
+    with replacing(path) as file, _packing(path, file) as stream:
         for piece in pieces:
-            written += file.write(piece.encode("utf-8"))
+            written += stream.write(piece.encode("utf-8"))
             if written > MAX_BYTES:
                 raise too_large_to_read(path)
+
+
+@contextmanager
+def _packing(path: str | Path, file: BinaryIO) -> Iterator[BinaryIO | gzip.GzipFile]:
+    """Pack what is written where the name says so; the same content is the same file."""
+    if not is_packed(path):
+        yield file
+        return
+    with gzip.GzipFile(filename="", fileobj=file, mode="wb", mtime=0) as packed:
+        yield packed
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:

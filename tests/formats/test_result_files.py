@@ -169,7 +169,7 @@ def test_a_thousand_frames_are_written_and_read_in_seconds(tmp_path, rng):
     assert sum(len(frame.joints) for frame in read_result(tmp_path / "r.npz").frames) == counts.sum()
 
 
-@pytest.mark.parametrize("name", ["r.csv", "r", "r.json.gz"])
+@pytest.mark.parametrize("name", ["r.csv", "r", "r.gz"])
 def test_other_suffixes_are_refused(tmp_path, rng, name):
     for act in (lambda: write_result(tmp_path / name, a_result(rng)), lambda: read_result(tmp_path / name)):
         with pytest.raises(InputError, match=r"the suffix \"[.a-z]*\"; expected \.json or \.npz"):

@@ -15,6 +15,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from posekit.safe_io.refusal import cut, nearest, refusal
+from posekit.safe_io.regular_file import plain_suffix
 
 _CHUNK: Final = 1 << 22
 COMPRESSION_LEVEL: Final = 3
@@ -92,7 +93,7 @@ def _write(out: IO[bytes], array: NDArray[Any] | Ragged) -> None:
 
 def suffix(path: str | Path, *accepted: str) -> str:
     """Return a path's suffix, which decides its format, or refuse it."""
-    found = Path(path).suffix.lower()
+    found = plain_suffix(path)
     if found not in accepted:
         remedy = nearest(found, accepted) if found else f"add {' or '.join(accepted)} to the name"
         raise refusal(path, "", f'the suffix "{cut(found)}"', " or ".join(accepted), remedy)
