@@ -10,7 +10,7 @@ from posekit.batch import run_batch
 from posekit.batch.image_rows import ImageRows, head_text
 from posekit.batch.view_table import open_view_table, read_rows, write_view_table
 from posekit.cameras import PinholeCamera
-from posekit.cameras.head import TABLE_A2
+from posekit.cameras.head import TABLE_A2, HeadPose
 from posekit.cameras.neck import place
 from posekit.errors import HeadError
 from posekit.formats.own import LeeChenModel, OpenCVModel, View, read_view, write_view
@@ -29,6 +29,9 @@ OWN = {
 }
 
 
+K = np.array([[1000.0, 0, 500], [0, 1000, 500], [0, 0, 1]])
+
+
 @pytest.fixture(scope="module")
 def walk() -> View:
     return posekit.builtin_view("seq1")
@@ -37,14 +40,21 @@ def walk() -> View:
 def in_camera(view: View) -> np.ndarray:
     """Place the own points (8, 3) where the walker's head is, which faces the camera."""
     turned = np.array([[0, 0, -1], [0, -1, 0], [-1, 0, 0]])
-    return (np.array(list(OWN.values())) - TABLE_A2.points[0]) @ turned.T + view.truth[0, 0]
+    placed: np.ndarray = (np.array(list(OWN.values())) - TABLE_A2.points[0]) @ turned.T + view.truth[0, 0]
+    return placed
+
+
+def pose_of(view: View) -> HeadPose:
+    pose = fit_camera(view, posekit.load_figure()).pose
+    assert pose is not None
+    return pose
 
 
 def with_own(view: View, *, only: bool = False, f: float = 0.05) -> View:
     """Add points of its own to the head of SEQ1, where the true head is; with `only`, the neck alone stays besides."""
     cam = in_camera(view)
     seen = f * cam[:, :2] / cam[:, 2:]
-    heads = {"neck": view.head_points["neck"]} if only else dict(view.head_points)
+    heads = {"neck": TABLE_A2.points[0]} if only else dict(zip(TABLE_A2.names, TABLE_A2.points, strict=True))
     return replace(
         view,
         head_points=heads | {name: np.array(at) for name, at in OWN.items()},
@@ -61,7 +71,7 @@ def test_a_head_of_own_points_gives_the_certified_postures_of_the_usual_six(walk
     own, usual = posekit.recover(view), posekit.recover(walk)
     for mine, theirs in zip(own.frames, usual.frames, strict=True):
         np.testing.assert_allclose(mine.joints, theirs.joints, atol=1e-6)
-    np.testing.assert_allclose(fit_camera(view, own.figure).pose.f, 0.05, rtol=1e-6)
+    np.testing.assert_allclose(pose_of(view).f, 0.05, rtol=1e-6)
 
 
 def test_more_points_tell_a_noisy_camera_better(walk, rng):
@@ -75,7 +85,7 @@ def test_more_points_tell_a_noisy_camera_better(walk, rng):
     fewer = replace(noisy, own_head_image=np.nan * noisy.own_head_image)
     off = []
     for view in (fewer, noisy):
-        pose = fit_camera(view, posekit.load_figure()).pose
+        pose = pose_of(view)
         off.append(np.median(np.abs(pose.f[pose.found] / 0.05 - 1)))
     assert off[1] < 0.8 * off[0]
 
@@ -103,7 +113,7 @@ def test_points_that_are_hidden_in_a_frame_are_left_out_of_it(walk):
 )
 def test_points_that_tell_no_camera_are_refused(walk, move, text):
     view = with_own(walk, only=True)
-    points = view.head_points | {name: np.array(at) for name, at in move.items()}
+    points = dict(view.head_points or {}) | {name: np.array(at) for name, at in move.items()}
     if len(move) > 1:
         points["neck"] = np.array([-0.34, *points["neck"][1:]])
     with pytest.raises(HeadError, match=text):
@@ -115,11 +125,10 @@ def before_a_known_camera(walk: View, turn: float = 0.0) -> View:
     angle, neck = np.radians(turn), walk.truth[0, 0]
     about = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     cam = (in_camera(walk) - neck) @ about.T + neck
-    K = np.array([[1000.0, 0, 500], [0, 1000, 500], [0, 0, 1]])
     image = PinholeCamera(K=K).project(np.concatenate([walk.truth[0], cam]))
     return View(
         camera=OpenCVModel(K=K),
-        time=[0.0],
+        time=np.zeros(1),
         image=image[None, :14],
         own_head_image=image[None, 14:],
         head_points={"neck": TABLE_A2.points[0]} | OWN,
@@ -132,7 +141,7 @@ def test_own_points_alone_place_the_neck_before_a_known_camera(walk):
     view = before_a_known_camera(walk)
     head = np.concatenate([view.head_image, view.own_head_image], axis=1)
     [placed] = place(
-        PinholeCamera(K=view.camera.K),
+        PinholeCamera(K=K),
         posekit.load_figure(),
         view.image,
         head,

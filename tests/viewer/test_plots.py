@@ -83,6 +83,8 @@ def test_each_survivor_has_its_panel_or_all_have_one():
 
 
 def test_a_superposition_labels_the_solutions_of_a_joint_and_not_what_they_carry():
+    from matplotlib.text import Annotation
+
     joints = np.repeat(first_frame().joints[:1], 4, axis=0)
     knee, ankle, wrist = (JOINTS.index(name) for name in ("left_knee", "left_ankle", "right_wrist"))
     joints[1::2, [knee, ankle], 2] += 0.1  # the ankle goes with the knee
@@ -90,7 +92,7 @@ def test_a_superposition_labels_the_solutions_of_a_joint_and_not_what_they_carry
     joints[3, wrist, 2] += 0.001  # a near-twin
     (axes,) = plot_projections(joints, superposed=True).axes
     assert axes.get_title() == "a right wrist, b left knee"
-    placed = {text.get_text(): text.xy for text in axes.texts}
+    placed = {text.get_text(): text.xy for text in axes.texts if isinstance(text, Annotation)}
     assert sorted(placed) == ["a1", "a2", "b1", "b2"]
     assert placed["b2"][0] - placed["b1"][0] == pytest.approx(0.1)
     (alone,) = plot_projections(joints[:1], superposed=True).axes
@@ -100,6 +102,7 @@ def test_a_superposition_labels_the_solutions_of_a_joint_and_not_what_they_carry
 def test_one_of_each_group_is_drawn(tmp_path, monkeypatch):
     view = builtin_view("seq2")
     result = result_of(recover(view, group=0.05), unit="cm", explain=True)
+    assert result.frames[0].groups is not None
     groups = result.frames[0].groups.tolist()
     drawn = []
 
