@@ -9,7 +9,7 @@ import numpy as np
 from posekit.errors import ViewerError
 from posekit.formats.markdown import table_lines
 from posekit.papers.taylor_constrained import Constrained, constrained, constrained_lines
-from posekit.papers.taylor_random_views import RandomViews, random_views, random_views_lines
+from posekit.papers.taylor_random_views import RandomViews, random_views_lines, view_at_random
 from posekit.papers.taylor_study import Study, synthetic_study
 from posekit.recovery.taylor_figure.proportions import TABLE_1
 from posekit.safe_io.writing import write_json, write_lines
@@ -34,7 +34,7 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         The lines of the report.
     """
     objects = constrained()
-    views = [random_views(one, posed=posed) for posed in (False, True) for one in objects]
+    views = [view_at_random(one, posed=posed) for posed in (False, True) for one in objects]
     study = synthetic_study(N_PICTURES)
     lines = [
         "# Taylor 2000, reproduced",

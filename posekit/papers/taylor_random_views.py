@@ -89,7 +89,7 @@ class RandomViews:
         }
 
 
-def random_views(
+def view_at_random(
     constrained: Constrained, views: int = N_VIEWS, seed: int = 2000, *, posed: bool = False
 ) -> RandomViews:
     """Look at an object from random directions, uniform over the sphere, flips given by hand (§3.3).

@@ -8,7 +8,7 @@ import pytest
 from posekit.linkages import LinkageFamily, name_nearer, search
 from posekit.measures import joint_angles
 from posekit.papers.taylor_constrained import OBJECT_SIZE_PIXELS, constrained, triples_of
-from posekit.papers.taylor_random_views import random_views, random_views_lines
+from posekit.papers.taylor_random_views import random_views_lines, view_at_random
 from posekit.papers.taylor_sensitivity import ConstrainedChain
 
 
@@ -50,7 +50,7 @@ def test_the_sensitivity_is_the_derivative_of_the_search(objects, which, rng):
 @pytest.mark.parametrize("posed", [False, True])
 @pytest.mark.parametrize("which", [0, 1])
 def test_as_many_views_are_within_the_bound_as_the_noise_allows(objects, which, posed):
-    views = random_views(objects[which], 300, seed=1, posed=posed)
+    views = view_at_random(objects[which], 300, seed=1, posed=posed)
     expected = views.chance.sum()
     allowed = 4 * np.sqrt((views.chance * (1 - views.chance)).sum())
     # A few views are folds, which first order does not see.
@@ -70,6 +70,6 @@ def test_depth_moves_without_bound_where_a_segment_lies_in_the_picture(objects):
 
 
 def test_a_scale_that_is_not_found_is_not_within(objects):
-    views = random_views(objects[0], 20)
+    views = view_at_random(objects[0], 20)
     lost = replace(views, worst=np.full(20, np.inf))
     assert lost.within(lost.chance >= 0) == 0
