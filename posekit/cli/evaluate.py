@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +28,7 @@ EVALUATE_EXAMPLES = examples(
     "posekit evaluate motion.npz -o report.json --actions walking,running --ranges table1 --jobs 2",
     "posekit evaluate motion.npz -o report.json --sequences --noise 0,2 --yaw-step 45 --heights 1.5m",
     "posekit evaluate view.json -o report.json",
+    "posekit evaluate result.npz --truth view.json",
 )
 
 SWEEP_OPTIONS = ("--yaw-step", "--heights", "--distance", "--f", "--size")
@@ -49,18 +51,25 @@ def evaluate(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="Motion (NPZ, TRC, C3D, BVH, CSV, Parquet), seen through virtual cameras; or a view with truth.",
+            help="Motion (NPZ, TRC, C3D, BVH, CSV, Parquet), seen through virtual cameras; a view with truth; or a "
+            "result, with --truth.",
         ),
     ],
     output: Annotated[
-        list[Path],
+        list[Path] | None,
         option(
             "--output",
             "REPORT",
             "The report: .json (everything), .csv (a row a condition) or .md (tables). May be repeated.",
             short="-o",
         ),
-    ],
+    ] = None,
+    truth: Annotated[
+        Path | None,
+        option(
+            "--truth", "FILE", "Of a result: a view with truth, or motion; how far off it is, is printed."
+        ),
+    ] = None,
     noise: Annotated[
         str,
         option(
@@ -127,6 +136,11 @@ def evaluate(
     ] = False,
 ) -> None:
     """Recover views whose truth is known, and say how good the survivors are: retained, how many, how far off."""
+    if truth is not None:
+        _tell_of_result(file, truth, options_given(ctx))
+        return
+    if not output:
+        raise InputError("-o: no report; expected the name of one; give it, or of a result --truth FILE")
     from posekit import evaluate as evaluation
     from posekit.evaluate.evaluation_charts import plot_paths, write_plots
     from posekit.evaluate.evaluation_report import check_evaluation_path, summary
@@ -188,6 +202,35 @@ def evaluate(
     say(f"written: {', '.join(map(str, written))}")
 
 
+def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
+    """Print how far a result is from the truth."""
+    import numpy as np
+
+    from posekit.cli.true_joints import true_joints
+    from posekit.evaluate.comparison import compare
+    from posekit.formats.format import Content
+    from posekit.formats.own import read_result
+    from posekit.formats.recognising import recognise
+
+    for name in given:
+        if name != "--truth":
+            raise InputError(f"{name}: means nothing beside --truth; leave the option out")
+    what = recognise(path)
+    if what.holds is not Content.RESULT:
+        raise InputError(f"{path}: {what.holds.value}; --truth expected a result; leave the option out")
+    result = read_result(path)
+    joints, in_camera = true_joints(truth, None, None, np.array([one.time for one in result.frames]))
+    camera = result.camera
+    if not in_camera:
+        if camera is None or camera.R is None or camera.t is None:
+            raise InputError(
+                f"--truth {truth}: nothing says how it stands before the camera; expected a view with truth; give it"
+            )
+        joints = joints @ camera.R.T + camera.t
+    for line in compare(result, joints).lines:
+        say(line)
+
+
 def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capture | View:
     """Read motion, or a view."""
     from posekit.formats.format import Content
@@ -201,7 +244,7 @@ def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capt
         return read_view(path)
     if what.holds is not Content.MOTION:
         raise InputError(
-            f"{path}: {what.holds.value}, of which no truth is known; expected motion, or a view with truth"
+            f"{path}: {what.holds.value}, of which no truth is known; expected motion, or a view with truth, or --truth"
         )
     return read_capture(
         path,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,9 +10,12 @@ import numpy as np
 
 from posekit.display.plural import plural
 from posekit.formats.markdown import table_lines
+from posekit.formats.own import Result, ResultFrame
 from posekit.geometry import Array
 from posekit.measures import mpjpe, pa_mpjpe
-from posekit.recovery.recovery import Recovery
+from posekit.recovery.ranked import probabilities
+from posekit.recovery.recovery import FrameRecovery, Recovery
+from posekit.validation import recovered_with
 
 MEASURE_LABELS: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
 
@@ -60,12 +64,16 @@ class Comparison:
         ]
 
 
-def compare(recovery: Recovery, truth: Array) -> Comparison:
+def compare(recovery: Recovery | Result, truth: Array) -> Comparison:
     """Compare the survivors of every frame with the truth (F, 14, 3), camera frame, metres."""
-    count = len(recovery.frames)
+    frames: Sequence[FrameRecovery | ResultFrame] = recovery.frames
+    count = len(frames)
     found = {name: np.full((count, 3), np.nan) for name in ("best", "first", "middle")}
-    ranking = recovery.ranking
-    for k, frame in enumerate(recovery.frames):
+    if isinstance(recovery, Result):
+        probability = probabilities(recovery, recovered_with(recovery).figure.lengths)
+    else:
+        probability = recovery.probability
+    for k, frame in enumerate(frames):
         joints = frame.joints
         both = np.isfinite(joints[..., 0]) & np.isfinite(truth[k, :, 0])
         if not both.any(axis=1).all() or not len(
@@ -73,11 +81,11 @@ def compare(recovery: Recovery, truth: Array) -> Comparison:
         ):  # the joints that are known are the same in all survivors
             continue
         errors = np.stack(_errors(joints, truth[k]), axis=-1)
-        first = ranking.of(k).order[0]
+        first = int(np.argmax(probability[k]))
         found["best"][k] = np.nanmin(errors, axis=0)
         found["first"][k] = errors[first]
         found["middle"][k] = np.nanmedian(errors, axis=0)
-    return Comparison(survivors=np.array([len(frame) for frame in recovery.frames]), **found)
+    return Comparison(survivors=np.array([len(frame) for frame in frames]), **found)
 
 
 def _errors(joints: Array, truth: Array) -> tuple[Array, Array, Array]:

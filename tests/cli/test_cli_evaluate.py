@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+import posekit
 from posekit.body import load_figure
+from posekit.evaluate.comparison import compare
 from posekit.formats.motion import Motion, write_motion
 from posekit.formats.own import write_view
 from posekit.skeleton import JOINTS
@@ -222,3 +224,25 @@ def test_help_names_the_options(run) -> None:
     assert outcome.code == 0
     for option in ("--yaw-step", "--heights", "--noise", "--frames-per-clip", "--plots", "--jobs"):
         assert option in outcome.out
+
+
+def test_a_result_is_held_against_its_truth(command: Callable[..., Any], tmp_path: Path) -> None:
+    """It says what `recover --truth` says; motion is the truth where the result's camera has a place in its world."""
+    view, result = tmp_path / "view.json", tmp_path / "result.npz"
+    save("walk.npz")
+    assert command("synth", "mocap", "walk.npz", "-o", view, "--frames", "3", "--noise", "2").code == 0
+    assert command("recover", view, "-o", result).code == 0
+    done = command("evaluate", result, "--truth", view)
+    assert done.code == 0, done.err
+    expected = compare(posekit.read_result(result), posekit.read_view(view).truth)
+    assert done.out.splitlines() == list(expected.lines)
+    assert "against the truth, 3 of 3 frames" in done.out
+    np.testing.assert_array_less(expected.best, expected.middle + 1e-12)
+    for words, said in (
+        ((result,), "-o: no report"),
+        ((view, "--truth", view), "expected a result"),
+        ((result, "--truth", view, "--jobs", "2"), "--jobs: means nothing beside --truth"),
+        ((result, "--truth", result), "truth"),
+    ):
+        done = command("evaluate", *words)
+        assert done.code == 2 and said in done.err and done.err.count("\n") == 1, done.err
