@@ -1,6 +1,7 @@
 """The page of what moves: motion of a file with what checks find in it, and the paths of a result that was followed."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -8,12 +9,13 @@ import pytest
 import posekit
 from posekit.formats.held import HeldPostures
 from posekit.formats.own import Postures
-from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.paths import FollowedPaths, path_shapes
 from posekit.formats.own.report import columns_of
 from posekit.samples import write_samples
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import JOINT, JOINTS, POINTS
 from posekit.validation.page_findings import page_findings
 from posekit.validation.reading import StatedMotion, read_postures_of
+from posekit.viewer.page.answer_page import answer_segments
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.page import write_page
 from tests.viewer.driving import wait_until
@@ -140,6 +142,38 @@ def followed(walked):
         apart=0.05,
     )
     return dataclasses.replace(walked, paths=paths)
+
+
+def test_of_a_path_that_is_alone_no_probability_is_said(opened, followed):
+    one = followed.paths
+    rows = {name: getattr(one, name)[:1] for name in path_shapes(*one.survivor.shape)}
+    tab = opened(dataclasses.replace(followed, paths=dataclasses.replace(one, **rows)))
+    assert tab.inner_text("#caption").startswith("path 0 (the only one in the result)")
+    assert "%" not in tab.inner_text("#path option[value='0']")
+
+
+def test_frames_in_which_a_segment_is_in_doubt_are_listed(opened, flat):
+    sides = [page_data(flat)["frames"][k]["answer"] for k in range(len(flat.frames))]
+    wanted = {
+        (k, j)
+        for k, one in enumerate(sides)
+        for j, (near, far) in enumerate(zip(one["near"], one["far"], strict=True))
+        if near is not None and min(near, far) >= 0.05
+    }
+    tab = opened(flat)
+    assert tab.inner_text("[data-tab=findings]") == "In doubt"
+    tab.click("[data-tab=findings]")
+    listed = set()
+    segments = [f"{POINTS[a]} {POINTS[b]}".replace("_", " ") for a, b in answer_segments()]
+    rows = tab.locator("#findings tbody tr").all()
+    for frames, segment in [row.locator("td").all_inner_texts()[:2] for row in rows]:
+        first, *last = [int(number) for number in re.findall(r"\d+", frames)]
+        k = segments.index(" ".join(re.findall(r"\w+", segment)))
+        listed |= {(frame, k) for frame in range(first, (last or [first])[0] + 1)}
+    assert listed == wanted
+    assert wanted
+    tab.click("#findings tbody button")
+    assert tab.evaluate("page.state.frame") in {k for k, _ in wanted}
 
 
 def test_a_followed_result_opens_on_its_likeliest_path_and_paths_can_be_chosen(opened, followed):

@@ -40,6 +40,8 @@ const page = (() => {
     return `${(100 * share).toFixed((share > 0 && share < 0.0995) || (share > 0.99 && share < 1) ? 1 : 0)} %`;
   }
 
+  const sureOf = (share) => (share === null ? "the only one in the result" : percent(share));
+
   // The survivor that is shown where nobody chose one: the path's, else the likeliest, which comes first.
   const usual = () => (state.path === null ? 0 : pack.onPath(state.frame, state.path));
 
@@ -136,7 +138,7 @@ const page = (() => {
     let said = here.held ? "" : "no posture in this frame";
     if (path !== null) {
       const bridged = survivor < 0;
-      said = `path ${path} (${percent(DATA.paths.probability[path])})` + (bridged ? ", bridged in this frame" : `, posture ${pack.number(here, survivor)}`);
+      said = `path ${path} (${sureOf(DATA.paths.probability[path])})` + (bridged ? ", bridged in this frame" : `, posture ${pack.number(here, survivor)}`);
     } else if (here.held) {
       const share = pack.probability(here, survivor);
       said = DATA.kind === "motion" ? DATA.clips?.[here.clip] ?? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
@@ -381,7 +383,7 @@ const page = (() => {
   byId("others-box").hidden = DATA.kind === "motion";
   byId("path-box").hidden = !DATA.paths;
   if (DATA.paths) {
-    byId("path").append(...DATA.paths.probability.map((share, path) => Object.assign(element("option", `path ${path} (${percent(share)})`), { value: path })), Object.assign(element("option", "each frame's likeliest"), { value: "" }));
+    byId("path").append(...DATA.paths.probability.map((share, path) => Object.assign(element("option", `path ${path} (${sureOf(share)})`), { value: path })), Object.assign(element("option", "each frame's likeliest"), { value: "" }));
     byId("path").title = DATA.paths.words;
     byId("path").onchange = (event) => choosePath(event.target.value === "" ? null : Number(event.target.value));
   }

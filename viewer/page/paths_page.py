@@ -26,7 +26,7 @@ class ShownPaths:
     Parameters
     ----------
     probability : array (P,)
-        Of each and what it stands for, the likeliest first.
+        Of each and what it stands for, the likeliest first; NaN of one that is the only one in the result.
     words : str
         How likely they are, for people.
     survivor : int array (P, T)
@@ -85,9 +85,10 @@ def paths_shown(
                 points[p, t, : len(JOINTS)] += move[k]
                 # The head goes along with the neck.
                 points[p, t, len(JOINTS) :] = body[k, len(JOINTS) :] + (points[p, t, 0] - body[k, 0])
+    alone = len(paths.share) == 1  # whether others were looked for is not told, nor how likely they are
     return ShownPaths(
-        probability=probability,
-        words=path_words(probability.tolist()),
+        probability=np.full(1, np.nan) if alone else probability,
+        words="no other path is in the result" if alone else path_words(probability.tolist()),
         survivor=survivor,
         points=points,
         bridged=paths.interpolated[chosen][:, index],

@@ -3,7 +3,7 @@
 const tables = (() => {
   const { byId, element, row, words, percent, plural } = page.tools;
   const text = (value, kind = "text") => element("td", value, kind);
-  const MOST_SPANS = 200;
+  const MOST_SPANS = 200, DOUBT = 0.05;
   let last = "", open = "joints";
 
   function parts(name) {
@@ -61,6 +61,36 @@ const tables = (() => {
       row(body, [place, text(words(one.check), "text wrap"), text(words(one.where), "text wrap"), text(`${one.value} ${one.unit}`), text(`${one.bound} ${one.unit}`)]);
     }
     if (all.length > MOST_SPANS) note.textContent += ` Shown are ${MOST_SPANS} of ${all.length}.`;
+  }
+
+  // In which frames it is in doubt which end of a segment is nearer: frames in a row are one line, which leads to the worst.
+  function doubts() {
+    const all = [];
+    DATA.answerSegments?.forEach(([start, end], k) => {
+      let last;
+      DATA.frames.forEach(({ answer }, index) => {
+        const [near, far] = [answer?.near[k] ?? 0, answer?.far[k] ?? 0], odds = Math.min(near, far);
+        if (odds < DOUBT) return;
+        if (last?.to !== index - 1) all.push((last = { start, end, from: index, to: index, odds: 0 }));
+        last.to = index;
+        if (odds > last.odds) Object.assign(last, { odds, near, far, worst: index });
+      });
+    });
+    return all.sort((a, b) => b.to - b.from - a.to + a.from);
+  }
+
+  function showDoubts(all) {
+    const [note, head, body] = parts("findings"), number = (index) => DATA.frames[index].number;
+    note.textContent = `Where either end of a segment is the nearer one with ${percent(DOUBT)} or more, the longest first; choose one to see its least sure frame.`;
+    if (all.length > MOST_SPANS) note.textContent += ` Shown are ${MOST_SPANS} of ${all.length}.`;
+    row(head, ["frames", "segment", "least sure"].map((title) => element("th", title, "text")));
+    for (const one of all.slice(0, MOST_SPANS)) {
+      const button = element("button", one.from === one.to ? number(one.from) : `${number(one.from)}–${number(one.to)}`), place = text(undefined);
+      button.type = "button";
+      button.onclick = () => play.go(one.worst);
+      place.append(button);
+      row(body, [place, text(`${words(DATA.points[one.start])} – ${words(DATA.points[one.end])}`, "text wrap"), text(`${words(DATA.points[one.end])} nearer ${percent(one.near)}, farther ${percent(one.far)}`, "text wrap")]);
+    }
   }
 
   function showLevels() {
@@ -167,7 +197,13 @@ const tables = (() => {
     };
   }
   for (const tab of tabs) if (["levels", "rejected", "settings"].includes(tab.dataset.tab)) tab.hidden = DATA.kind !== "result";
-  for (const tab of tabs) if (tab.dataset.tab === "findings") tab.hidden = DATA.kind !== "motion" || !DATA.judged;
+  const inDoubt = DATA.kind === "result" && DATA.frames.length > 1 ? doubts() : [];
+  for (const tab of tabs) {
+    if (tab.dataset.tab !== "findings") continue;
+    tab.hidden = !inDoubt.length && (DATA.kind !== "motion" || !DATA.judged);
+    if (inDoubt.length) tab.textContent = "In doubt";
+  }
+  if (inDoubt.length) showDoubts(inDoubt);
   byId("flips-tab").hidden = !DATA.frames.some((one) => one.family);
   byId("unseen-tab").hidden = !DATA.frames.some((one) => one.inferred?.some((joints) => Object.keys(joints).length));
   for (const [name, value] of DATA.settings) row(byId("settings").querySelector("tbody"), [text(words(name)), text(value, "text wrap")]);
