@@ -218,6 +218,11 @@ def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
     what = recognise(path)
     if what.holds is not Content.RESULT:
         raise InputError(f"{path}: {what.holds.value}; --truth expected a result; leave the option out")
+    against = recognise(truth)
+    if against.holds not in (Content.VIEW, Content.MOTION):
+        raise InputError(
+            f"--truth {truth}: {against.holds.value}; expected a view with truth, or motion of the same seconds"
+        )
     result = read_result(path)
     joints, in_camera = true_joints(truth, None, None, np.array([one.time for one in result.frames]))
     camera = result.camera

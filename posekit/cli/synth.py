@@ -14,6 +14,7 @@ from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
+    from posekit.geometry import Array
     from posekit.synthesis import SyntheticScene
 
 app = typer.Typer(
@@ -155,7 +156,7 @@ def mocap(
         say(
             f"{len(scene.joints_cam)} of {plural(frames, 'frame')}: the clip has no more; name another --clip or --dt"
         )
-    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
+    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures, up=capture.up)
 
 
 @app.command(
@@ -198,8 +199,9 @@ def _write(
     *,
     uncalibrated: bool = False,
     pictures: Path | None = None,
+    up: Array | None = None,
 ) -> None:
-    """Add noise, write the view, and the pictures where they are asked for; say so."""
+    """Add noise, write the view, in the world whose `up` is known, and the pictures where asked for; say so."""
     from dataclasses import replace
 
     import numpy as np
@@ -213,6 +215,7 @@ def _write(
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
     view = views.view_of(scene)
+    view = view if up is None else views.in_world(view, scene, up)
     if noise > 0 and scene.lee_chen_f is None:
         view = replace(view, deviation=noise)
     if pictures is not None:

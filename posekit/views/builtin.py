@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from posekit.body import Figure, load_figure
 from posekit.cameras.head import TABLE_A2
 from posekit.errors import InputError
+from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS
@@ -44,6 +46,26 @@ def view_of(scene: SyntheticScene) -> View:
         head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
         unit="m" if scene.lee_chen_f is None else "cm",
     )
+
+
+def in_world(view: View, scene: SyntheticScene, up: Array) -> View:
+    """Return the view with its camera's place in the scene's world, where it stands still.
+
+    Parameters
+    ----------
+    view : View
+        Of `view_of`.
+    scene : SyntheticScene
+        What it shows.
+    up : array (3,)
+        The world's up; said where it is an axis.
+    """
+    R, t = scene.R_cam_world, scene.t_cam_world
+    still = np.isfinite(R).all() and np.ptp(R, axis=0).max() == 0 and np.ptp(t, axis=0).max() == 0
+    if not still or not isinstance(view.camera, OpenCVModel):
+        return view
+    axis = next((name for name, way in UP_DIRECTIONS.items() if np.allclose(way, up)), "")
+    return replace(view, camera=replace(view.camera, R=R[0], t=t[0], up=axis))
 
 
 def forget_camera(view: View) -> View:

@@ -15,7 +15,7 @@ import posekit
 from posekit.body import load_figure
 from posekit.evaluate.comparison import compare
 from posekit.formats.motion import Motion, write_motion
-from posekit.formats.own import write_view
+from posekit.formats.own import OpenCVModel, write_view
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Walker, random_views, seq1
 from posekit.views.builtin import view_of
@@ -237,6 +237,9 @@ def test_a_result_is_held_against_its_truth(command: Callable[..., Any], tmp_pat
     expected = compare(posekit.read_result(result), posekit.read_view(view).truth)
     assert done.out.splitlines() == list(expected.lines)
     assert "against the truth, 3 of 3 frames" in done.out
+    assert command("evaluate", result, "--truth", "walk.npz").out.startswith(
+        "against the truth, 3 of 3 frames"
+    )
     np.testing.assert_array_less(expected.best, expected.middle + 1e-12)
     for words, said in (
         ((result,), "-o: no report"),
@@ -246,3 +249,20 @@ def test_a_result_is_held_against_its_truth(command: Callable[..., Any], tmp_pat
     ):
         done = command("evaluate", *words)
         assert done.code == 2 and said in done.err and done.err.count("\n") == 1, done.err
+
+
+def test_a_view_of_motion_capture_says_where_its_camera_stands(
+    command: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The truth, brought into the world, is the motion; what is recovered stands there without a view."""
+    save("walk.npz")
+    assert command("synth", "mocap", "walk.npz", "-o", "view.json", "--frames", "3", "--dt", "0.1").code == 0
+    view = posekit.read_view("view.json")
+    camera = view.camera
+    assert isinstance(camera, OpenCVModel) and camera.R is not None and camera.t is not None
+    assert camera.up == "+y"
+    world = (view.truth - camera.t) @ camera.R
+    steps = np.linalg.norm(joints()[None] - world[:, None], axis=-1).max(axis=-1)
+    np.testing.assert_allclose(steps.min(axis=1), 0.0, atol=1e-9)
+    assert command("recover", "view.json", "-o", "result.npz").code == 0
+    assert "where +y is up" in command("convert", "result.npz", "out.trc").out
