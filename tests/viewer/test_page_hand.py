@@ -244,3 +244,17 @@ def test_calibrated_frames_have_no_flips_by_hand(opened, walked):
     assert tab.is_hidden("#flips-tab")
     tab.keyboard.press("f")
     assert tab.is_hidden("#flips")
+
+
+def test_segments_whose_ends_were_not_seen_are_not_turned(opened, hidden_elbow):
+    tab = opened(hidden_elbow[0])
+    tab.evaluate("tables.choose('flips')")
+    hidden = {k for k, name in enumerate(SEGMENT_NAMES_OF_TREE) if "right_elbow" in name}
+    before = tab.evaluate("scene.drawn()")
+    for number in hidden:
+        assert tab.is_disabled(f"#flips-list button >> nth={number}")
+        tab.evaluate(f"hand.toggle({number})")
+    assert tab.evaluate("scene.drawn()") == before
+    assert not {SEGMENT_NAMES_OF_TREE[k] for k in hidden} & set(tab.evaluate("hand.file().frames[0]"))
+    tab.evaluate("hand.toggle(0)")
+    assert tab.evaluate("scene.drawn()") != before

@@ -78,7 +78,7 @@ const hand = (() => {
       return { kind: "rejected", line: `rejected: ${texts.slice(0, MOST_REASONS).join("; ")}${frame.family.scales.length > 1 ? " (at one of its scales)" : ""}` };
     }
     if (frame.complete && frame.held === frame.count) return { kind: "rejected", line: "rejected: all that survive are listed, and it is not among them; recover with --explain to see by which check" };
-    return { kind: "unknown", line: "not among the postures of this page: save the file, and let posekit judge it" };
+    return { kind: "unknown", line: "not among the postures of this page: save the file and let posekit judge it, or recover with --explain" };
   }
 
   // Turns a segment, and shows what comes of it.
