@@ -86,6 +86,12 @@ class StatedMotion:
         return replace(held, frame=frame, time=frame / self.rate)
 
 
+PATH_AS_MOTION: Final = (
+    "the survivors of a followed result are judged as postures; to judge its path as motion, convert it first: "
+    "posekit convert RESULT path.npz"
+)
+
+
 class ReadPostures(NamedTuple):
     """What a file holds, and the result that it is, if it is one."""
 
@@ -120,6 +126,8 @@ def read_postures_of(path: Path, stated: StatedMotion) -> ReadPostures:
     if found.holds is Content.RESULT:
         result = read_result(path)
         held = stated.applied(postures_of_result(result))
+        if result.paths is not None:
+            held = replace(held, said=(*held.said, PATH_AS_MOTION))
     elif found.holds is Content.CONFIGURATIONS:
         held = configurations_of(path, found, stated.rate)
     else:

@@ -65,3 +65,15 @@ def test_survivors_of_one_view_are_no_recording(command: Callable[..., Any], tmp
 
     alone = [margins(one[None]) for one in joints]
     np.testing.assert_allclose(margins(joints), np.concatenate(alone), rtol=0, atol=1e-9)
+
+
+def test_the_path_of_a_followed_result_is_offered_as_motion(
+    result: Path, command: Callable[..., Any], tmp_path: Path
+) -> None:
+    assert "posekit convert RESULT path.npz" not in command("validate", result).out
+    view, followed, path = tmp_path / "walk.json", tmp_path / "followed.npz", tmp_path / "path.npz"
+    assert command("synth", "walker", "-o", view, "--frames", "5", "--dt", "0.1").code == 0
+    assert command("recover", view, "-o", followed, "--follow", "1").code == 0
+    assert "posekit convert RESULT path.npz" in command("validate", followed).out
+    assert command("convert", followed, path).code == 0
+    assert "1 clip: " in command("validate", path).out
