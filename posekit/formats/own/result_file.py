@@ -15,7 +15,7 @@ def read_result(path: str | Path) -> Result:
     Parameters
     ----------
     path : path
-        ``.json`` or ``.npz``.
+        ``.json``, ``.json.gz`` or ``.npz``.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def write_result(path: str | Path, result: Result) -> None:
     Parameters
     ----------
     path : path
-        ``.json``, or ``.npz``, which is five times faster to write and to read.
+        ``.json``, ``.json.gz``, or ``.npz``, which is five times faster to write and to read.
     result : Result
         What to write; lengths are turned into ``result.unit``.
 
