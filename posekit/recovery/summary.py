@@ -66,7 +66,8 @@ def _unlisted(recovery: Recovery) -> str:
     if not unlisted:
         return ""
     most = max(frame.unlisted_probability for frame in recovery.frames)
-    return f"; up to {unlisted} more hold {percent(most)} of a frame at most (--coverage 1 lists them)"
+    share = percent(most) if most else "under 1 %"  # what is less than rounding is not impossible
+    return f"; up to {unlisted} more hold {share} of a frame at most (--coverage 1 lists them)"
 
 
 def _scale_lines(recovery: Recovery) -> list[str]:

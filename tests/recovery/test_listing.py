@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from posekit.errors import InputError
 from posekit.ranking.ranking import softmax
 from posekit.recovery import Recovery, recover
 from posekit.recovery.listing import likeliest
+from posekit.recovery.summary import summary_lines
 from posekit.refinement.merging import MERGE_DISTANCE_METRES
 from posekit.settings import RecoverSettings
 from posekit.synthesis import random_views
@@ -68,6 +70,13 @@ def test_what_is_not_listed_is_bounded_and_counted(both: tuple[Recovery, Recover
     for frame in both[1].frames:
         assert 0 <= frame.unlisted_probability <= 1 - COVERAGE + 1e-9
         assert frame.rejected.get("noise/unlisted", 0) == frame.unlisted
+
+
+def test_of_what_is_not_listed_nothing_is_said_to_be_impossible(both: tuple[Recovery, Recovery]) -> None:
+    rounded = [replace(frame, unlisted_probability=0.0) for frame in both[1].frames]
+    said = "\n".join(summary_lines(replace(both[1], frames=rounded)))
+    assert "more hold under 1 % of a frame at most" in said
+    assert "hold 0 %" not in said
 
 
 def test_the_set_holds_what_is_listed_and_what_is_not(both: tuple[Recovery, Recovery]) -> None:
