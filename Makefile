@@ -36,6 +36,8 @@ $(PYTHON) -m venv --clear $(VENV) >/dev/null 2>&1 || {
     apt_install "$$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
     $(PYTHON) -m venv --clear $(VENV)
 }
+# Pinocchio's wheel links to GNU's OpenMP and does not bring it; a minimal Debian has none.
+$(PYTHON) -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || apt_install libgomp1
 endef
 export CREATE_VENV
 

@@ -142,3 +142,31 @@ def test_names_that_are_loaded_on_demand_are_those_that_types_are_checked_by(pac
         assert getattr(module, name) is getattr(import_module(home), name)
         with pytest.raises(ImportError):  # the import system would set such a name to the module
             import_module(f"{package}.{name}")
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        ("ImportError('libgomp.so.1: cannot open shared object file')", "apt-get install libgomp1"),
+        (
+            "ImportError('libodd.so.7: cannot open shared object file', name='pinocchio')",
+            "which pinocchio needs",
+        ),
+        ("MemoryError()", "not enough memory"),
+    ],
+)
+def test_what_the_system_lacks_is_one_line(raised, said, tmp_path):
+    broken = tmp_path / "pinocchio.py"
+    broken.write_text(f"raise {raised}\n", encoding="utf-8")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['posekit', 'demo', '-o', 'never']; "
+        "from posekit.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("posekit: error: ")
+    assert said in line
+    assert not (tmp_path / "never").exists()

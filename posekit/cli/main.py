@@ -26,6 +26,9 @@ MAIN_PROCESS: Final = os.getpid()
 NEW_OBJECTS_PER_COLLECTION = 100_000
 """Containers made between two collections of garbage, in a process of the command."""
 
+SYSTEM_REMEDIES: Final = {"libgomp.so.1": "on Debian and Ubuntu run: apt-get install libgomp1"}
+"""By library of the system that packages of ours load and do not bring: how to get it."""
+
 # Typer brings click along in its own name space, or takes the installed one, version by version.
 UsageError: Any = typer.BadParameter.__bases__[0]
 ClickError: Any = UsageError.__bases__[0]
@@ -121,6 +124,20 @@ def main() -> None:
         # What is still to be written has no reader: it goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
+    except ImportError as error:
+        # A package that is there and does not load: a shared library of the system is missing.
+        library = str(error).partition(":")[0]
+        if ".so" not in library:
+            raise
+        code = _fail(
+            f"{library} cannot be loaded, which {error.name or 'a package'} needs; expected that library of the "
+            f"system; {SYSTEM_REMEDIES.get(library, 'install the package of the system that has it')}"
+        )
+    except MemoryError:
+        code = _fail(
+            "there is not enough memory for this; expected some 300 MB and what the input needs; "
+            "give fewer frames at a time"
+        )
     except OSError as error:
         place = f"{error.filename}: " if error.filename is not None else ""
         code = _fail(f"{place}{error.strerror or error}; expected a file or folder that can be used")
