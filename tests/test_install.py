@@ -111,4 +111,4 @@ def test_the_command_is_named_as_the_package_and_only_tried_versions_are_claimed
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert set(project["scripts"]) == {project["name"]}  # uvx runs it by that name
     claimed = [line.rpartition(" ")[2] for line in project["classifiers"] if "Python :: 3." in line]
-    assert claimed == ["3.11"]
+    assert claimed == ["3.11", "3.13"]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.refinement.descent import CHI2_PRECISION
 from posekit.refinement.merging import leaders_of_pairs
 from posekit.refinement.refine import BegunRefinement
 from posekit.skeleton import LIMB_JOINTS, N_TRUNK_JOINTS
@@ -51,7 +52,7 @@ def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
         # Limbs of a trunk that is as another: the likeliest of that one's that they are as.
         b, a = equal_pairs(np.where(leader[on] == on, -1, leader[on]), on)
         near = _within(place[b] - place[a], ellipsoid[a])
-        order = np.lexsort((fit[a[near]], b[near]))
+        order = np.lexsort((_without_rounding(fit[a[near]]), b[near]))
         other, which = np.unique(b[near][order], return_index=True)
         across = np.full(len(on), -1)
         across[other] = alone[a[near][order][which]]
@@ -67,13 +68,18 @@ def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
 
 def _leaders(group: Rows, chi2: Array, place: Array, ellipsoid: Array) -> Rows:
     """Find for each part (n, J, 3) the first of its group, the likeliest first, in whose ellipsoids it is."""
-    order = np.argsort(chi2, kind="stable")
+    order = np.argsort(_without_rounding(chi2), kind="stable")
     b, a = equal_pairs(group[order], group[order])
     a, b = a[a < b], b[a < b]
     near = _within(place[order[b]] - place[order[a]], ellipsoid[order[a]])
     leader = np.empty_like(order)
     leader[order] = order[leaders_of_pairs(len(order), a[near], b[near])]
     return leader
+
+
+def _without_rounding(chi2: Array) -> Array:
+    """Return chi2 (n,) in steps of what searches leave open: less than that would choose otherwise on each machine."""
+    return np.asarray(np.round(chi2 / CHI2_PRECISION))
 
 
 def _within(apart: Array, ellipsoid: Array) -> NDArray[np.bool_]:
