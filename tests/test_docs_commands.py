@@ -120,7 +120,25 @@ def test_what_is_shown_runs(
                 printed += out.getvalue()
         elif block.language == "text" and name.startswith("docs/tutorials/"):
             for line in block.text.splitlines():
-                assert line in printed, f"{name} shows what is not said: {line}"
+                assert is_said(line, printed), f"{name} shows what is not said: {line}"
+
+
+def is_said(line: str, printed: str) -> bool:
+    """Tell whether a line was printed: numbers to 2 %, as sets under noise end a body earlier on another processor."""
+    words = r"\d[\d.]*".join(re.escape(part) for part in re.split(r"\d[\d.]*", line))
+    wanted = [float(number.rstrip(".")) for number in re.findall(r"\d[\d.]*", line)]
+    return line in printed or any(
+        [float(number.rstrip(".")) for number in re.findall(r"\d[\d.]*", said)]
+        == pytest.approx(wanted, rel=0.02)
+        for said in re.findall(words, printed)
+    )
+
+
+def test_lines_are_said_by_their_words_and_numbers() -> None:
+    said = "person 0:\n197 postures in 12 frames, 44 % sure\n"
+    assert is_said("196 postures in 12 frames", said)
+    assert not is_said("190 postures in 12 frames", said)
+    assert not is_said("197 bodies in 12 frames", said)
 
 
 def run(line: str, name: str, command: Callable[..., Any]) -> str:
