@@ -13,11 +13,13 @@ from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
 from posekit.formats.own import ResultFrame, schema, write_result
 from posekit.formats.own.column import column, columns_in
+from posekit.formats.own.digits import Precision
 from posekit.formats.own.npz import write_npz
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
 from posekit.formats.own.survivor_models import model_of
 from posekit.formats.own.survivor_npz import survivor_arrays, survivors_in
+from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 from posekit.recovery import recover, result_of
 from posekit.safe_io.npz_file import open_npz
@@ -121,3 +123,20 @@ def test_a_row_more_is_an_array_more_in_npz(tmp_path: Path, unit: Any) -> None:
     back = WiderColumns(**of_frame)
     np.testing.assert_allclose(back.reach, wider.reach, rtol=1e-15)
     np.testing.assert_allclose(back.margins["collision"], wider.margins["collision"], rtol=1e-15)
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+@pytest.mark.parametrize("precision", [None, Precision(decimals=4), Precision(decimals=4, binary=True)])
+def test_a_covariance_in_a_file_stays_one(precision: Precision | None, unit: Unit) -> None:
+    covariance = columns_in(Likelihoods)["covariance"]
+    rng = np.random.default_rng(2)
+    ray = rng.normal(size=(300, 14, 3))
+    across, along = 10.0 ** rng.uniform(-4, -2, (300, 14, 1, 1)), 10.0 ** rng.uniform(-2, 0, (300, 14, 1, 1))
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    known = across**2 * np.eye(3) + along**2 * ray[..., :, None] * ray[..., None, :]
+    read = covariance.in_memory(covariance.in_file(known, unit, precision), unit)
+    of_known = np.linalg.solve(known, read) - np.eye(3)
+    assert np.abs(np.linalg.eigvals(of_known)).max() < 0.2
+    again = covariance.in_file(read, unit, precision)
+    np.testing.assert_array_equal(again, covariance.in_file(known, unit, precision))
+    assert not covariance.in_file(0.0 * known, unit, precision).any()

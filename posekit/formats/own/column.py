@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.digits import Precision, significant
+from posekit.formats.own.digits import Precision
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
@@ -20,8 +20,6 @@ COLUMN_KEY: Final = "column"
 """The metadata of a dataclass's field that hold its `Column`."""
 UPPER_TRIANGLE: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 """Entries of a symmetric matrix that files hold: xx, xy, xz, yy, yz, zz."""
-COVARIANCE_DIGITS: Final = 4
-"""Significant digits of a symmetric matrix in a file: a deviation is never known better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,16 +131,16 @@ class Column:
 
     def in_file(self, values: Array, unit: Unit, precision: Precision | None = None) -> Array:
         """Turn numbers of memory, in metres, into those of a file, where noise is known with the digits they have."""
-        if self.symmetric:
-            values = values[..., UPPER_TRIANGLE[0], UPPER_TRIANGLE[1]]
         values = _scaled(values, PER_METRE[unit], self.length_power)
+        if self.symmetric:
+            values = (precision or Precision(decimals=0)).covariances(values)
+            return values[..., UPPER_TRIANGLE[0], UPPER_TRIANGLE[1]]
         if precision is None:
-            return significant(values, COVARIANCE_DIGITS) if self.symmetric else values
+            return values
         if self.decimals is not None:
             of_unit = round(self.length_power * math.log10(PER_METRE[unit]))
             return precision.places(values, precision.decimals + self.decimals - of_unit)
-        digits = COVARIANCE_DIGITS if self.symmetric else self.digits
-        return precision.significant(values, digits) if digits else values
+        return precision.significant(values, self.digits) if self.digits else values
 
     def in_memory(self, values: Array, unit: Unit) -> Array:
         """Turn numbers of a file into those of memory, in metres."""

@@ -1,8 +1,8 @@
 """The digits that numbers have: what noise leaves open is not written to the last bit.
 
 In frames whose noise is known, positions are written to a twentieth of the least standard deviation of a joint in the
-middle, which adds two ten-thousandths to its variance. JSON keeps so
-many decimals; an NPZ keeps so many bits, which pack better. Exact frames keep every bit.
+middle, which adds two ten-thousandths to its variance. JSON keeps so many decimals; an NPZ keeps so many bits, which
+pack better. Exact frames keep every bit.
 """
 
 from __future__ import annotations
@@ -20,6 +20,13 @@ FEWEST_DECIMALS: Final = 3
 MOST_DECIMALS: Final = 6
 OF_DEVIATION: Final = 0.05
 """Which part of a standard deviation is written."""
+
+OF_EIGENVALUE: Final = 0.1
+"""Which part of the least eigenvalue of a covariance is written: it is off by 15 % at most then."""
+LEAST_EIGENVALUE: Final = 1e-7
+"""Of the largest one: below it a covariance is taken for singular."""
+LEAST_COVARIANCE: Final = 1e-15
+"""Of the square of a file's unit: what is less is not written."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,12 +53,25 @@ class Precision:
         decimals = -math.log10(OF_DEVIATION * math.sqrt(np.median(known))) if known.size else MOST_DECIMALS
         return Precision(decimals=min(max(round(decimals), FEWEST_DECIMALS), MOST_DECIMALS))
 
-    def places(self, values: Array, decimals: int) -> Array:
-        """Round to decimals."""
-        if not self.binary:
+    def places(self, values: Array, decimals: int | Array) -> Array:
+        """Round to decimals, which may be an array that broadcasts."""
+        if self.binary:
+            scale = np.exp2(np.ceil(np.multiply(decimals, math.log2(10))))
+        elif isinstance(decimals, int):
             return np.asarray(np.round(values, decimals))
-        step = 2.0 ** -math.ceil(decimals * math.log2(10))
-        return np.asarray(np.round(values / step) * step)
+        else:
+            scale = 10.0**decimals
+        return np.asarray(np.round(values * scale) / scale)
+
+    def covariances(self, values: Array) -> Array:
+        """Round covariances (..., 3, 3) to a tenth of their least eigenvalue: they stay positive definite."""
+        # Twice, so that what was read is written as it is: its eigenvalue may have passed a power of ten.
+        for _ in range(2):
+            eigenvalues = np.linalg.eigvalsh(np.where(np.isfinite(values), values, 0.0))
+            least = np.maximum(eigenvalues[..., 0], LEAST_EIGENVALUE * eigenvalues[..., -1])
+            decimals = np.ceil(-np.log10(np.maximum(OF_EIGENVALUE * least, LEAST_COVARIANCE)))
+            values = self.places(values, decimals[..., None, None])
+        return values
 
     def significant(self, values: Array, digits: int) -> Array:
         """Round to significant digits."""
