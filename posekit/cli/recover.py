@@ -30,6 +30,8 @@ from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from posekit.following.following import Following
     from posekit.formats.own import Result, View
     from posekit.recovery.recovery import Recovery
@@ -179,7 +181,7 @@ def recover(
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         files.write_result(path, _with_pictures(result, one))
-        summarize(recovery)
+        summarize(recovery, one.pictures)
         _tell(recovery, scaled, following, None if truth is None else one.view)
         say(f"written: {path}")
     first, found, _ = recovered[0]
@@ -248,14 +250,14 @@ def _scale_line(scaled: ScaledFollowing) -> str:
     return f"lengths times {scaled.scale:.3f}, standard deviation {scaled.deviation:.3f} ({len(tried)} tried{end})"
 
 
-def summarize(recovery: Recovery) -> None:
+def summarize(recovery: Recovery, pictures: Sequence[str] = ()) -> None:
     """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
     from posekit.body.closing import closing_line
     from posekit.formats.own import OpenCVModel
     from posekit.recovery.advice import advice_lines
     from posekit.recovery.summary import summary_lines
 
-    for line in [*summary_lines(recovery), *advice_lines(recovery)]:
+    for line in [*summary_lines(recovery, pictures), *advice_lines(recovery)]:
         say(line)
     changed = closing_line(recovery.figure.moved_lengths)
     if changed:

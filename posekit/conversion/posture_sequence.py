@@ -67,6 +67,8 @@ class PostureSequence:
         The branch code of each row; empty where there is none.
     lost : mapping of int to float
         The frames that have no posture, and are left out, with their times.
+    pictures : tuple of str
+        By number of a frame the picture that it was seen in; empty where nobody says.
     """
 
     points: Array
@@ -79,6 +81,7 @@ class PostureSequence:
     values: dict[str, Array]
     branches: tuple[str, ...] = ()
     lost: Mapping[int, float] = field(default_factory=dict)
+    pictures: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Count the rows."""
@@ -111,7 +114,12 @@ class PostureSequence:
             rate=self.rate,
             up=self.up,
             source=source,
+            pictures=self._pictures(),
         )
+
+    def _pictures(self) -> tuple[str, ...]:
+        """Return the picture of each row."""
+        return tuple(self.pictures[k] for k in self.frame.tolist()) if self.pictures else ()
 
     @property
     def rate(self) -> float:
@@ -142,6 +150,7 @@ class PostureSequence:
             joints=self.points[:, :14],
             values=self.values,
             branches=self.branches,
+            pictures=self._pictures(),
         )
 
 
@@ -269,6 +278,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         values=values,
         branches=tuple(result.frames[k].branches[row] for k, row in rows),
         lost=lost,
+        pictures=result.pictures,
     )
 
 
@@ -300,9 +310,10 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     points, up = _placed(
         points, result.camera if view is None else view.camera, stated, says, told=view is not None
     )
-    codes = [""] * len(time)
+    codes, pictures = [""] * len(time), [""] * len(time)
     for row, k in zip(place.tolist(), known.tolist(), strict=True):
         codes[row] = result.frames[k].branches[survivor[row]] if survivor[row] >= 0 else ""
+        pictures[row] = result.pictures[k] if result.pictures else ""
     return PostureSequence(
         points=points,
         time=time,
@@ -316,6 +327,7 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
         lost={k: result.frames[k].time for k in np.setdiff1d(np.arange(len(result.frames)), known).tolist()}
         if len(time) == len(known)
         else {},
+        pictures=tuple(pictures) if result.pictures else (),
     )
 
 

@@ -59,11 +59,10 @@ def write_rerun_result(path: Path, result: Result, view: View | None, over: Path
 def _pictures(over: Path, result: Result, view: View | None) -> tuple[Iterator[bytes], list[str]]:
     """Encode the picture of each frame, as large as the view's camera has it; say how they were matched."""
     from posekit.viewer.overlay.frame_pictures import frame_pictures, matched
-    from posekit.viewer.overlay.overlaid_person import picture_names
 
     source = frame_pictures(over)
     times = np.array([frame.time for frame in result.frames])
-    match = matched(source, times, picture_names(result))
+    match = matched(source, times, result.pictures)
     size = None if view is None else getattr(view.camera, "size", None)
     return (_jpeg(image, size) for image in source.images(match.pictures)), [match.said] if match.said else []
 
@@ -81,7 +80,7 @@ def _recorded(k: int, frame: ResultFrame) -> RecordedFrame:
     """Lay out a frame: its postures by probability, and its findings in a line."""
     p = frame.probability
     order = np.arange(len(frame.joints)) if p is None else np.argsort(-np.asarray(p), kind="stable")
-    lost = sorted(frame.rejected.items(), key=lambda pair: -pair[1])[:MAX_REASONS]
+    lost = sorted(frame.rejecting.items(), key=lambda pair: -pair[1])[:MAX_REASONS]
     why = ", ".join(f"{reason} {count}" for reason, count in lost)
     return RecordedFrame(
         time=frame.time,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,12 +21,19 @@ from posekit.inspection.telling import (
     tally,
 )
 from posekit.recovery.answered import result_answers
+from posekit.recovery.summary import telling_names
+
+NAMES_SHOWN: Final = 4
+"""Pictures that are named."""
 
 
 def result_lines(result: Result) -> list[str]:
     """Describe survivors, what they were judged as and refined with, ranking, paths and settings."""
     frames, settings = result.frames, result.settings
     lines = [counts_line([len(frame.joints) for frame in frames]), *reason_lines(_unrecovered(settings))]
+    if pictures := telling_names(result.pictures):
+        more = f", … to {pictures[-1]}" if len(pictures) > NAMES_SHOWN else ""
+        lines.append(f"pictures: {', '.join(pictures[:NAMES_SHOWN])}{more}")
     lines += _sets(result)
     judged = settings.get("judged")
     kinds = [one for one in judged if isinstance(one, str)] if isinstance(judged, list) else []

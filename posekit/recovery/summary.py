@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,7 +12,9 @@ import numpy as np
 from posekit.answers.paths import distinct_paths
 from posekit.answers.wording import answer_lines, path_words, percent
 from posekit.display.plural import plural
+from posekit.formats.own.result import NOT_LISTED
 from posekit.recovery.recovery import FrameRecovery, Recovery
+from posekit.safe_io import cut, one_line
 
 if TYPE_CHECKING:
     from posekit.following.following import Following
@@ -26,26 +29,40 @@ TOLERANCE_WORDS: Final[Mapping[str, str]] = {"given": "as given", "noisy": "from
 """What the table says of frames that were judged so, where the word alone would be a riddle."""
 
 
-def summary_lines(recovery: Recovery) -> list[str]:
+def summary_lines(recovery: Recovery, pictures: Sequence[str] = ()) -> list[str]:
     """Say what was recovered of a person: in three lines, then frame by frame.
 
     The lines are how many postures there are, the likeliest and how sure it is, and what else it can be. The table has
-    each frame's survivors and losses; of a long sequence the first and last frames. Frames are counted from 0.
+    each frame's survivors and losses, and its picture where that has a name beyond the frame's number; of a long
+    sequence the first and last frames. Frames are counted from 0.
     """
     frames = list(enumerate(recovery.frames))
+    names = telling_names(pictures)
+    longest = max(map(len, names), default=0)
+    cells = [f"  {name:<{longest}}" for name in names] or [""] * len(frames)
+    head = f"  {'picture':<{longest}}" if names else ""
     lines = [
         _count_line(recovery),
         *answer_lines(recovery.answers),
-        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'tolerances':>10}  rejected by (leaves, 8192 a tree)",
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'tolerances':>10}{head}  "
+        "rejected by (leaves, 8192 a tree)",
     ]
-    cut = len(frames) - 2 * MAX_SHOWN
+    between = len(frames) - 2 * MAX_SHOWN
     for k, frame in frames:
-        if cut > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
+        if between > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
             if k == MAX_SHOWN:
-                lines.append(f"{'…':>5} {plural(cut, 'frame')} between")
+                lines.append(f"{'…':>5} {plural(between, 'frame')} between")
             continue
-        lines.append(_frame_line(k, frame))
+        lines.append(_frame_line(k, frame, cells[k]))
     return lines + _scale_lines(recovery)
+
+
+def telling_names(pictures: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of pictures, cut; none where each only says the number of its frame."""
+    numbers = [re.findall(r"\d+", name) for name in pictures]
+    if all(found and int(found[-1]) == k for k, found in enumerate(numbers)):
+        return ()
+    return tuple(cut(one_line(name)) for name in pictures)
 
 
 def _count_line(recovery: Recovery) -> str:
@@ -87,16 +104,19 @@ def _scale_lines(recovery: Recovery) -> list[str]:
     ]
 
 
-def _frame_line(k: int, frame: FrameRecovery) -> str:
+def _frame_line(k: int, frame: FrameRecovery, picture: str) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
     judged = "-" if frame.judged is None else TOLERANCE_WORDS.get(frame.judged, frame.judged)
     if frame.reason:
-        return f"{k:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
-    lost = Counter(frame.rejected).most_common()
+        return f"{k:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}{picture}  {frame.reason}"
+    lost = Counter(
+        {reason: count for reason, count in frame.rejected.items() if reason != NOT_LISTED}
+    ).most_common()
     if not len(frame):  # what the last ones died of comes first
         lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
     most = ", ".join(f"{reason} {count}" for reason, count in lost[:MAX_SHOWN])
-    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
+    kept = f"; {frame.unlisted} more not listed" if frame.unlisted else ""
+    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}{picture}  {most}{kept}"
 
 
 def following_line(following: Following) -> str:

@@ -258,3 +258,14 @@ def test_segments_whose_ends_were_not_seen_are_not_turned(opened, hidden_elbow):
     assert not {SEGMENT_NAMES_OF_TREE[k] for k in hidden} & set(tab.evaluate("hand.file().frames[0]"))
     tab.evaluate("hand.toggle(0)")
     assert tab.evaluate("scene.drawn()") != before
+
+
+def test_what_is_not_listed_is_not_among_what_was_rejected(opened, photograph):
+    _, result = photograph
+    frame, tab = result.frames[0], opened(result)
+    assert frame.unlisted
+    tab.click("[data-tab=rejected]")
+    note = tab.inner_text("#rejected .note").replace(",", "")
+    lost = sum(frame.rejected.values()) - frame.unlisted
+    assert f"{lost} were rejected {len(frame.joints)} survived {frame.unlisted} more are possible" in note
+    assert "unlisted" not in tab.inner_text("#rejected")

@@ -91,16 +91,6 @@ def overlaid_person(
         frames=frames,
         figure=subject.figure,
         size=size,
-        files=picture_names(given),
+        files=given.pictures if isinstance(given, Result) else (),
         detected=seen is not None,
     )
-
-
-def picture_names(given: Result | View) -> tuple[str, ...]:
-    """Return the names of the pictures that a result's frames were detected in; none where it does not say."""
-    if not isinstance(given, Result):
-        return ()
-    names = given.settings.get("pictures")
-    if not isinstance(names, Sequence) or len(names) != len(given.frames):
-        return ()
-    return tuple(str(name) for name in names)

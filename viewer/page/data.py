@@ -313,13 +313,14 @@ def _packed_columns(frames: Sequence[ResultFrame], rows: Sequence[NDArray[np.int
 
 
 def _frame(frame: ResultFrame, rows: NDArray[np.intp], reasons: Mapping[str, int]) -> Json:
-    rejected = sorted(frame.rejected.items(), key=lambda item: (-item[1], item[0]))
+    rejected = sorted(frame.rejecting.items(), key=lambda item: (-item[1], item[0]))
     return {
         "time": frame.time,
         "levels": {name: list(frame.levels[name]) for name in ("joint", "physical", "motion")},
         "answer": answer_data(frame, rows),
         "unlisted": float(f"{frame.unlisted_probability:.3g}"),
         "rejected": [[reasons[reason], leaves] for reason, leaves in rejected[:MOST_REASONS]],
+        "notListed": sum(frame.rejected.values()) - sum(frame.rejecting.values()),
         "rejectedMore": sum(leaves for _, leaves in rejected[MOST_REASONS:]),
     }
 

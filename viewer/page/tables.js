@@ -113,8 +113,9 @@ const tables = (() => {
     const here = page.frame(), [note, head, body] = parts("rejected");
     const lost = here.rejected.reduce((sum, entry) => sum + entry[1], here.rejectedMore);
     note.textContent =
-      `${plural(lost + here.count, "possible posture", "possible postures")}: ${plural(lost, "was", "were")} ` +
-      `rejected, ${here.count.toLocaleString("en")} survived. A posture counts where it broke its first check.` +
+      `${plural(lost + here.count + here.notListed, "possible posture", "possible postures")}: ${plural(lost, "was", "were")} ` +
+      `rejected, ${here.count.toLocaleString("en")} survived` +
+      `${here.notListed ? `, ${here.notListed.toLocaleString("en")} more are possible and not listed` : ""}. A posture counts where it broke its first check.` +
       (here.examples.length ? " Choose a reason to see a branch that it rejected." : "");
     row(head, [element("th", "check", "text"), element("th", "where", "text"), element("th", "postures", "text")]);
     const top = Math.max(1, ...here.rejected.map((entry) => entry[1]));

@@ -60,6 +60,8 @@ class Motion(Pictured):
         What the file itself says, of ``unit``, ``up``: the rest was taken for what is customary.
     said : tuple of str
         What was found out about the file, a sentence each.
+    pictures : tuple of str (T,), optional
+        The picture that each frame was seen in; tables hold it.
 
     Raises
     ------
@@ -81,6 +83,7 @@ class Motion(Pictured):
     as_recorded: bool = False
     told: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64)
@@ -93,6 +96,8 @@ class Motion(Pictured):
                 f"{self.source}: points have shape {points.shape}; expected ({len(time)}, {len(self.names)}, 3): "
                 "frames, names, three coordinates"
             )
+        if len(self.pictures) not in (0, len(time)):
+            raise refusal(self.source, "pictures", str(len(self.pictures)), f"{len(time)}, one a frame")
         known = np.isfinite(time).all() and np.isfinite(self.rate)
         if np.isinf(time).any() or not (self.as_recorded or known) or self.rate <= 0:
             raise refusal(self.source, "rate", shown(float(self.rate)), "a positive rate, finite times")
@@ -165,6 +170,7 @@ class Motion(Pictured):
             as_recorded=self.as_recorded,
             told=self.told,
             said=self.said,
+            pictures=tuple(self.pictures[k] for k in rows.tolist()) if self.pictures else (),
         )
 
     def _check_clips(self, clip: NDArray[np.intp], rates: Array) -> None:

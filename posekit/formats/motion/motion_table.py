@@ -126,6 +126,8 @@ def wide_columns(motion: Motion) -> dict[str, Column]:
     columns: dict[str, Column] = {"time": motion.time}
     if len(motion.clips) > 1:
         columns["clip"] = np.array(motion.clips)[motion.clip]
+    if motion.pictures:
+        columns["picture"] = np.array(motion.pictures)
     for k, name in enumerate(motion.names):
         for axis in range(3):
             columns[f"{name}_{'xyz'[axis]}"] = motion.points[:, k, axis]
@@ -138,6 +140,8 @@ def long_columns(motion: Motion) -> dict[str, Column]:
     columns: dict[str, Column] = {"frame": frame.astype(np.float64), "time": motion.time[frame]}
     if len(motion.clips) > 1:
         columns["clip"] = np.array(motion.clips)[motion.clip[frame]]
+    if motion.pictures:
+        columns["picture"] = np.array(motion.pictures)[frame]
     columns["name"] = np.array(motion.names)[point]
     for axis in range(3):
         columns["xyz"[axis]] = motion.points[frame, point, axis]

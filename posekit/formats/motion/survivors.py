@@ -2,8 +2,8 @@
 
 Columns: ``frame``, ``time``, ``survivor`` (its number in the frame), ``neck_x``, ``neck_y``, ``neck_z``,
 ``right_shoulder_x``, … for the 14 joints in metres, then any numbers of a survivor by name (``scale``,
-``probability``, ``margin.collision``, …), then ``branches``. Then ``table.groupby("frame")`` gives the sets, and
-``table.query("frame == 3").filter(like="wrist")`` the wrists.
+``probability``, ``margin.collision``, …), then ``branches`` and ``picture``, the name of the frame's picture. Then
+``table.groupby("frame")`` gives the sets, and ``table.query("frame == 3").filter(like="wrist")`` the wrists.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from posekit.skeleton import JOINTS
 
 COORDINATE_COLUMNS: Final = tuple(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")
 KEY_COLUMNS: Final = ("frame", "time", "survivor")
+TEXT_COLUMNS: Final = ("branches", "picture")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,6 +44,8 @@ class SurvivorTable(ShortRepr):
         Numbers (N,) by name: probability, scale, margins.
     branches : tuple of str (N,), optional
         The branch taken at each joint; empty where not known.
+    pictures : tuple of str (N,), optional
+        The picture that each was seen in; empty where not known.
     source : str
         What to call it in errors.
 
@@ -58,6 +61,7 @@ class SurvivorTable(ShortRepr):
     joints: Array
     values: Mapping[str, Array] = field(default_factory=dict)
     branches: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
     source: str = "survivors"
 
     def __post_init__(self) -> None:
@@ -78,12 +82,13 @@ class SurvivorTable(ShortRepr):
             if np.isinf(array).any():
                 raise refusal(self.source, cut(name), "an infinite number", "finite numbers, or NaN")
             array.flags.writeable = False
-        taken = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"} & values.keys()
+        taken = {*KEY_COLUMNS, *COORDINATE_COLUMNS, *TEXT_COLUMNS} & values.keys()
         if taken or not all(name and name.isprintable() for name in values):
             got = shown(min(taken, default="a name that does not print"))
             raise refusal(self.source, "values", got, "names of their own", "rename the value")
-        if len(self.branches) not in (0, count):
-            raise refusal(self.source, "branches", f"{len(self.branches)} for {count} survivors", "one each")
+        for name, texts in (("branches", self.branches), ("picture", self.pictures)):
+            if len(texts) not in (0, count):
+                raise refusal(self.source, name, f"{len(texts)} for {count} survivors", "one each")
         keys = np.stack([arrays["frame"], arrays["survivor"]], axis=1)
         if (np.diff(keys[:, 0]) < 0).any() or len(np.unique(keys, axis=0)) != count:
             got = "frames out of order, or a survivor twice"
@@ -105,6 +110,8 @@ class SurvivorTable(ShortRepr):
         columns |= self.values
         if self.branches:
             columns["branches"] = np.array(self.branches, dtype=np.str_)
+        if self.pictures:
+            columns["picture"] = np.array(self.pictures, dtype=np.str_)
         return columns
 
     @classmethod
@@ -121,7 +128,7 @@ class SurvivorTable(ShortRepr):
             got = f"no {missing[0]} among {cut(one_line(', '.join(columns)))}"
             expected = f"{', '.join(KEY_COLUMNS)} and the joints' coordinates ({COORDINATE_COLUMNS[0]}, …)"
             raise refusal(source, "columns", got, expected, "give a table of survivors, in metres")
-        known = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"}
+        known = {*KEY_COLUMNS, *COORDINATE_COLUMNS, *TEXT_COLUMNS}
         return cls(
             frame=columns["frame"],
             time=columns["time"],
@@ -134,14 +141,15 @@ class SurvivorTable(ShortRepr):
                 for name, values in columns.items()
                 if name not in known and values.dtype.kind != "U"
             },
-            branches=tuple(str(one) for one in columns["branches"]) if "branches" in columns else (),
+            branches=tuple(str(one) for one in columns.get("branches", ())),
+            pictures=tuple(str(one) for one in columns.get("picture", ())),
             source=source,
         )
 
 
 def number_columns(names: Any) -> set[str]:
-    """Return the columns of a survivors' table that are numbers: all but the branches."""
-    return {name for name in names if name != "branches"}
+    """Return the columns of a survivors' table that are numbers: all but the branches and the pictures."""
+    return {name for name in names if name not in TEXT_COLUMNS}
 
 
 def _whole(source: str, name: str, values: NDArray[Any]) -> NDArray[np.int64]:

@@ -11,8 +11,15 @@ import numpy as np
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.csv_table import read_columns, write_columns
 from posekit.formats.motion.parquet import columns_of, opened, write_tables
-from posekit.formats.motion.survivors import COORDINATE_COLUMNS, KEY_COLUMNS, SurvivorTable, number_columns
+from posekit.formats.motion.survivors import (
+    COORDINATE_COLUMNS,
+    KEY_COLUMNS,
+    TEXT_COLUMNS,
+    SurvivorTable,
+    number_columns,
+)
 from posekit.safe_io import open_npz, refusal, replacing, shown
+from posekit.safe_io.npz_file import Archive
 from posekit.skeleton import JOINTS
 
 SURVIVORS_SCHEMA: Final = "posekit.survivors/1"
@@ -24,8 +31,8 @@ _SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".np
 def write_survivors(path: str | Path, table: SurvivorTable) -> None:
     """Write a table of survivors as CSV, Parquet or NPZ by the end of the name, whole or not at all.
 
-    An NPZ holds ``joints`` (N, 14, 3), ``joint_names``, ``frame``, ``time``, ``survivor``, ``values/<name>`` and
-    ``branches``, and ``schema``.
+    An NPZ holds ``joints`` (N, 14, 3), ``joint_names``, ``frame``, ``time``, ``survivor``, ``values/<name>``,
+    ``branches``, ``picture``, and ``schema``.
 
     Raises
     ------
@@ -47,8 +54,7 @@ def write_survivors(path: str | Path, table: SurvivorTable) -> None:
             "joints": table.joints,
             **{_VALUE + name: values for name, values in table.values.items()},
         }
-        if table.branches:
-            arrays["branches"] = np.array(table.branches, dtype=np.str_)
+        arrays |= {name: values for name, values in table.columns.items() if name in TEXT_COLUMNS}
         with replacing(path) as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
 
@@ -84,9 +90,8 @@ def read_survivors(path: str | Path) -> SurvivorTable:
                 for name in archive.names
                 if name.startswith(_VALUE)
             },
-            branches=tuple(archive.array("branches", "U", (None,)).tolist())
-            if "branches" in archive.names
-            else (),
+            branches=_texts(archive, "branches"),
+            pictures=_texts(archive, "picture"),
             source=str(path),
         )
 
@@ -101,6 +106,10 @@ def read_survivor_pieces(path: str | Path) -> Iterator[SurvivorTable]:
     with opened(path) as file:
         for index in range(file.metadata.num_row_groups):
             yield SurvivorTable.of_columns(columns_of(path, file, index), str(path))
+
+
+def _texts(archive: Archive, name: str) -> tuple[str, ...]:
+    return tuple(archive.array(name, "U", (None,)).tolist()) if name in archive.names else ()
 
 
 def _kind(path: str | Path) -> str:

@@ -39,6 +39,9 @@ EARLIER_RESULT_SCHEMA: Final = "posekit.result/1"
 RESULT_SCHEMAS: Final = (RESULT_SCHEMA, EARLIER_RESULT_SCHEMA)
 
 
+NOT_LISTED: Final = "noise/unlisted"
+"""What branches are counted by that nothing rejected: they are possible, but with the least probability."""
+
 BASE_QUATERNION: Final = slice(3, 7)
 """Where a configuration has the rotation of its base, after its place."""
 
@@ -114,6 +117,11 @@ class ResultFrame(SurvivorColumns):
             self.answer.check_against(len(self.joints))
         if self.refined is not None:
             object.__setattr__(self, "q", _with_unit_quaternions(self.q))
+
+    @property
+    def rejecting(self) -> dict[str, int]:
+        """Pruned branches by what rejected them: without those that are possible and only not listed."""
+        return {reason: count for reason, count in self.rejected.items() if reason != NOT_LISTED}
 
     @cached_property
     def precision(self) -> Precision | None:
@@ -205,6 +213,14 @@ class Result(Pictured):
         from posekit.formats.own.view_file import camera_of
 
         return camera_of(self.settings)
+
+    @property
+    def pictures(self) -> tuple[str, ...]:
+        """The names of the pictures that its frames were detected in; none where it does not say."""
+        names = self.settings.get("pictures")
+        if not isinstance(names, Sequence) or isinstance(names, str) or len(names) != len(self.frames):
+            return ()
+        return tuple(str(name) for name in names)
 
     @property
     def written_decimals(self) -> int | None:
