@@ -172,6 +172,10 @@ bench-gate: $(VENV)/dev.stamp ## the same, quickly: warn where a ratio fell belo
 bench-all: $(VENV)/dev.stamp ## run every file of benchmarks/
 	@for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python "$$file" || exit 1; done
 
+.PHONY: mutants
+mutants: $(VENV)/dev.stamp ## plant small faults in tree, cameras, validators, closed forms and schemas: do tests find them?
+	$(BIN)/python -m benchmarks.mutants
+
 .PHONY: clean
 clean: ## remove everything that make made
 	rm -rf $(VENV) build dist *.egg-info docs/_build docs/gallery docs/sg_execution_times.rst $(DEMO_RESULTS) $(BENCH_RESULTS)
