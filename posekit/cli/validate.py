@@ -15,6 +15,7 @@ from posekit.cli.options import distinct, examples, option, progress
 from posekit.cli.terminal import say
 from posekit.cli.validate_options import BodyOptions, JudgedOptions, StatedOptions, asked_of
 from posekit.cli.validate_output import FailOver, ValidateOutput, parse_fail_over
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.errors import InputError
 
@@ -193,7 +194,7 @@ def _validate_archive(
         told = ", ".join(f"{counts[verdict]:,} {verdict}" for verdict in ("valid", "invalid", "undecided"))
         say(f"{counts.total():,} {name}: {told}")
     for check, count in totals.rejected.most_common():
-        say(f"  {check}: {plural(count, 'frame')} rejected")
+        say(f"  {check_words(check)}: {plural(count, 'frame')} rejected")
     say(f"written: {output}, {plural(totals.parts, 'part')}, {totals.skipped} of them from before")
     if totals.refused:
         raise typer.Exit(BAD_INPUT)

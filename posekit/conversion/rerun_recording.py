@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.motion.rerun_file import RecordedFrame, write_rerun_recording
 from posekit.formats.own import Result, ResultFrame, View
@@ -81,7 +82,7 @@ def _recorded(k: int, frame: ResultFrame) -> RecordedFrame:
     p = frame.probability
     order = np.arange(len(frame.joints)) if p is None else np.argsort(-np.asarray(p), kind="stable")
     lost = sorted(frame.rejecting.items(), key=lambda pair: -pair[1])[:MAX_REASONS]
-    why = ", ".join(f"{reason} {count}" for reason, count in lost)
+    why = ", ".join(f"{check_words(reason)} {count}" for reason, count in lost)
     return RecordedFrame(
         time=frame.time,
         postures=frame.joints[order],

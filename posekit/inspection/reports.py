@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_table import clip_lines, summary_table
@@ -24,7 +25,7 @@ def report_lines(report: ValidationReport) -> list[str]:
     return [
         f"{plural(len(report), 'posture')}: {counts}; listed are {report.listed}",
         *(
-            f"{check}: {one.rejected} rejected, {one.undecided} undecided"
+            f"{check_words(check)}: {one.rejected} rejected, {one.undecided} undecided"
             for check, one in report.checks.items()
         ),
         *clips,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from posekit.body import load_figure
 from posekit.compiled.compiling import PAYS_FROM, expect
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError, PosekitError
@@ -186,4 +187,4 @@ def _lost(frame: FrameRecovery) -> str:
     if frame.reason:
         return frame.reason.removeprefix("frames[0]: ")
     most = max(frame.rejected, key=frame.rejected.__getitem__)
-    return f"no posture passes: most were lost to {most}"
+    return f"no posture passes: most were lost to {check_words(most)}"

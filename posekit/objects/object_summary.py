@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.own.object_result import ObjectFrame, ObjectResult
 
@@ -47,7 +48,9 @@ def _other_scale(result: ObjectResult) -> str:
 def _frame_line(k: int, frame: ObjectFrame) -> str:
     certified = [verdict for verdict in frame.certified if verdict is not None]
     sure = str(sum(certified)) if certified else "-"
-    most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(MAX_SHOWN))
+    most = ", ".join(
+        f"{check_words(reason)} {count}" for reason, count in Counter(frame.rejected).most_common(MAX_SHOWN)
+    )
     return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {sure:>9} {frame.judged or '-':>9}  {frame.reason or most}"
 
 

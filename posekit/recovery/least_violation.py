@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.check_words import check_words
 from posekit.geometry import Array
 from posekit.recovery.grower import Grower
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
@@ -44,10 +45,10 @@ class Excess:
     unit: str
 
     def __str__(self) -> str:
-        """Say it in words: ``rigid_parts/right_hip-left_hip 1.2 cm``."""
+        """Say it in words: ``rigid-parts/right_hip-left_hip 1.2 cm``."""
         if self.unit == "m":
-            return f"{self.reason} {self.beyond * 100:.3g} cm"
-        return f"{self.reason} {self.beyond:.2g} {self.unit}"
+            return f"{check_words(self.reason)} {self.beyond * 100:.3g} cm"
+        return f"{check_words(self.reason)} {self.beyond:.2g} {self.unit}"
 
 
 @dataclass(frozen=True, kw_only=True)

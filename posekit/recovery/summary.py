@@ -11,6 +11,7 @@ import numpy as np
 
 from posekit.answers.paths import distinct_paths
 from posekit.answers.wording import answer_lines, path_words, percent
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.own.result import NOT_LISTED
 from posekit.recovery.recovery import FrameRecovery, Recovery
@@ -114,7 +115,7 @@ def _frame_line(k: int, frame: FrameRecovery, picture: str) -> str:
     ).most_common()
     if not len(frame):  # what the last ones died of comes first
         lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
-    most = ", ".join(f"{reason} {count}" for reason, count in lost[:MAX_SHOWN])
+    most = ", ".join(f"{check_words(reason)} {count}" for reason, count in lost[:MAX_SHOWN])
     kept = f"; {frame.unlisted} more not listed" if frame.unlisted else ""
     return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}{picture}  {most}{kept}"
 

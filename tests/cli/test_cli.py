@@ -213,7 +213,7 @@ def test_validate_exits_1_where_some_are_not(run) -> None:
     outcome = run("validate", "p.npz", "-o", "report.json")
     assert (outcome.code, outcome.err) == (1, "")
     assert outcome.out.splitlines()[0] == "3 postures: 1 valid, 1 invalid, 1 undecided"
-    assert "joint_range/pelvis.flexion" in outcome.out
+    assert "joint-range/pelvis.flexion" in outcome.out
     report = read_report("report.json")
     assert [posture.verdict for posture in report.postures] == ["valid", "invalid", "undecided"]
     bad = [one for one in report.postures[1].findings if one.verdict == "invalid"]

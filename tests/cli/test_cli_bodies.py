@@ -65,7 +65,7 @@ def test_mirror_images_of_torsos_are_not_certified(run) -> None:
         options = ("--rigid-tolerance", "1mm", "--checks", "rigid-parts", "--strict")
         assert run("validate", "p.json", *options).code == code
     outcome = run("validate", "p.json", "--checks", "rigid-parts", "--strict", "-o", "report.json")
-    assert "rigid_parts/torso 1" in outcome.out
+    assert "rigid-parts/torso 1" in outcome.out
     assert json.loads(Path("report.json").read_text(encoding="utf-8"))["settings"]["shoulders"] == "front"
 
 

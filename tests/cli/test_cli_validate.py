@@ -49,7 +49,7 @@ def test_joints_are_judged_on_a_robot_by_name(run) -> None:
     outcome = run("p.npz", "--urdf", "human", "-o", "report.json")
     assert (outcome.code, outcome.err) == (1, "")
     assert outcome.out.splitlines()[0] == "3 postures: 2 valid, 1 invalid, 0 undecided"
-    assert "rigid_parts/right_knee-right_ankle 1" in outcome.out
+    assert "rigid-parts/right_knee-right_ankle 1" in outcome.out
     report = read_report("report.json")
     assert [posture.verdict for posture in report.postures] == ["valid", "invalid", "valid"]
     settings = report.settings
@@ -106,7 +106,7 @@ def test_configurations_are_taken_as_they_are(run, suffix: str) -> None:
     outcome = run(f"q.{suffix}", "--urdf", "human", "-o", "report.json")
     assert outcome.code == 1
     assert outcome.out.splitlines()[0] == "4 postures: 3 valid, 1 invalid, 0 undecided"
-    assert "joint_range/right_knee_Z 1" in outcome.out
+    assert "joint-range/right_knee_Z 1" in outcome.out
     report = read_report("report.json")
     assert report.settings["checks"] == ["joint-range", "collision"]
     worst = report.postures[1].worst
@@ -245,7 +245,7 @@ def test_markdown_has_tables_and_settings(run) -> None:
     assert run("q.npz", "--urdf", "human", "-o", "r.md").code == 1
     text = Path("r.md").read_text(encoding="utf-8")
     assert text.startswith("# Validation\n")
-    assert "| 1       | invalid | joint_range/right_knee_Z -20 deg (bound 0) |" in text
+    assert "| 1       | invalid | joint-range/right_knee_Z -20 deg (bound 0) |" in text
     assert "- robot: human" in text
     assert "made up" in text
 

@@ -270,5 +270,5 @@ def test_batches_are_counted_through():
     assert (posture, judged.place, judged.margin) == (1, places[0], -3.0)
     table = "\n".join(summary_table(columns))
     assert table.startswith("5 postures: 2 valid, 2 invalid, 1 undecided")
-    assert "joint_range/knee 2" in table
+    assert "joint-range/knee 2" in table
     assert joined([], places, ()).summary == {"valid": 0, "invalid": 0, "undecided": 0}

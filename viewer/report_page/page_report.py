@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.body.capsules import CAPSULE_AXES
+from posekit.display.check_words import check_words
 from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_clips import ClipVerdict, Span, Still
 from posekit.formats.own.report_columns import VerdictColumns, measured
@@ -86,7 +87,7 @@ def _checks(columns: VerdictColumns, clips: Sequence[ClipVerdict]) -> list[dict[
                 of_clips[span.check].add(k)
     return [
         {
-            "name": name,
+            "name": check_words(name),
             "rejected": count.rejected,
             "undecided": count.undecided,
             "clips": len(of_clips[name]),
@@ -139,7 +140,8 @@ def _span(span: Span) -> dict[str, Any]:
         )
     }
     return {
-        **{name: getattr(span, name) for name in ("check", "where", "verdict", "first", "last")},
+        **{name: getattr(span, name) for name in ("where", "verdict", "first", "last")},
+        "check": check_words(span.check),
         "unit": "" if span.unit == "1" else span.unit,
         "worst": span.worst_frame,
         "places": list(span.places),
@@ -169,11 +171,11 @@ def _postures(columns: VerdictColumns) -> list[dict[str, Any]]:
             "posture": row.posture,
             "verdict": row.verdict,
             "why": [
-                f"{one.place.name} {measured(one.value, one.place.unit)} (bound {one.bound:.4g})"
+                f"{check_words(one.place.name)} {measured(one.value, one.place.unit)} (bound {one.bound:.4g})"
                 for one in row.violations
                 if math.isfinite(one.value)
             ][:5]
-            or row.undecided_by,
+            or [check_words(check) for check in row.undecided_by],
         }
         for row in columns.rows(np.flatnonzero(columns.verdict)[:MOST_POSTURES].tolist())
     ]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 
 REPAIR_HEAD: Final = ("written", "clip", "what was done", "by up to", "frames")
@@ -42,7 +43,12 @@ def _rows(repair: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
             yield (*clip, f"{span['place']} {span['remedy']}", _most(span["most"], span["unit"]), frames)
         for one in record["left"]:
             beyond = f"{one['left']:.3g} {'' if one['unit'] == '1' else one['unit']}".rstrip()
-            yield (*clip, f"left: {one['check']} {one['place']}", f"{beyond} beyond", str(one["frame"]))
+            yield (
+                *clip,
+                f"left: {check_words(one['check'])} {one['place']}",
+                f"{beyond} beyond",
+                str(one["frame"]),
+            )
 
 
 def _most(most: float, unit: str) -> str:

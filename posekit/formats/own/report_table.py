@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.markdown import no_markup, table_lines
 from posekit.formats.own.report_clips import ClipVerdict, Span
@@ -61,7 +62,7 @@ def summary_table(
         quiet = []
     rows = [
         (
-            check,
+            check_words(check),
             f"{count.rejected} ({count.rejected / total:.1%})",
             count.undecided,
             _most(check, count),
@@ -71,7 +72,7 @@ def summary_table(
         if check not in quiet
     ]
     table = _table(head, rows, markdown) if rows else []
-    return lines + table + ([f"nothing found by {', '.join(quiet)}"] if quiet else [])
+    return lines + table + ([f"nothing found by {', '.join(map(check_words, quiet))}"] if quiet else [])
 
 
 def markdown_lines(
@@ -116,7 +117,8 @@ def markdown_lines(
             *(() if frames is None else _of_frame(frames, row.posture)),
             row.verdict,
             "" if row.worst is None else _at(row.worst),
-            "; ".join(map(_at, row.violations)) or f"undecided: {', '.join(row.undecided_by)}",
+            "; ".join(map(_at, row.violations))
+            or f"undecided: {', '.join(map(check_words, row.undecided_by))}",
         )
         for row in columns.rows(bad[:MAX_SHOWN_POSTURES].tolist())
     ]
@@ -185,7 +187,7 @@ def _of_clip(clip: ClipVerdict) -> tuple[object, ...]:
         ClipName(clip.file, clip.clip).name or "0",
         clip.verdict,
         f"{clip.invalid + clip.undecided} of {clip.frames} ({clip.rejected_share:.1%})",
-        f"frame {clip.first_frame}: {', '.join(clip.first_by[:MAX_NAMED_PLACES])}",
+        f"frame {clip.first_frame}: {', '.join(map(check_words, clip.first_by[:MAX_NAMED_PLACES]))}",
         said_of_span(clip.spans[0]) if clip.spans else "",
         f"{clip.good[0]} to {clip.good[1]}" if clip.good else "none",
     )
@@ -198,7 +200,7 @@ def said_of_span(span: Span) -> str:
         time = f" ({span.start:.2f} to {span.end:.2f} s)"
     frames = f"frames {span.first} to {span.last}" if span.last > span.first else f"frame {span.first}"
     more = f" and {len(span.places) - 1} more" if len(span.places) > 1 else ""
-    said = f"{span.name}{more}, {frames}{time}"
+    said = f"{check_words(span.name)}{more}, {frames}{time}"
     if span.value is None:
         return said if span.verdict == "invalid" else f"{said}, undecided"
     bound = "" if span.bound is None else f" (bound {span.bound:.4g})"
@@ -213,7 +215,7 @@ def _of_frame(frames: ReportFrames, posture: int) -> tuple[object, ...]:
 
 def _most(check: str, count: CheckCount) -> str:
     places = list(count.places.items())
-    named = ", ".join(f"{check}/{where} {number}" for where, number in places[:MAX_NAMED_PLACES])
+    named = ", ".join(f"{check_words(check)}/{where} {number}" for where, number in places[:MAX_NAMED_PLACES])
     return named + (f", and {len(places) - MAX_NAMED_PLACES} more" if len(places) > MAX_NAMED_PLACES else "")
 
 
@@ -230,7 +232,7 @@ def _worst(count: CheckCount, frames: ReportFrames | None) -> str:
 
 def _at(judged: PlaceValue) -> str:
     """Word what was found: ``speed/right_wrist 21.3 m/s (bound 15)``."""
-    return _found(judged.place.name, judged)
+    return _found(check_words(judged.place.name), judged)
 
 
 def _found(name: str, judged: PlaceValue) -> str:
