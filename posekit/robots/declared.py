@@ -19,6 +19,7 @@ SIZE_ATTRIBUTES: Final[dict[str, tuple[str, ...]]] = {
 }
 """The attributes of each shape that are to be positive."""
 MAX_BODIES: Final = 500
+BodyKind = Literal["collision", "visual"]
 _ALL: Final = {1: "it positive", 2: "both positive", 3: "all positive"}
 
 
@@ -41,9 +42,7 @@ class DeclaredBody:
     element: ElementTree.Element
 
 
-def declared_bodies(
-    robot: ElementTree.Element, kind: Literal["collision", "visual"] = "collision"
-) -> Iterator[DeclaredBody]:
+def declared_bodies(robot: ElementTree.Element, kind: BodyKind = "collision") -> Iterator[DeclaredBody]:
     """List the bodies of a URDF, in the order of the text."""
     for link in robot.findall("link"):
         capsules = {capsule.get("name") for capsule in link.findall("collision_checking/capsule")}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Final, Literal
+from typing import Final
 from xml.etree import ElementTree
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.robots.declared import declared_bodies
+from posekit.robots.declared import BodyKind, declared_bodies
 from posekit.safe_io import cut, refusal
 
 MAX_TRIANGLES: Final = 500_000
@@ -23,7 +23,7 @@ def build_geometry(
     model: pin.Model,
     robot: ElementTree.Element,
     source: str,
-    kind: Literal["collision", "visual"] = "collision",
+    kind: BodyKind = "collision",
 ) -> pin.GeometryModel:
     """Load the bodies of a checked URDF whose meshes are resolved.
 

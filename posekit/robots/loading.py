@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from posekit.robots.declared import BodyKind
 from posekit.robots.find import find
+from posekit.robots.meshes import private_copies
 from posekit.robots.robot import Robot
 from posekit.robots.second_reader import compare_readers
 from posekit.robots.untrusted import ProbeLimits, probe
@@ -69,9 +71,15 @@ def load_robot(
     }
     stranger = not files.built_in if untrusted is None else untrusted
     if stranger:
-        check_urdf(settings["urdf"], settings["source"])  # what can be said without a child is said at once
-        probe(settings, compare=not files.built_in, limits=limits)
+        tree = check_urdf(
+            settings["urdf"], settings["source"]
+        )  # what can be said without a child is said at once
+        wanted: dict[BodyKind, bool] = {"collision": geometry, "visual": visuals}
+        kinds = [kind for kind in wanted if wanted[kind]]
+        with private_copies(tree, files.package_dirs, settings["source"], kinds) as settings["mesh_copies"]:
+            probe(settings, compare=not files.built_in, limits=limits)
+            return Robot(**settings)
     robot = Robot(**settings)
-    if not files.built_in and not stranger:
+    if not files.built_in:
         compare_readers(robot.urdf, robot.model, robot.source, must_read=False)
     return robot

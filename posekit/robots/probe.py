@@ -33,9 +33,10 @@ def main() -> None:
     try:
         settings = request["robot"]
         settings["package_dirs"] = tuple(map(Path, settings["package_dirs"]))
+        settings["mesh_copies"] = {name: Path(copy) for name, copy in settings.get("mesh_copies", {}).items()}
         answer["compared"] = exercise(Robot(**settings), compare=request["compare"])
     except PosekitError as error:
-        answer = {"error": str(error)}
+        answer = {"memory": True} if "std::bad_alloc" in str(error) else {"error": str(error)}
     except MemoryError:
         answer = {"memory": True}
     os.write(answers, json.dumps(answer).encode())

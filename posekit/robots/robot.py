@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import pinocchio as pin
 
 from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
+from posekit.robots.declared import BodyKind
 from posekit.robots.geometry import build_geometry, link_of
 from posekit.robots.meshes import with_resolved_meshes
 from posekit.robots.model import build_model, configuration_names
@@ -48,6 +50,9 @@ class Robot(ShortRepr):
     shared_srdf : bool
         Whether the SRDF is one for several variants of the robot, as published ones are: links that it knows and
         the robot has not are passed over then, and listed in `unknown_links`.
+    mesh_copies : mapping of str to Path, optional
+        Files that are read, once, in place of the meshes that the URDF names: see
+        `posekit.robots.meshes.private_copies`.
 
     Raises
     ------
@@ -64,13 +69,15 @@ class Robot(ShortRepr):
     with_geometry: bool = True
     with_visuals: bool = False
     shared_srdf: bool = False
+    mesh_copies: Mapping[str, Path] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         _ = self.model, self._srdf, self.geometry, self.visuals
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the texts and the settings: a model is built from them in milliseconds."""
-        return _robot, ({entry.name: getattr(self, entry.name) for entry in fields(self)},)
+        settings = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return _robot, ({**settings, "mesh_copies": None},)
 
     @cached_property
     def tree(self) -> ElementTree.Element:
@@ -87,18 +94,18 @@ class Robot(ShortRepr):
         """Pinocchio's geometry model of the collision bodies, with the pairs to check; None where not wanted."""
         if not self.with_geometry:
             return None
-        robot = with_resolved_meshes(self.tree, self.package_dirs, self.source)
-        geometry = build_geometry(self.model, robot, self.source)
+        geometry = self._built("collision")
         set_pairs(self.model, geometry, self._srdf)
         return geometry
 
     @cached_property
     def visuals(self) -> pin.GeometryModel | None:
         """Pinocchio's geometry model of the visual bodies; None where not wanted."""
-        if not self.with_visuals:
-            return None
-        robot = with_resolved_meshes(self.tree, self.package_dirs, self.source, "visual")
-        return build_geometry(self.model, robot, self.source, "visual")
+        return self._built("visual") if self.with_visuals else None
+
+    def _built(self, kind: BodyKind) -> pin.GeometryModel:
+        robot = with_resolved_meshes(self.tree, self.package_dirs, self.source, kind, self.mesh_copies)
+        return build_geometry(self.model, robot, self.source, kind)
 
     @cached_property
     def lower(self) -> Array:

@@ -58,7 +58,7 @@ def probe(settings: dict[str, Any], *, compare: bool, limits: ProbeLimits | None
     limits = limits or ProbeLimits()
     source = str(settings["source"])
     request = {
-        "robot": {**settings, "package_dirs": [str(folder) for folder in settings["package_dirs"]]},
+        "robot": settings,
         "compare": compare,
         "memory": limits.memory,
         "cpu": limits.cpu,
@@ -67,7 +67,7 @@ def probe(settings: dict[str, Any], *, compare: bool, limits: ProbeLimits | None
     try:
         child = subprocess.run(
             [sys.executable, "-P", "-c", _CODE, home],
-            input=json.dumps(request).encode(),
+            input=json.dumps(request, default=str).encode(),
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=limits.wall,

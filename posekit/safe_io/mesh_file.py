@@ -12,6 +12,7 @@ import stat
 from pathlib import Path
 from typing import Final
 
+from posekit.safe_io.collada_file import check_collada
 from posekit.safe_io.refusal import cut, refusal, shown
 from posekit.safe_io.regular_file import read_bytes
 
@@ -21,8 +22,6 @@ MAX_MATERIAL_BYTES: Final = 10_000_000
 """The largest library of materials beside an OBJ file."""
 MAX_LINE_BYTES: Final = 65_536
 """Of an OBJ file: a face of so many corners that its line is longer takes the square of their number to triangulate."""
-MAX_PLACED_NODES: Final = 64
-"""Words ``instance_node`` in a COLLADA file, two an element: of 32 nodes that place others come 3**(32/3) at most."""
 MESH_SUFFIXES: Final = (".stl", ".obj", ".dae")
 STL_HEADER_BYTES: Final = 84
 STL_TRIANGLE_BYTES: Final = 50
@@ -31,7 +30,7 @@ _MATERIALS = re.compile(rb"^[ \t]*mtllib([^\r\n]*)", re.MULTILINE)
 _LINE_ENDS = re.compile(rb"[\r\n]+")
 
 
-def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> int:
+def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> bytes:
     """Look at a mesh file.
 
     Parameters
@@ -43,8 +42,8 @@ def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> int:
 
     Returns
     -------
-    int
-        Bytes that it has.
+    bytes
+        The file: what was looked at.
 
     Raises
     ------
@@ -59,19 +58,15 @@ def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> int:
     data = read_bytes(path, limit=limit, too_large="simplify the mesh")
     if suffix == ".stl":
         _check_stl(path, data)
-    elif suffix == ".dae" and (b"<COLLADA" not in data or b"<!DOCTYPE" in data):
-        got = "DOCTYPE" if b"<!DOCTYPE" in data else "no COLLADA"
-        raise refusal(path, "", got, "<COLLADA> without DOCTYPE", "export it again")
-    elif suffix == ".dae" and data.count(b"instance_node") > MAX_PLACED_NODES:
-        got, expected = "many nodes that place nodes", f"at most {MAX_PLACED_NODES // 2}"
-        raise refusal(path, "", got, expected, "export it with its nodes resolved")
+    elif suffix == ".dae":
+        check_collada(path, data)
     elif suffix == ".obj" and max(map(len, _LINE_ENDS.split(data))) > MAX_LINE_BYTES:
         expected = f"at most {MAX_LINE_BYTES:,} bytes"
         raise refusal(path, "", "a line that is longer", expected, "triangulate its faces")
     # The library goes by a file's content where its suffix does not fit: any file may be an OBJ.
     for line in _MATERIALS.finditer(data):
         _check_material(path, line[1])
-    return len(data)
+    return data
 
 
 def _check_stl(path: Path, data: bytes) -> None:

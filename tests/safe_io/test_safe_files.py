@@ -242,7 +242,7 @@ class TestMeshes:
     )
     def test_what_is_taken(self, tmp_path: Path, name: str, data: bytes) -> None:
         (tmp_path / name).write_bytes(data)
-        assert check_mesh(tmp_path / name) == len(data)
+        assert check_mesh(tmp_path / name) == data
 
     @pytest.mark.parametrize(
         ("name", "data", "reason"),
