@@ -20,6 +20,7 @@ from posekit.viewer.browser.studio import Pixels, Studio, check_size
 from posekit.viewer.caption import captioned
 from posekit.viewer.moving import check_speed, write_gif
 from posekit.viewer.scene.compose import Composition, Style, compose, row_count
+from posekit.viewer.scene.drawn_object import DrawnObject, compose_object
 from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, check_one_scale
 from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
@@ -103,7 +104,7 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
 
 def write_picture(
     path: str | Path,
-    subject: DrawnSubject,
+    subject: DrawnSubject | DrawnObject,
     frames: Sequence[Shown] | None = None,
     *,
     style: Style | None = None,
@@ -118,8 +119,8 @@ def write_picture(
     path : path
         ``.png`` and ``.html``: the first of the frames; ``.gif`` and ``.mp4``: all of them one after another, or
         a turn around the first.
-    subject : DrawnSubject
-        Whose figure, and which world.
+    subject : DrawnSubject or DrawnObject
+        Whose figure, and which world; or an object's segments.
     frames : sequence of Shown, optional
         Those of the subject, or some of them, with some of their postures, or rejected branches.
     style : Style, optional
@@ -174,7 +175,9 @@ def png(pixels: Pixels) -> bytes:
 class _Film:
     """Scenes one after another, in one world, and from where they are looked at."""
 
-    def __init__(self, subject: DrawnSubject, frames: Sequence[Shown], style: Style, shot: Shot) -> None:
+    def __init__(
+        self, subject: DrawnSubject | DrawnObject, frames: Sequence[Shown], style: Style, shot: Shot
+    ) -> None:
         self.shot = shot
         alone = style.layout == "superposed" or all(len(frame) == 1 for frame in frames)
         self.with_camera = style.camera and alone and not shot.through_view and frames[0].sight is not None
@@ -220,7 +223,11 @@ class _Film:
             else:
                 yield composition.scene, eye
 
-    def _compose(self, frame: Shown, subject: DrawnSubject, style: Style, stage: Array | None) -> Composition:
+    def _compose(
+        self, frame: Shown, subject: DrawnSubject | DrawnObject, style: Style, stage: Array | None
+    ) -> Composition:
+        if isinstance(subject, DrawnObject):
+            return compose_object(frame, subject, world=self.world, style=style, stage=stage)
         return compose(frame, figure=subject.figure, world=self.world, style=style, stage=stage)
 
     @staticmethod

@@ -18,7 +18,7 @@ from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
-    from posekit.formats.own import Postures, Result, View
+    from posekit.formats.own import ObjectResult, Postures, Result, View
     from posekit.geometry import Array
 
 RENDER_EXAMPLES = examples(
@@ -273,7 +273,7 @@ def _refuse_others(options: Sequence[str], beside: str, heeded: Sequence[str]) -
 
 def _truth_of(
     path: Path,
-    content: Result | Postures | HeldPostures,
+    content: Result | Postures | HeldPostures | ObjectResult,
     view: View | None,
     view_path: Path | None,
     rejected: bool,

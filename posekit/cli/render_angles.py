@@ -39,6 +39,7 @@ def render_angles(
     """
     import numpy as np
 
+    from posekit.formats.own import ObjectResult
     from posekit.safe_io.writing import check_target
     from posekit.validators.ranges import load_ranges
     from posekit.viewer.plots.angle_plot import judged_limits, plot_angles
@@ -57,6 +58,10 @@ def render_angles(
     with drawing():  # says what is missing before the work
         pass
     content, view = read_given(given[0], seen[0] if seen else None)
+    if isinstance(content, ObjectResult):
+        raise InputError(
+            f"{given[0]}: --angles: are a person's; got an object; expected its pictures: leave --angles out"
+        )
     with about(given[0]):
         subject = subject_of(content, view)
     frames = frame_numbers(frame, len(subject.frames))

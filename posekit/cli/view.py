@@ -16,7 +16,7 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
-    from posekit.formats.own import Postures, Result, View
+    from posekit.formats.own import ObjectResult, Postures, Result, View
     from posekit.viewer.page.server import PageServer
     from posekit.viewer.viser_viewer import ViserViewer
 
@@ -78,27 +78,31 @@ def view(
 
 
 def _as_page(
-    content: Result | Postures | HeldPostures,
+    content: Result | Postures | HeldPostures | ObjectResult,
     behind: View | None,
     frames: range | None,
     port: int,
     *,
     title: str,
 ) -> PageServer:
-    from posekit.validation.page_findings import page_findings
-    from posekit.viewer.page.page import page_html
+    from posekit.conversion.composed import page_of
     from posekit.viewer.page.server import PageServer
 
-    page = page_html(content, behind, title=title, frames=frames, findings=page_findings(content))
-    return PageServer(page, port)
+    return PageServer(page_of(content, behind, frames=frames, title=title), port)
 
 
 def _in_viser(
-    content: Result | Postures | HeldPostures, behind: View | None, frames: range | None, port: int
+    content: Result | Postures | HeldPostures | ObjectResult,
+    behind: View | None,
+    frames: range | None,
+    port: int,
 ) -> ViserViewer:
+    from posekit.formats.own import ObjectResult
     from posekit.viewer.scene.drawn_subject import subject_of
     from posekit.viewer.viser_viewer import ViserViewer
 
+    if isinstance(content, ObjectResult):
+        raise InputError("--viser: shows persons; got an object; expected its page: leave the option out")
     subject = subject_of(content, behind)
     if frames is not None:
         if frames.stop > len(subject.frames):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,11 +10,13 @@ from typing import TYPE_CHECKING
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import frame_count
 from posekit.errors import InputError
-from posekit.formats.own import Postures, Result, View
+from posekit.formats.own import ObjectResult, Postures, Result, View
+from posekit.safe_io.writing import write_text
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
     from posekit.geometry import Array
+    from posekit.viewer.scene.drawn_object import DrawnObject
     from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 
@@ -43,13 +46,13 @@ class DrawnChoice:
         return "superposed" if moving or through_view or self.truth is not None else "side-by-side"
 
     def of(
-        self, content: Result | Postures | HeldPostures, view: View | None, *, moving: bool
-    ) -> tuple[DrawnSubject, list[Shown]]:
+        self, content: Result | Postures | HeldPostures | ObjectResult, view: View | None, *, moving: bool
+    ) -> tuple[DrawnSubject | DrawnObject, list[Shown]]:
         """Compose the frames that are drawn.
 
         Parameters
         ----------
-        content : Result, Postures or HeldPostures
+        content : Result, Postures, HeldPostures or ObjectResult
             What is drawn.
         view : View, optional
             What a result was recovered from.
@@ -66,6 +69,8 @@ class DrawnChoice:
         from posekit.viewer.scene.drawn_subject import subject_of
         from posekit.viewer.scene.likeliest import numbered
 
+        if isinstance(content, ObjectResult):
+            return self._of_object(content, moving=moving)
         subject = subject_of(content, view)
         frames = frame_numbers(self.frame, len(subject.frames))
         if frames is None:
@@ -87,13 +92,50 @@ class DrawnChoice:
             chosen = numbered(chosen, frames)
         return subject, chosen
 
+    def _of_object(self, content: ObjectResult, *, moving: bool) -> tuple[DrawnObject, list[Shown]]:
+        from posekit.viewer.scene.drawn_object import DrawnObject
+        from posekit.viewer.scene.likeliest import MAX_BESIDE
+
+        if self.rejected or self.truth is not None:
+            raise InputError(
+                "--rejected, --truth: are of persons; expected neither for an object; leave them out"
+            )
+        subject = DrawnObject.of(content)
+        frames = frame_numbers(self.frame, len(subject.frames))
+        if frames is None:
+            frames = [k for k, shown in enumerate(subject.frames) if len(shown)]
+        return subject, [
+            subject.chosen(self.posture, k, 1 if moving else MAX_BESIDE)
+            for k in (frames if moving else frames[:1])
+        ]
+
 
 def write_whole_page(
-    output: Path, content: Result | Postures | HeldPostures, view: View | None, *, frame: str, title: str
+    output: Path,
+    content: Result | Postures | HeldPostures | ObjectResult,
+    view: View | None,
+    *,
+    frame: str,
+    title: str,
 ) -> None:
     """Write the page of all survivors of some frames, with what checks find in them."""
-    from posekit.validation.page_findings import page_findings
-    from posekit.viewer.page.page import write_page
-
     frames = frame_numbers(frame, frame_count(content))
-    write_page(output, content, view, title=title, frames=frames, findings=page_findings(content))
+    write_text(output, [page_of(content, view, frames=frames, title=title)])
+
+
+def page_of(
+    content: Result | Postures | HeldPostures | ObjectResult,
+    view: View | None,
+    *,
+    frames: Sequence[int] | None,
+    title: str,
+) -> str:
+    """Make the page of all survivors of some frames, all of them where these are None."""
+    if isinstance(content, ObjectResult):
+        from posekit.viewer.object_page import object_page
+
+        return object_page(content, frames=frames, title=title)
+    from posekit.validation.page_findings import page_findings
+    from posekit.viewer.page.page import page_html
+
+    return page_html(content, view, title=title, frames=frames, findings=page_findings(content))

@@ -11,7 +11,7 @@ from posekit.conversion.given import read_given
 from posekit.conversion.held import Held, content_of
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
-from posekit.formats.own import Postures, Result, View, read_view
+from posekit.formats.own import ObjectResult, Postures, Result, View, read_view
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 
@@ -80,7 +80,7 @@ def convert(
 
 
 def render(
-    given: str | Path | Recovery | Result | View | Postures | HeldPostures,
+    given: str | Path | Recovery | Result | View | Postures | HeldPostures | ObjectResult,
     output: str | Path,
     *,
     view: str | Path | View | None = None,
@@ -93,7 +93,7 @@ def render(
 
     Parameters
     ----------
-    given : path, Recovery, Result, View, Postures or HeldPostures
+    given : path, Recovery, Result, View, Postures, HeldPostures or ObjectResult
         What is drawn; a view is recovered first.
     output : path
         ``.png``, ``.gif``, ``.mp4``; or ``.html``: the page of all survivors.
@@ -149,7 +149,7 @@ def render(
 
 def _drawable(
     given: Any, view: str | Path | View | None
-) -> tuple[Result | Postures | HeldPostures, View | None, str]:
+) -> tuple[Result | Postures | HeldPostures | ObjectResult, View | None, str]:
     """Return what can be drawn, the view behind it, and its title."""
     if isinstance(given, str | Path):
         path = view if isinstance(view, str | Path) else None
@@ -162,8 +162,9 @@ def _drawable(
         return result_of(recover(given, group=0.05), unit=given.unit), given, "view"
     if isinstance(given, Recovery):
         return result_of(given), behind, "recovery"
-    if isinstance(given, Result | Postures | HeldPostures):
+    if isinstance(given, Result | Postures | HeldPostures | ObjectResult):
         return given, behind, type(given).__name__.lower()
     raise InputError(
-        f"render: got {type(given).__name__}; expected a path, a recovery, a result, a view or postures"
+        f"render: got {type(given).__name__}; expected a path, a recovery, a result, a view, postures or recovered "
+        "objects"
     )

@@ -9,13 +9,13 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
-    from posekit.formats.own import Postures, Result, View
+    from posekit.formats.own import ObjectResult, Postures, Result, View
 
 
 def read_given(
     path: Path, seen: Path | None, *, explain: bool = False
-) -> tuple[Result | Postures | HeldPostures, View | None]:
-    """Read a file that holds postures, and the view behind a result; a view is recovered first.
+) -> tuple[Result | Postures | HeldPostures | ObjectResult, View | None]:
+    """Read postures of a person or an object, and the view behind a result; a view is recovered first.
 
     Parameters
     ----------
@@ -57,21 +57,23 @@ def read_given(
         return files.read_result(path), behind
     if behind is not None:
         raise InputError("--view: the file holds no result; expected one, recovered from that view")
+    if found.holds is Content.OBJECTS:
+        return files.read_object(path), None
     held = held_postures(path, found)
     # Postures without frames are drawn together, and lie as they are.
     return (held.postures if found.holds is Content.POSTURES else held), None
 
 
-def frame_count(content: Result | Postures | HeldPostures) -> int:
+def frame_count(content: Result | Postures | HeldPostures | ObjectResult) -> int:
     """Count the frames of what is drawn; postures without frames are one.
 
     Parameters
     ----------
-    content : Result, Postures or HeldPostures
+    content : Result, Postures, HeldPostures or ObjectResult
         What a file holds.
     """
-    from posekit.formats.own import Postures, Result
+    from posekit.formats.own import ObjectResult, Postures, Result
 
-    if isinstance(content, Result):
+    if isinstance(content, Result | ObjectResult):
         return len(content.frames)
     return 1 if isinstance(content, Postures) else int(content.frame.max(initial=0)) + 1

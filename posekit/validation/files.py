@@ -67,12 +67,13 @@ class AskedValidation:
         InputError
             Where what is asked is impossible, or a result's settings are.
         """
-        figure: str | Path | Figure | Robot = self.urdf or STICK_FIGURE_NAME
+        robot = self.urdf or read.robot
+        figure: str | Path | Figure | Robot = robot or STICK_FIGURE_NAME
         base = self.settings or self._usual(read.up)
         if read.result is not None and self.settings is None:
             own, base = recovered_with(read.result)
             figure = self.urdf or own
-        if self.urdf not in ("", STICK_FIGURE_NAME) and self.settings is None:
+        if robot not in ("", STICK_FIGURE_NAME) and self.settings is None:
             # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
             own_limits = "urdf" if base.ranges == "urdf" else DEFAULT_RANGES
             base = base.changed(contact_margin=0.0, ranges=own_limits, lengths=None)
@@ -89,12 +90,12 @@ class _Validators:
 
     def __init__(self, asked: AskedValidation) -> None:
         self._asked = asked
-        self._made: dict[tuple[float, ...], Validator] = {}
+        self._made: dict[tuple[str | float, ...], Validator] = {}
 
     def of(self, read: ReadPostures) -> Validator:
         if read.result is not None and self._asked.settings is None:
             return self._asked.validator(read)
-        up = () if read.up is None else tuple(read.up.tolist())
+        up = (read.robot, *(() if read.up is None else read.up.tolist()))
         if up not in self._made:
             self._made[up] = self._asked.validator(read)
         return self._made[up]
@@ -163,7 +164,7 @@ def _other_content(path: Path) -> str:
         holds = recognise(path).holds
     except PosekitError as error:
         raise _Refused(path, error) from error
-    return "" if holds in (*POSTURE_CONTENTS, Content.KEY_POINTS) else holds.value
+    return "" if holds in (*POSTURE_CONTENTS, Content.KEY_POINTS, Content.OBJECTS) else holds.value
 
 
 class _Refused(Exception):

@@ -143,6 +143,8 @@ class ReportBuilder:
         if given.held is not None and given.held.in_time:
             job.over_time, job.not_asked = judged_over_time(given.held, job.recordings, validator)
         self.own |= own
+        if given.held is None and isinstance(postures, NamedConfigurations):
+            self._said.update(postures.said)
         if not job.groups:  # its configurations may be none of the robot's
             self._judge_waiting()
             self._judge([job])

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.held_postures import (
@@ -22,7 +23,7 @@ from posekit.formats.listing import Wanted, listed
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.motion.ground_up import against_stated_up
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
-from posekit.formats.own import NamedConfigurations, Result, read_result
+from posekit.formats.own import NamedConfigurations, ObjectResult, Result, read_object, read_result
 from posekit.formats.recognising import recognise
 from posekit.formats.registry import formats
 from posekit.geometry import Array
@@ -93,10 +94,11 @@ PATH_AS_MOTION: Final = (
 
 
 class ReadPostures(NamedTuple):
-    """What a file holds, and the result that it is, if it is one."""
+    """What a file holds, the result that it is, if it is one, and the robot that it says it is of."""
 
     postures: HeldPostures | NamedConfigurations
     result: Result | None = None
+    robot: str = ""
 
     @property
     def up(self) -> Array | None:
@@ -128,6 +130,8 @@ def read_postures_of(path: Path, stated: StatedMotion) -> ReadPostures:
         held = stated.applied(postures_of_result(result))
         if result.paths is not None:
             held = replace(held, said=(*held.said, PATH_AS_MOTION))
+    elif found.holds is Content.OBJECTS:
+        return _of_objects(path, read_object(path))
     elif found.holds is Content.CONFIGURATIONS:
         held = configurations_of(path, found, stated.rate)
     else:
@@ -143,6 +147,36 @@ def read_postures_of(path: Path, stated: StatedMotion) -> ReadPostures:
     if not len(held):
         raise InputError(f"{path}: it holds no posture; nothing can be judged; expected at least one")
     return ReadPostures(held, result)
+
+
+def _of_objects(path: Path, objects: ObjectResult) -> ReadPostures:
+    """Return the configurations that reach objects; the nearest ones of other postures are none of theirs."""
+    reached = [
+        q
+        for frame in objects.frames
+        if frame.q is not None
+        for q, certified in zip(frame.q, frame.certified, strict=True)
+        if certified
+    ]
+    robot, count = objects.settings.get("robot"), sum(map(len, objects.frames))
+    if not isinstance(robot, dict):
+        expected = "configurations of a robot"
+        raise refusal(
+            path, "", "objects without a URDF", expected, "its lengths were checked; render or convert it"
+        )
+    if not reached:
+        got = f"{plural(count, 'posture')}, for none of which a configuration within limits is known"
+        raise refusal(path, "", got, "one at least", "recover it at another scale, as --scale closure")
+    lacking = count - len(reached)
+    held = NamedConfigurations(
+        q=np.array(reached),
+        names=objects.configuration_names,
+        source=str(path),
+        said=(f"{plural(lacking, 'posture')} without a configuration within limits left out",)
+        if lacking
+        else (),
+    )
+    return ReadPostures(held, robot=str(robot.get("name", "")))
 
 
 def files_of(given: Sequence[Path], output: Path | None = None) -> list[Path]:
@@ -161,7 +195,7 @@ def files_of(given: Sequence[Path], output: Path | None = None) -> list[Path]:
         Where one is not there, or there is no file that can hold postures.
     """
     suffixes = {suffix for one in formats(*POSTURE_CONTENTS) for suffix in one.suffixes}
-    contents = (*POSTURE_CONTENTS, Content.KEY_POINTS, Content.BATCH)
+    contents = (*POSTURE_CONTENTS, Content.KEY_POINTS, Content.OBJECTS, Content.BATCH)
     found = listed(given, Wanted(suffixes=suffixes, contents=contents), output)
     if not found:
         names = cut(", ".join(map(str, given)))

@@ -75,7 +75,7 @@ def make_results(folder: Path, command: Command) -> dict[str, Path]:
     recover("person", "-o", folder / "taylor.json", *stature, "--proportions", "taylor", "--size", "1280x720")
     calibration = ("--camera", samples / "calibration.toml", "--person", "all")
     recover("people", "-o", folder / "people.json", *stature, *calibration)
-    recover("samples/gripper.json", "-o", folder / "gripper.json", "--linkage", "panda")
+    recover("samples/gripper.json", "-o", folder / "gripper.json", "--linkage", "panda", "--scale", "closure")
     return {
         "exact, JSON": folder / "exact.json",
         "exact, NPZ, `--explain`": folder / "explained.npz",

@@ -117,7 +117,7 @@ def compose(
     drawn_ones = shown.chosen(known)
     shifts = drawn_ones.alignment @ world.R_world_cam.T
     if apart:
-        shifts = shifts + _shifts(world.place(drawn_ones.aligned_points), world, style.azimuth)
+        shifts = shifts + side_by_side(world.place(drawn_ones.aligned_points), world, style.azimuth)
     together = len(known) > 1 and not apart and style.look is None
     looks = superposed_looks(drawn_ones, figure) if together else [style.look or Look()] * len(known)
     drawn = []
@@ -165,7 +165,7 @@ def _visible(found: Culprit, points: Array) -> Culprit:
     return Culprit(links=found.links, joints=tuple(dict.fromkeys(joints)))
 
 
-def _shifts(placed: Array, world: World, azimuth: float) -> Array:
+def side_by_side(placed: Array, world: World, azimuth: float) -> Array:
     """Return where the postures (N, K, 3) go side by side (N, 3): in rows, from the left, from the front."""
     count = len(placed)
     right, ahead = sight_axes(world, azimuth)
