@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.robots.declared import BodyKind, declared_bodies
+from posekit.robots.declared import BodyKind, check_count, declared_bodies
 from posekit.safe_io import cut, refusal
 
 MAX_TRIANGLES: Final = 500_000
@@ -30,9 +30,10 @@ def build_geometry(
     Raises
     ------
     InputError
-        Where Pinocchio or coal cannot load them, or the collision bodies loaded are not those declared, by link,
-        number and type.
+        Where there are too many, Pinocchio or coal cannot load them, or the collision bodies loaded are not those
+        declared, by link, number and type.
     """
+    check_count(robot, source, kind)
     text = ElementTree.tostring(robot, encoding="unicode")
     wanted = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
     try:

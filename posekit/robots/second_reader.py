@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from posekit.geometry import Array, rotation_about
 from posekit.safe_io import cut, one_line, refusal
 
 AGREEMENT_METRES = 1e-9
@@ -46,7 +49,7 @@ def compare_readers(urdf: str, model: pin.Model, source: str, *, must_read: bool
     import yourdfpy
 
     try:
-        other = yourdfpy.URDF.load(io.BytesIO(urdf.encode()), load_meshes=False, build_scene_graph=True)
+        other = yourdfpy.URDF.load(io.BytesIO(urdf.encode()), load_meshes=False, build_scene_graph=False)
     except Exception as error:  # yourdfpy lets through whatever its parsers raise
         if not must_read:
             return False
@@ -64,22 +67,48 @@ def compare_readers(urdf: str, model: pin.Model, source: str, *, must_read: bool
             got = f"joint {name!r} is read by one reader and not by another"
             raise refusal(source, "", got, "the same joints", "check its XML")
         angles[name] = _set(model, q, name, None, kinds[name])
+    mimics: dict[str, float] = {}
     for joint in other.robot.joints:
         if joint.mimic is not None and joint.name in kinds and joint.mimic.joint in angles:
             followed = joint.mimic.multiplier * angles[joint.mimic.joint] + joint.mimic.offset
-            _set(model, q, joint.name, followed, kinds[joint.name])
-    other.update_cfg(angles)
+            mimics[joint.name] = _set(model, q, joint.name, followed, kinds[joint.name])
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
-    root = model.getFrameId(other.base_link, pin.FrameType.BODY)
+    children = {joint.child for joint in other.robot.joints}
+    root = next((link for link in other.link_map if link not in children), "")
+    places = _places(root, other.robot.joints, angles | mimics)
+    base = data.oMf[model.getFrameId(root, pin.FrameType.BODY)]
     for link in other.link_map:
-        T = other.get_transform(link)
-        placement = data.oMf[root].actInv(data.oMf[model.getFrameId(link, pin.FrameType.BODY)])
+        T = places.get(link, np.eye(4))
+        placement = base.actInv(data.oMf[model.getFrameId(link, pin.FrameType.BODY)])
         apart = np.abs(T - placement.homogeneous).max()
         if not apart <= AGREEMENT_METRES * max(1.0, float(np.abs(T[:3, 3]).max())):
             got = f"two readers place link {link!r} {apart:.3g} m apart"
             raise refusal(source, "", got, "one place", "check the numbers of its joint")
     return True
+
+
+def _places(root: str, joints: list[Any], angles: Mapping[str, float]) -> dict[str, Array]:
+    """Place the links in the root's frame (4, 4), from joint to joint: yourdfpy's graph takes n^4 for a chain of n."""
+    below: dict[str, list[Any]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent, []).append(joint)
+    places = {root: np.eye(4)}
+    waiting = [root]
+    while waiting:
+        link = waiting.pop()
+        for joint in below.pop(link, ()):
+            motion = np.eye(4)
+            angle = angles.get(joint.name, 0.0)
+            if joint.type == "prismatic":
+                motion[:3, 3] = angle * joint.axis
+            elif joint.type in ("revolute", "continuous"):
+                axis = joint.axis / np.linalg.norm(joint.axis)
+                motion[:3, :3] = rotation_about(axis, np.asarray(angle))
+            origin = np.eye(4) if joint.origin is None else joint.origin
+            places[joint.child] = places[link] @ origin @ motion
+            waiting.append(joint.child)
+    return places
 
 
 def _set(model: pin.Model, q: np.ndarray, name: str, angle: float | None, kind: str) -> float:

@@ -423,6 +423,15 @@ def test_a_mesh_with(folder: Path, name: str) -> None:
             assert str(error).isprintable()
 
 
+def test_visual_bodies_beyond_the_limit_are_refused_where_they_are_loaded(folder: Path) -> None:
+    many = '<visual><geometry><sphere radius="1"/></geometry></visual>' * 501
+    (folder / "x.urdf").write_text(VALID.replace("</link>", many + "</link>", 1))
+    assert len(load_robot(folder / "x.urdf").body_names) == 3
+    for untrusted in (False, True):
+        said = refused(folder / "x.urdf", visuals=True, untrusted=untrusted)
+        assert "501 visual bodies; expected at most 500" in said
+
+
 @pytest.mark.parametrize("late", [False, True])
 def test_what_is_loaded_is_what_the_child_saw(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, late: bool

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pickle
 import signal
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +251,19 @@ class TestSecondReader:
         assert "two readers place link 'b'" in refusal_of(compare_readers, ARM, other, "x")
         fewer = Robot(urdf=ARM.replace('"bc" type="prismatic"', '"bc" type="fixed"')).model
         assert "joint 'bc' is read by one reader" in refusal_of(compare_readers, ARM, fewer, "x")
+
+    def test_a_turned_and_shifted_chain_as_long_as_may_be_costs_little(self) -> None:
+        """yourdfpy's own graph took n^4: 68 s for 240 links."""
+        names = [f"l{k}" for k in range(240)]
+        text = robot_text(
+            *(link(name, "") for name in names),
+            *(joint(f"j{b}", a, b) for a, b in itertools.pairwise(names)),
+        )
+        model, start = Robot(urdf=text).model, time.process_time()
+        assert compare_readers(text, model, "x")
+        assert time.process_time() - start < 10
+        other = Robot(urdf=text.replace('rpy="0.1 0.2 0.3"', 'rpy="0.1 0.2 0.30001"', 1)).model
+        assert "two readers place link 'l1'" in refusal_of(compare_readers, text, other, "x")
 
     def test_what_it_cannot_read_is_passed_over_where_that_is_said(self) -> None:
         text = robot_text(link("a", '<capsule radius="1" length="1"/>'), attributes=' version="1.1"')
