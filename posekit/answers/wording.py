@@ -9,6 +9,8 @@ import numpy as np
 
 from posekit.answers.answer import REPRESENTED_PROBABILITY, Answer
 from posekit.answers.depth_order import ANSWER_SEGMENTS, LEVEL_METRES
+from posekit.answers.paths import distinct_paths
+from posekit.formats.own.paths import FollowedPaths
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 
@@ -28,6 +30,10 @@ EVEN_ODDS: Final = 1.1
 
 OF_LISTED: Final = " of what is listed"
 """Added where much is not."""
+
+
+NOT_ASKED: Final = "how sure is not asked (--follow 2)"
+"""What is said of the only path that was looked for."""
 
 
 def answer_lines(answers: Sequence[Answer]) -> list[str]:
@@ -68,6 +74,13 @@ def path_words(probability: Sequence[float]) -> str:
     odds = probability[0] / probability[1]
     said = "the first is " + (f"{odds:.2g} times" if odds >= EVEN_ODDS else "about") + " as likely as"
     return f"{said} the next that is 5 cm elsewhere; {len(probability)} of them hold 95 % ({each}{more})"
+
+
+def words_of_paths(paths: FollowedPaths) -> str:
+    """Say how sure the first path of a result is, of those that it holds."""
+    if len(paths) > 1 or paths.compared:
+        return path_words(distinct_paths(paths.joints, paths.share)[1].tolist())
+    return "no other path is in the result" if paths.compared is None else NOT_ASKED
 
 
 def percent(probability: float) -> str:

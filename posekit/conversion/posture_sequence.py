@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.answers.wording import percent
+from posekit.answers.wording import percent, words_of_paths
 from posekit.body import Figure, load_figure
 from posekit.body.anthropometry import lengths_from_postures
 from posekit.display.plural import plural
@@ -304,7 +304,7 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     sure = (
         f"with {percent(paths.share[0])} of the probability of {plural(others + 1, 'path')}"
         if others
-        else "how sure is not asked (--follow 2)"
+        else words_of_paths(paths)
     )
     says = [f"the likeliest path, {sure}{bridged}"]
     points, up = _placed(

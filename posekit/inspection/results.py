@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.answers.paths import distinct_paths
-from posekit.answers.wording import answer_lines, path_words
+from posekit.answers.wording import answer_lines, words_of_paths
 from posekit.display.plural import plural
 from posekit.formats.own import Result
 from posekit.formats.own.paths import FollowedPaths
@@ -115,10 +114,10 @@ def _paths(paths: FollowedPaths) -> str:
     count, frames = paths.survivor.shape
     certain = "certain to be" if paths.exact else "not certain to be"
     sure = f"the first is {certain} the likeliest"
-    if count > 1:
-        sure = f"{path_words(distinct_paths(paths.joints, paths.share)[1].tolist())}; {sure}"
+    if count > 1 or paths.compared:
+        sure = f"{words_of_paths(paths)}; {sure}"
     elif not paths.exact:
-        sure = "how sure is not asked (--follow 2)"
+        sure = words_of_paths(paths)
     return (
         f"{plural(count, 'path')}: {sure}, "
         f"{int((paths.survivor[0] < 0).sum())} of {plural(frames, 'frame')} bridged"

@@ -87,6 +87,7 @@ def _paths(following: Following) -> FollowedPaths:
         lead=following.lead if np.isfinite(following.lead) else np.nan,
         exact=following.exact,
         apart=following.apart,
+        compared=not np.isnan(following.lead),
     )
 
 

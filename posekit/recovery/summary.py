@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from posekit.answers.paths import distinct_paths
-from posekit.answers.wording import answer_lines, path_words, percent
+from posekit.answers.wording import NOT_ASKED, answer_lines, path_words, percent
 from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.own.result import NOT_LISTED
@@ -124,7 +124,7 @@ def following_line(following: Following) -> str:
     """Describe the paths through a recovery in a line."""
     bridged = int(following.bridged[0].sum())
     guessed = int((following.confidence[0] < SURE_CONFIDENCE).sum())
-    sure = "how sure is not asked (--follow 2)"
+    sure = NOT_ASKED
     if not np.isnan(following.lead):
         _, probability = distinct_paths(following.joints, following.share)
         sure = path_words(probability.tolist())

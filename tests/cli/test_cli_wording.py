@@ -71,6 +71,17 @@ def test_a_path_alone_says_that_others_were_not_asked_for(
     assert "the likeliest path, how sure is not asked (--follow 2)" in said
 
 
+@pytest.mark.parametrize("end", ["json", "npz"])
+def test_a_path_that_is_left_of_several_is_not_said_to_be_alone(
+    run: Callable[..., Any], samples: Path, tmp_path: Path, end: str
+) -> None:
+    sure = "no other that is 5 cm elsewhere holds 5 %"
+    out = tmp_path / f"walk.{end}"
+    assert sure in run("recover", samples / "walk.json", "-o", out, "--follow", "3").out
+    assert f"1 path: {sure}" in run("inspect", out).out
+    assert sure in run("convert", out, tmp_path / "walk.bvh").out
+
+
 def test_the_joint_that_is_furthest_off_is_named(
     run: Callable[..., Any], samples: Path, tmp_path: Path
 ) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.answers.paths import distinct_paths
-from posekit.answers.wording import path_words
+from posekit.answers.wording import words_of_paths
 from posekit.formats.own.paths import FollowedPaths
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, POINTS
@@ -85,10 +85,10 @@ def paths_shown(
                 points[p, t, : len(JOINTS)] += move[k]
                 # The head goes along with the neck.
                 points[p, t, len(JOINTS) :] = body[k, len(JOINTS) :] + (points[p, t, 0] - body[k, 0])
-    alone = len(paths.share) == 1  # whether others were looked for is not told, nor how likely they are
+    alone = len(paths.share) == 1  # how likely others are is not told
     return ShownPaths(
         probability=np.full(1, np.nan) if alone else probability,
-        words="no other path is in the result" if alone else path_words(probability.tolist()),
+        words=words_of_paths(paths),
         survivor=survivor,
         points=points,
         bridged=paths.interpolated[chosen][:, index],

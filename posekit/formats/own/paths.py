@@ -46,6 +46,8 @@ class FollowedPaths:
         Whether the first path is certain to be the likeliest of all.
     apart : float
         Metres by which some joint is elsewhere in different paths.
+    compared : bool, optional
+        Whether others than the first were looked for; None where a file of earlier does not say.
     """
 
     survivor: NDArray[np.int64]
@@ -59,6 +61,7 @@ class FollowedPaths:
     lead: float
     exact: bool
     apart: float
+    compared: bool | None = None
 
     def __post_init__(self) -> None:
         K, T = np.shape(self.survivor) if np.ndim(self.survivor) == 2 else (0, 0)
@@ -113,6 +116,7 @@ class FollowedPaths:
             "lead": None if np.isnan(self.lead) else float(self.lead),
             "exact": bool(self.exact),
             "apart": float(from_metres(self.apart, unit)),
+            "compared": self.compared,
         }
 
     def fields(self, unit: Unit) -> dict[str, Any]:
@@ -141,6 +145,7 @@ class FollowedPaths:
             lead=np.nan if told["lead"] is None else float(told["lead"]),
             exact=bool(told["exact"]),
             apart=float(to_metres(told["apart"], unit)),
+            compared=told["compared"],
         )
 
 
@@ -158,5 +163,5 @@ def path_shapes(K: int, T: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-SINGLE_VALUES: Final = ("lead", "exact", "apart")
+SINGLE_VALUES: Final = ("lead", "exact", "apart", "compared")
 """What is said once of all paths."""

@@ -214,6 +214,9 @@ class ResultPaths(FileModel):
     )
     exact: bool = Field(description="Whether the first path is certain to be the cheapest.")
     apart: float = Field(description="By how much some joint is elsewhere in a different path, in `unit`.")
+    compared: bool | None = Field(
+        default=None, description="Whether other paths were looked for; null where that is not said."
+    )
     paths: Annotated[list[ResultPath], Field(min_length=1, max_length=1000), FailFast()]
 
 
@@ -223,6 +226,7 @@ class ResultPathsTold(FileModel):
     lead: Maybe
     exact: bool
     apart: float
+    compared: bool | None = None
 
 
 class ResultDetails(FileModel):
