@@ -65,14 +65,18 @@ def true_joints(path: Path, view: View | None, view_path: Path | None, times: Ar
     if last + 1 == len(times):
         joints[held.frame] = held.postures.joints
         return joints, False
-    since, asked = held.time - held.time[:1], times - times[:1]
-    if not len(since) or not (np.isfinite(since).all() and np.isfinite(asked).all()):
+    since = held.time - held.time[:1]
+    if not len(since) or not (np.isfinite(since).all() and np.isfinite(times).all()):
         raise InputError(
             f"--truth {path}: {last + 1} frames; expected {len(times)}, or times of both that say which is which"
         )
-    nearest = np.abs(since[None] - asked[:, None]).argmin(axis=1)
     step = float(np.median(np.diff(since))) if len(since) > 1 else 0.0
-    near = np.abs(since[nearest] - asked) <= max(0.51 * step, 1e-9)
+    # Second 0 is the motion's first frame; else, where that has more pictures, the first picture's.
+    tried = []
+    for asked in (times, times - times[:1]):
+        nearest = np.abs(since[None] - asked[:, None]).argmin(axis=1)
+        tried.append((nearest, np.abs(since[nearest] - asked) <= max(0.51 * step, 1e-9)))
+    nearest, near = max(tried, key=lambda one: int(one[1].sum()))
     if not near.any():
         raise InputError(
             f"--truth {path}: none of its frames is at the time of a picture; expected the same seconds"

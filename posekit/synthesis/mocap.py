@@ -103,7 +103,7 @@ def mocap_scene(
             R_cam_world=np.broadcast_to(R, (len(rows), 3, 3)),
             position=np.broadcast_to(centre, (len(rows), 3)),
         ),
-        time=(capture.order[rows] - capture.order[rows[0]]) / capture.fps[index],
+        time=capture.order[rows] / capture.fps[index],
         size=sphere.size,
         labels=(capture.actions[index],) * len(rows),
     )

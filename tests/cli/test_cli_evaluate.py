@@ -4,6 +4,7 @@ import builtins
 import csv
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -266,3 +267,26 @@ def test_a_view_of_motion_capture_says_where_its_camera_stands(
     np.testing.assert_allclose(steps.min(axis=1), 0.0, atol=1e-9)
     assert command("recover", "view.json", "-o", "result.npz").code == 0
     assert "where +y is up" in command("convert", "result.npz", "out.trc").out
+
+
+def test_pictures_from_the_middle_of_a_clip_are_held_against_their_own_frames(
+    command: Callable[..., Any], tmp_path: Path
+) -> None:
+    late = joints()
+    late[:4] = np.nan
+    save("late.npz", joints=late)
+    words = ("--frames", "3", "--dt", "0.1", "--camera", "4,1,1.5")
+    assert command("synth", "mocap", "late.npz", "-o", "view.json", *words).code == 0
+    np.testing.assert_allclose(posekit.read_view("view.json").time, np.array([4, 7, 10]) / 30)
+    assert command("recover", "view.json", "-o", "result.npz").code == 0
+    by_view, by_motion = (
+        command("evaluate", "result.npz", "--truth", truth).out for truth in ("view.json", "late.npz")
+    )
+    assert by_view == by_motion != ""
+    # The same pictures, counted from their first: their seconds are as good.
+    since = posekit.read_result("result.npz")
+    frames = [replace(one, time=one.time - since.frames[0].time) for one in since.frames]
+    posekit.write_result("since.npz", replace(since, frames=frames))
+    save("first.npz", joints=late[4:], clip=np.zeros(FRAMES - 4, dtype=int))
+    assert command("evaluate", "since.npz", "--truth", "first.npz").out == by_view
+    assert command("evaluate", "result.npz", "--truth", "first.npz").out == by_view

@@ -50,7 +50,7 @@ def test_a_table_of_a_robot_is_judged_over_time(run: Callable[..., Any]) -> None
     np.savetxt("walk.csv", q, delimiter=",")
     arguments = ("walk.csv", "--urdf", "g1", "--checks", "joint-range,joint-velocity,drift", "-o", "r.json")
     done = run(*arguments, "--rate", 50)
-    assert done.code == 1 and "joint_velocity/left_elbow_joint" in done.out, done.err
+    assert done.code == 1 and "joint-velocity/left_elbow_joint" in done.out, done.err
     checks = json.loads(Path("r.json").read_text(encoding="utf-8"))["checks"]
     assert checks["drift"]["rejected"] == 0
     assert "--rate" in run(*arguments).out

@@ -307,7 +307,7 @@ def test_an_image_point_beyond_all_reach_warns_of_nothing_else(run, walk: dict[s
     assert outcome.code == 0
     assert outcome.err.startswith("posekit: warning: 1 of 2 frames have no posture")
     assert outcome.err.count("\n") == 1
-    assert "no_solution/left_elbow" in outcome.out
+    assert "no-solution/left_elbow" in outcome.out
 
 
 def test_inputs_are_not_written_over(run, walk: dict[str, Any], write) -> None:

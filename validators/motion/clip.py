@@ -9,7 +9,6 @@ from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS
@@ -85,11 +84,6 @@ class MotionClip:
         if self.up is None:
             return np.full(self.joints.shape[:2], np.nan)
         return np.asarray(self.joints @ self.up)
-
-    @cached_property
-    def complete(self) -> NDArray[np.bool_]:
-        """Which frames have all joints (T,)."""
-        return np.asarray(np.isfinite(self.joints).all(axis=(1, 2)))
 
 
 def once_a_clip(find: Callable[[MotionClip], Found]) -> Callable[[MotionClip], Found]:
