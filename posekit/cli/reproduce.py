@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, cast
 
 import typer
 
@@ -19,6 +19,9 @@ def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen or taylor.")],
     output: Annotated[Path, option("--output", "DIR", "Where to write the tables.", short="-o")],
     pictures: Pictures = True,
+    effort: Annotated[
+        str, option("--effort", "quick|fine", "Over how many settings of the walker lee-chen counts.")
+    ] = "quick",
 ) -> None:
     """Write a paper's tables, reproduced, beside what it prints."""
     from posekit import papers
@@ -28,8 +31,18 @@ def reproduce(
         raise InputError(
             f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPER_NAMES)}"
         )
+    work = _effort(effort)
     make_folder(output)
-    make = papers.reproduce_lee_chen if paper == "lee-chen" else papers.reproduce_taylor
-    for line in make(output, pictures=pictures):
+    if paper == "lee-chen":
+        lines = papers.reproduce_lee_chen(output, pictures=pictures, effort=work)
+    else:
+        lines = papers.reproduce_taylor(output, pictures=pictures)
+    for line in lines:
         say(line)
     say(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")
+
+
+def _effort(text: str) -> Literal["quick", "fine"]:
+    if text in ("quick", "fine"):
+        return cast(Literal["quick", "fine"], text)
+    raise InputError(f"--effort: {text!r}; expected quick or fine")

@@ -60,6 +60,9 @@ def walker(
     velocity: Annotated[
         float, typer.Option("--velocity", help="Relative velocity, leg lengths a second, 0.5 to 1.3.")
     ] = 1.0,
+    lean: Annotated[
+        float, typer.Option("--lean", help="How far the back leans forward besides, degrees, -30 to 30.")
+    ] = 0.0,
     phase: Annotated[float, typer.Option("--phase", help="Phase of the first frame, in cycles.")] = 0.0,
     noise: Annotated[
         float,
@@ -73,11 +76,13 @@ def walker(
     seed: Seed = 0,
 ) -> None:
     """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1."""
+    import numpy as np
+
     from posekit import synthesis
 
     x, y, z = numbers(camera, 3, "--camera")
     scene = synthesis.walker_scene(
-        synthesis.Walker(velocity=velocity),
+        synthesis.Walker(velocity=velocity, lean=np.radians(lean)),
         camera=(x / 100, y / 100, z / 100),
         frames=frames,
         dt=dt,

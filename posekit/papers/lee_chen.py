@@ -9,22 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from posekit.display.plural import plural
 from posekit.formats.markdown import table_lines
 from posekit.papers import lee_chen_printed as printed
-from posekit.papers.lee_chen_table2 import CameraEstimate, camera_estimates, exact_tables
+from posekit.papers.lee_chen_spread import cell_spreads, final_spread_lines, setting_words, spread_lines
+from posekit.papers.lee_chen_table2 import CameraEstimate
 from posekit.papers.lee_chen_tables34 import (
     GROUPING_METRES,
-    N_PHASES,
     PAPER_TOLERANCE,
-    Sequence1985,
-    closest,
+    WALK_GRIDS,
+    Effort,
+    WalkCounts,
     recover_sequence,
 )
+from posekit.papers.lee_chen_tangent import shoulder_lines
+from posekit.papers.lee_chen_work import LeeChenWork
 from posekit.recovery.result import result_of
 from posekit.safe_io.writing import write_json, write_lines
 from posekit.skeleton import JOINTS
-from posekit.synthesis.walker_scene import SEQ_VELOCITY
 from posekit.viewer.illustrate import illustrate
 
 FIGURES_TEXT = (
@@ -39,7 +40,9 @@ FIGURES_TEXT = (
 TABLE_TITLES = {"seq1": "Table 3 (SEQ1)", "seq2": "Table 4 (SEQ2)"}
 
 
-def reproduce_lee_chen(folder: Path, *, pictures: bool = True) -> list[str]:
+def reproduce_lee_chen(
+    folder: Path, *, pictures: bool = True, effort: Effort = "quick", work: LeeChenWork | None = None
+) -> list[str]:
     """Write ``lee-chen.md`` and ``lee-chen.json`` into a folder, and the figures: Tables 2-4 and §4.2 beside the print.
 
     Parameters
@@ -48,73 +51,98 @@ def reproduce_lee_chen(folder: Path, *, pictures: bool = True) -> list[str]:
         Must exist.
     pictures : bool
         Whether to draw the figures too.
+    effort : {"quick", "fine"}
+        Over how many settings of the walker Tables 3 and 4 are counted (`WALK_GRIDS`).
+    work : LeeChenWork, optional
+        What was calculated already; the effort's otherwise.
 
     Returns
     -------
     list of str
         The lines of the report.
     """
-    estimates, tables = camera_estimates(), exact_tables()
-    found = [closest(name, SEQ_VELOCITY) for name in ("seq1", "seq2")]
+    work = work or LeeChenWork(grid=WALK_GRIDS[effort])
+    found = list(work.counts.values())
     lines = [
         "# Lee & Chen 1985, reproduced",
         "",
-        *_table2_lines(estimates, tables),
-        *(line for sequence in found for line in _levels_lines(sequence)),
-        *_frame1_lines(found),
+        *_table2_lines(work.estimates, work.tables),
+        *_settings_lines(work),
+        *(line for counts in found for line in _levels_lines(counts, work.chosen)),
+        *shoulder_lines(work.shoulders),
+        *_frame1_lines(found, work.chosen),
         *(FIGURES_TEXT if pictures else ()),
-        *_differences_lines(found),
+        *_differences_lines(found, work.chosen),
     ]
     document = {
         "table2": {
-            "estimates": [{**asdict(one), "position": one.position.tolist()} for one in estimates],
-            "exact": {name: values.tolist() for name, values in tables.items()},
+            "estimates": [{**asdict(one), "position": one.position.tolist()} for one in work.estimates],
+            "exact": {name: values.tolist() for name, values in work.tables.items()},
             "unit": "cm",
         },
-        "sequences": [_plain(sequence) for sequence in found],
+        "settings": asdict(work.grid),
+        "sequences": [_plain(counts, work.chosen) for counts in found],
     }
     if pictures:
-        lines += [f"- {line}" for sequence in found for line in _illustrate(folder, sequence)]
+        lines += [f"- {line}" for name in work.counts for line in _illustrate(folder, name, work)]
     write_lines(folder / "lee-chen.md", lines)
     write_json(folder / "lee-chen.json", document)
     return lines
 
 
-def _illustrate(folder: Path, sequence: Sequence1985) -> list[str]:
+def _illustrate(folder: Path, name: str, work: LeeChenWork) -> list[str]:
     """Draw the figures of a sequence, the printed counts beside its own; return what was left out, and why."""
-    view, recovery = recover_sequence(sequence)
+    view, recovery = recover_sequence(name, work.setting)
     return list(
         illustrate(
             folder,
-            f"lee-chen.{sequence.name}",
+            f"lee-chen.{name}",
             result_of(recovery, unit=view.unit, explain=True),
             view,
-            printed={
-                "physical": printed.PRINTED_PHYSICAL[sequence.name],
-                "motion": printed.PRINTED_MOTION[sequence.name],
-            },
+            printed={"physical": printed.PRINTED_PHYSICAL[name], "motion": printed.PRINTED_MOTION[name]},
             printed_frames=[frame - 1 for frame in printed.PRINTED_FRAMES],
         )
     )
 
 
-def _plain(sequence: Sequence1985) -> dict[str, Any]:
+def _plain(counts: WalkCounts, chosen: int) -> dict[str, Any]:
+    velocity, lean, phase = counts.settings[chosen].tolist()
     return {
-        "name": sequence.name,
-        "velocity": sequence.velocity,
-        "phase": sequence.phase,
-        "distance": sequence.distance,
+        "name": counts.name,
+        "velocity": velocity,
+        "lean_degrees": lean,
+        "phase": phase,
+        "distance": float(counts.distance[chosen]),
         "frames": list(printed.PRINTED_FRAMES),
         "joint": list(JOINTS),
-        "physical": sequence.physical.tolist(),
-        "motion": sequence.motion.tolist(),
-        "printed_physical": printed.PRINTED_PHYSICAL[sequence.name],
-        "printed_motion": printed.PRINTED_MOTION[sequence.name],
-        "groups_after_rules_1_2": sequence.groups_after_rules_1_2,
-        "survivors_after_rules_1_5": sequence.final[0],
-        "groups_after_rules_1_5": sequence.final[1],
-        "truth_survives": sequence.truth_survives,
+        "physical": counts.physical[chosen].tolist(),
+        "motion": counts.motion[chosen].tolist(),
+        "printed_physical": printed.PRINTED_PHYSICAL[counts.name],
+        "printed_motion": printed.PRINTED_MOTION[counts.name],
+        "groups_after_rules_1_2": int(counts.grouped[chosen]),
+        "survivors_after_rules_1_5": int(counts.final[chosen, 1]),
+        "groups_after_rules_1_5": int(counts.final[chosen, 0]),
+        "truth_survives": bool(counts.truth[chosen]),
+        "truth_survives_share": float(counts.truth.mean()),
+        "spread": [one.plain() for one in cell_spreads(counts)],
     }
+
+
+def _settings_lines(work: LeeChenWork) -> list[str]:
+    grid = work.grid
+    total = np.sum([counts.distance for counts in work.counts.values()], axis=0)
+    cells = sum(counts.cells.shape[1] for counts in work.counts.values())
+    return [
+        "## Tables 3 and 4: over which settings",
+        "",
+        f"The paper prints neither the walker's speed nor its lean nor the phase of frame 1. Counted at {len(grid)} "
+        f"settings: {len(grid.velocities)} speeds ({grid.velocities[0]:g} to {grid.velocities[-1]:g} leg lengths/s), "
+        f"{len(grid.leans)} leans ({grid.leans[0]:g} to {grid.leans[-1]:g} degrees), {grid.phases} phases, each seen "
+        f"by both cameras. Closest to all {cells} printed cells together, by the sum of |log2(here / print)|: "
+        f"{setting_words(work.setting)}; the sum is {total[work.chosen]:.1f} (median of all {np.median(total):.1f}), "
+        f"a factor of {2 ** (total[work.chosen] / cells):.2f} a cell. Nothing was adjusted to what comes out there.",
+        "",
+    ]
 
 
 def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -> list[str]:
@@ -147,7 +175,7 @@ def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -
     ]
 
 
-def _levels_lines(sequence: Sequence1985) -> list[str]:
+def _levels_lines(counts: WalkCounts, chosen: int) -> list[str]:
     head = ["level", "joint"]
     for column in ("physical", "with Rules 1-2"):
         head += [f"{column}, frame {frame}: print / here" for frame in printed.PRINTED_FRAMES]
@@ -155,68 +183,46 @@ def _levels_lines(sequence: Sequence1985) -> list[str]:
     for level, joint in enumerate(JOINTS):
         row: list[object] = [level, joint]
         for theirs, ours in (
-            (printed.PRINTED_PHYSICAL[sequence.name], sequence.physical),
-            (printed.PRINTED_MOTION[sequence.name], sequence.motion),
+            (printed.PRINTED_PHYSICAL[counts.name], counts.physical[chosen]),
+            (printed.PRINTED_MOTION[counts.name], counts.motion[chosen]),
         ):
             row += [f"{theirs[k][level]} / {ours[k, level]}" for k in range(len(printed.PRINTED_FRAMES))]
         rows.append(row)
     return [
-        f"## {TABLE_TITLES[sequence.name]}: survivors per level",
+        f"## {TABLE_TITLES[counts.name]}: survivors per level",
         "",
-        f"Walker at {sequence.velocity:g} leg lengths/s; of {N_PHASES} phases of frame 1 searched, "
-        f"{sequence.phase:.2f} of a cycle comes closest to the print among those at which §4.2 comes out as printed.",
+        *spread_lines(counts),
+        "At the one setting that is closest to all cells of both tables and of §4.2 together:",
         "",
         *table_lines(head, rows),
     ]
 
 
-def _frame1_lines(found: Sequence[Sequence1985]) -> list[str]:
-    rows = []
-    for sequence in found:
-        rules_12, grouped, final = printed.PRINTED_FINAL[sequence.name]
-        rows.append(
-            (
-                sequence.name.upper(),
-                f"{rules_12} / {sequence.motion[0, -1]}",
-                f"{grouped} / {sequence.groups_after_rules_1_2}",
-                f"{final} / {sequence.final[1]} ({plural(sequence.final[0], 'survivor')})",
-                "yes" if sequence.truth_survives else "no",
-            )
-        )
-    head = (
-        "",
-        "Rules 1-2: print / here",
-        "groups: print / here",
-        "Rules 3-5, groups: print / here",
-        "input among them",
-    )
+def _frame1_lines(found: Sequence[WalkCounts], chosen: int) -> list[str]:
     return [
         "## Frame 1 after grouping and Rules 3-5 (§4.2)",
         "",
-        f"Groups are of postures with every joint within {GROUPING_METRES * 100:g} cm of the group's representative. "
-        "The phases were chosen among those at which Rules 3-5 leave as many groups as the paper says, so that column "
-        "agrees by construction; the groups before it do not agree, because the paper's are finer.",
+        f"Groups are of postures with every joint within {GROUPING_METRES * 100:g} cm of the group's representative.",
         "",
-        *table_lines(head, rows),
+        *final_spread_lines(found, chosen),
     ]
 
 
-def _differences_lines(found: Sequence[Sequence1985]) -> list[str]:
+def _differences_lines(found: Sequence[WalkCounts], chosen: int) -> list[str]:
     return [
         "## Where this differs from the paper",
         "",
         "- The joints of SEQ1 and SEQ2 are not printed. The walker here is Boulic, Thalmann & Thalmann's (1990) on the "
-        "body of Table A.1, not Cutting's (1978), whose constants the paper does not give; velocity and phase are not "
-        "given either. So the counts can be compared in size, not digit for digit.",
+        "body of Table A.1, not Cutting's (1978), whose constants the paper does not give. So the counts can be "
+        "compared in size, not digit for digit.",
         "- The torso of Table A.1 is not flat, and its shoulders are put in front of the line from neck to pelvis; the "
         "pelvis is therefore not always square to its ray, as it seems to have been in the paper.",
         f"- The paper gives no tolerance for its distances; here it is {PAPER_TOLERANCE.rigid * 100:g} cm. It gives no "
         "thresholds for its rules and no size for its groups: see `WalkingThresholds` and `--group`.",
         "- Collision bodies are capsules of posekit's own figure; the paper's are not described.",
         *(
-            f"- {one.name.upper()}: the sum of |log2(here / print)| over the {2 * one.physical.size} cells is "
-            f"{one.distance:.1f}, {one.distance / (2 * one.physical.size):.2f} a cell: a factor of "
-            f"{2 ** (one.distance / (2 * one.physical.size)):.2f} on average."
+            f"- {one.name.upper()}: the sum of |log2(here / print)| over its {one.cells.shape[1]} cells is "
+            f"{one.distance[chosen]:.1f} at the closest setting."
             for one in found
         ),
         "",

@@ -5,8 +5,9 @@ at the coordinates of Table A.2. It is carried along with the walker, as on a tr
 upright and facing forward, so that its points rest.
 
 What the model leaves open is decided here. The hips stay level and the back leans against them, by 0 to 4
-degrees; the torso turns against the hips, by as much as they turn (`COUNTER_TORSION`); the neck undoes both.
-Arms swing in planes of the torso, legs in planes of the hips, without abduction and axial rotation.
+degrees and what a walker leans besides; the torso turns against the hips, by as much as they turn
+(`COUNTER_TORSION`); the neck undoes both. Arms swing in planes of the torso, legs in planes of the hips, without
+abduction and axial rotation.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ from posekit.synthesis.gait import Gait, GaitAngles
 COUNTER_TORSION = 1.0
 """How far the torso turns against the hips, as a fraction of the hips' torsion."""
 
+MOST_LEAN = np.radians(30.0)
+"""Radians by which a walker leans besides at most, either way."""
+
 NECK_HEAD_CENTRED = TABLE_A2.points[0]
 """The neck in the head-centred frame, metres (Table A.2a)."""
 
@@ -44,11 +48,13 @@ class Walker:
         The built-in one (Table A.1) unless told otherwise.
     velocity : float
         Leg lengths a second, 0.5 to 1.3 (Boulic et al. 1990, mid gait).
+    lean : float
+        How far the back leans forward besides, radians, at most `MOST_LEAN`; negative is backward.
 
     Raises
     ------
     InputError
-        Where the velocity lies outside.
+        Where the velocity or the lean lies outside.
 
     Examples
     --------
@@ -59,9 +65,15 @@ class Walker:
 
     figure: Figure = field(default_factory=load_figure)
     velocity: float = 1.0
+    lean: float = 0.0
 
     def __post_init__(self) -> None:
         _ = self.gait
+        if not abs(self.lean) <= MOST_LEAN:
+            raise InputError(
+                f"the walker leans by {np.degrees(self.lean):g} degrees; expected {-np.degrees(MOST_LEAN):g} to "
+                f"{np.degrees(MOST_LEAN):g}"
+            )
 
     @cached_property
     def gait(self) -> Gait:
@@ -93,7 +105,7 @@ class Walker:
             raise InputError(f"phases must be finite, of shape (N,); got shape {phases.shape}")
         gait = self.gait.angles(phases)
         # The torso turns against the hips, so that shoulders and hips swing in opposition.
-        R_torso = R_HEAD_REP103 @ _turned(-COUNTER_TORSION * gait.torsion, gait.lean)
+        R_torso = R_HEAD_REP103 @ self._torso(gait)
         R_hips = R_HEAD_REP103 @ _turned(gait.torsion, np.zeros_like(gait.torsion))
         neck = np.broadcast_to(NECK_HEAD_CENTRED, (len(phases), 3))
         head = neck[:, None] + self.figure.head_points[1:]
@@ -125,10 +137,14 @@ class Walker:
         """
         times = np.concatenate([[0.0], np.asarray(time, dtype=np.float64)])
         gait = self.gait.angles(self.phase(times, phase0))
-        up = _turned(-COUNTER_TORSION * gait.torsion, gait.lean)[:, :, 2]
+        up = self._torso(gait)[:, :, 2]
         back = up * self.figure.lengths["neck-pelvis"]
         place: Array = (self._root(times, gait) + back) @ R_HEAD_REP103.T
         return np.asarray(place[1:] - place[0])
+
+    def _torso(self, gait: GaitAngles) -> Array:
+        """Return the torso's rotations (N, 3, 3), REP-103 axes."""
+        return _turned(-COUNTER_TORSION * gait.torsion, gait.lean + self.lean)
 
     def _root(self, time: Array, gait: GaitAngles) -> Array:
         """Return the root's path (N, 3) in REP-103 axes, metres."""

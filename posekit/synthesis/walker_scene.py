@@ -30,8 +30,8 @@ SEQ2_CAMERA = (3.0, 0.0, 3.0)
 SEQ_VELOCITY = 0.7
 SEQ1_PHASE0 = 0.11
 SEQ2_PHASE0 = 0.68
-"""What the paper does not tell: the velocity (leg lengths/s), and the phase of frame 1 at which the survivors come
-closest to its Tables 3 and 4 (found by `posekit reproduce lee-chen`)."""
+"""What the paper does not tell: the velocity (leg lengths/s) and the phase of frame 1. The built-in sequences have
+these; `posekit reproduce lee-chen` takes none for granted and counts over all."""
 
 UP_WORLD = np.array([0.0, 1.0, 0.0])
 

@@ -118,6 +118,33 @@ def test_walker_crosses_the_ground_at_its_velocity_where_it_is_not_carried():
     np.testing.assert_allclose(moved, walker.travel(free.time, 0.3)[:, 0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("lean", [-4.0, 6.0])
+def test_a_lean_turns_the_torso_alone_about_the_level_axis(lean):
+    """Against the gait's own lean, measured in the points: hips, legs and head keep their directions."""
+    upright, leaning = (
+        FIGURE.forward_kinematics(Walker(velocity=0.8, lean=float(np.radians(by))).configurations(PHASES))
+        for by in (0.0, lean)
+    )
+
+    def back(points):
+        return points[:, JOINT["neck"]] - points[:, JOINT["pelvis"]]
+
+    cosine = (back(upright) * back(leaning)).sum(axis=1) / np.linalg.norm(back(upright), axis=1) ** 2
+    # Heading differs from straight ahead by the counter-torsion, about which the lean turns with it.
+    np.testing.assert_allclose(np.degrees(np.arccos(cosine)), abs(lean), rtol=0, atol=1e-6)
+    assert (np.sign(back(leaning)[:, 0] - back(upright)[:, 0]) == np.sign(lean)).all()
+    for a, b in (("pelvis", "right_hip"), ("left_hip", "left_knee"), ("right_knee", "right_ankle")):
+        before, after = (points[:, JOINT[b]] - points[:, JOINT[a]] for points in (upright, leaning))
+        np.testing.assert_allclose(before, after, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(upright[:, 14:], leaning[:, 14:], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("lean", [0.6, -0.6, np.nan, np.inf])
+def test_walkers_that_fall_over_are_refused(lean):
+    with pytest.raises(InputError, match=r"leans by .* degrees; expected -30 to 30"):
+        Walker(lean=lean)
+
+
 def test_other_people_walk_too():
     figure = FIGURE.from_stature(1.6)
     scene = walker_scene(Walker(figure=figure, velocity=0.9), frames=3, dt=0.1)
