@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -88,7 +89,8 @@ def _as_page(
     from posekit.conversion.composed import page_of
     from posekit.viewer.page.server import PageServer
 
-    return PageServer(page_of(content, behind, frames=frames, title=title), port)
+    made = partial(page_of, content, behind, title=title, served=True)
+    return PageServer(made(frames=frames), port, lambda number: made(frames=[number]))
 
 
 def _in_viser(

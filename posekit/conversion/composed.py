@@ -129,6 +129,7 @@ def page_of(
     *,
     frames: Sequence[int] | None,
     title: str,
+    served: bool = False,
 ) -> str:
     """Make the page of all survivors of some frames, all of them where these are None."""
     if isinstance(content, ObjectResult):
@@ -138,4 +139,5 @@ def page_of(
     from posekit.validation.page_findings import page_findings
     from posekit.viewer.page.page import page_html
 
-    return page_html(content, view, title=title, frames=frames, findings=page_findings(content))
+    found = page_findings(content)
+    return page_html(content, view, title=title, frames=frames, findings=found, served=served)

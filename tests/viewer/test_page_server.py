@@ -18,6 +18,7 @@ from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.viewer.page.server import PageServer
 from posekit.views.builtin import builtin_view
+from tests.viewer.driving import wait_until
 
 COMMAND = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
@@ -136,3 +137,35 @@ def test_frames_count_from_zero():
     assert view._frames("") is None
     assert view._frames("7") == range(7, 8)
     assert view._frames("0-2") == range(3)
+
+
+def test_what_does_not_fit_is_loaded_frame_by_frame(chromium, monkeypatch):
+    """The page holds few postures of each frame; a click leads to all of one, another back."""
+    monkeypatch.setattr("posekit.viewer.page.shown_survivors.PAGE_BYTES", 20_000)
+    result = result_of(recover(builtin_view("seq1")))
+    counts = [len(frame.joints) for frame in result.frames]
+    server = view._as_page(result, None, None, 0, title="walk")
+    with server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            for path in ("/frame/99", "/frame/-1", "/frame/", "/frame/1/", "/frame/1?x=1"):
+                assert ask(server, path)[0] == 404
+            tab = chromium.new_page()
+            tab.goto(server.url)
+            wait_until(tab, "page.state.drawn === true")
+            tab.evaluate("play.go(1)")
+            assert tab.evaluate("page.frame().held") < counts[1]
+            monkeypatch.undo()
+            tab.click("#rest a")
+            wait_until(tab, "typeof page === 'object' && page.state.drawn === true")
+            assert tab.url == f"{server.url}frame/1"
+            assert tab.evaluate("DATA.frames.map((one) => [one.number, one.held])") == [[1, counts[1]]]
+            tab.click("#rest a")
+            wait_until(
+                tab, "typeof page === 'object' && page.state.drawn === true && DATA.frames.length === 5"
+            )
+            tab.close()
+        finally:
+            server.shutdown()
+            thread.join()

@@ -37,13 +37,15 @@ def page_html(
     title: str = "posekit",
     frames: Sequence[int] | None = None,
     findings: PageFindings | None = None,
+    served: bool = False,
 ) -> str:
-    """Make the page, as text; see `write_page`."""
+    """Make the page, as text; see `write_page`. Where it is `served`, its frames have pages beside it."""
+    data = page_data(given, view, title=title, frames=frames, findings=findings) | {"served": served}
     return _file("page.html").format(
         policy=CONTENT_POLICY,
         title=html.escape(f"{title} - posekit" if title != "posekit" else title),
         style=_file("page.css"),
-        data=script_json(page_data(given, view, title=title, frames=frames, findings=findings)),
+        data=script_json(data),
         scripts="\n".join(_file(name) for name in PAGE_SCRIPTS),
     )
 

@@ -310,6 +310,12 @@ const page = (() => {
     showRest(order.length);
   }
 
+  function linked(address, words) {
+    const made = element("a", words);
+    made.href = address;
+    return made;
+  }
+
   // What is not in the table, and what is not in the page.
   function showRest(held) {
     const here = frame(), box = byId("rest"), lines = [];
@@ -323,9 +329,11 @@ const page = (() => {
       lines.push(made);
     }
     if (here.count > here.held) {
-      lines.push(element("p", `This page holds the ${here.held.toLocaleString("en")} likeliest of the ${here.count.toLocaleString("en")} postures of this frame. For more of them, a page of this frame alone:`));
-      lines.push(element("code", `posekit render RESULT --frame ${here.number} -o frame-${here.number}.html`));
+      const told = `This page holds the ${here.held.toLocaleString("en")} likeliest of the ${here.count.toLocaleString("en")} postures of this frame.`;
+      if (DATA.served) lines.push(element("p", told), linked(`/frame/${here.number}`, `this frame alone, with as many as fit`));
+      else lines.push(element("p", `${told} For more of them, a page of this frame alone:`), element("code", `posekit render RESULT --frame ${here.number} -o frame-${here.number}.html`));
     }
+    if (DATA.served && DATA.frames.length < (DATA.flips?.frames ?? 0)) lines.push(linked("/", "all frames"));
     if (here.unlisted > 0.0005) lines.push(element("p", `Further postures, which the result does not list, hold ${percent(here.unlisted)} at most.`));
     box.replaceChildren(...lines);
     box.hidden = !lines.length;
