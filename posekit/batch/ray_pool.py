@@ -9,8 +9,13 @@ from __future__ import annotations
 import os
 import re
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
+from ipaddress import ip_address
 from itertools import islice
 from types import TracebackType
 from typing import Any, Final, TypeVar
@@ -27,6 +32,9 @@ TASKS_AHEAD: Final = 2
 """Tasks in flight for each core of the cluster: one that runs and one that waits."""
 ANSWERS_WITHIN: Final = 10.0
 """Seconds for a cluster to answer at all: Ray itself waits for minutes, and complains meanwhile."""
+FOUND_WITHIN: Final = 30.0
+"""Seconds for `ray status` to find a cluster at an address, 1.3 s on a quiet machine: what listens may be no Ray."""
+LOOPBACK_SWITCH: Final = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 LEAST_RAY_VERSION: Final = (2, 55)
 """The oldest version whose retries are relied on."""
 
@@ -64,27 +72,44 @@ class RayPool:
                 f"--cluster: ray is {self.ray.__version__}; expected {'.'.join(map(str, LEAST_RAY_VERSION))} or later; "
                 "update it"
             )
-        self._call()
+        self._find()
         common: dict[str, Any] = {"log_to_driver": False, "logging_level": "error", "configure_logging": True}
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told of the run
         try:
             if self.address == LOCAL_CLUSTER:
-                self.ray.init(num_cpus=self.jobs, include_dashboard=False, **common)
+                with _loopback():
+                    self.ray.init(num_cpus=self.jobs, include_dashboard=False, **common)
             else:
                 self.ray.init(address=self.address, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
             raise self._refusal(short(str(error))) from None
+        where = self.ray.util.get_node_ip_address()
+        if self.address == LOCAL_CLUSTER and not ip_address(where).is_loopback:
+            self.ray.shutdown()
+            raise self._refusal(f"ray {self.ray.__version__} listens on {where}, not on this machine alone")
         return self
 
-    def _call(self) -> None:
-        """Refuse an address where nothing listens."""
-        found = re.fullmatch(r"(?:ray://)?\[?([^/\[\]]+?)\]?:(\d{1,5})", self.address)
+    def _find(self) -> None:
+        """Refuse an address where nothing listens, or something else than a cluster: Ray would wait for minutes."""
+        found = re.fullmatch(r"(ray://)?\[?([^/\[\]]+?)\]?:(\d{1,5})", self.address)
         if found is None:
             return  # local, auto, or what Ray refuses at once
         try:
-            socket.create_connection((found[1], int(found[2])), ANSWERS_WITHIN).close()
+            socket.create_connection((found[2], int(found[3])), ANSWERS_WITHIN).close()
         except (OSError, OverflowError, UnicodeError) as error:
             raise self._refusal(f"nothing answers there ({short(str(error))})") from None
+        if found[1]:
+            return  # Ray's own client has a bound
+        status = [sys.executable, "-m", "ray.scripts.scripts", "status", "--address", self.address]
+        try:
+            done = subprocess.run(status, capture_output=True, check=False, timeout=FOUND_WITHIN)
+        except subprocess.TimeoutExpired:
+            raise self._refusal(f"no cluster is found there within {FOUND_WITHIN:g} s") from None
+        if done.returncode:
+            lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            raise self._refusal(
+                f"no cluster is found there ({short(lines[-1] if lines else 'no reason said')})"
+            )
 
     def _refusal(self, why: str) -> InputError:
         return InputError(
@@ -128,3 +153,21 @@ class RayPool:
         return Outcome(
             item=item, value=report.value, error=report.error, fatal=report.fatal, peak=report.peak
         )
+
+
+@contextmanager
+def _loopback() -> Iterator[None]:
+    """Let Ray listen on 127.0.0.1 alone, as it does by itself where there are no clusters: on Windows and macOS.
+
+    The switch is for the processes that it starts; here it was read when Ray was imported.
+    """
+    constants: Any = import_module("ray._private.ray_constants")
+    kept = os.environ.get(LOOPBACK_SWITCH), getattr(constants, "ENABLE_RAY_CLUSTER", True)
+    os.environ[LOOPBACK_SWITCH], constants.ENABLE_RAY_CLUSTER = "0", False
+    try:
+        yield
+    finally:
+        os.environ.pop(LOOPBACK_SWITCH)
+        if kept[0] is not None:
+            os.environ[LOOPBACK_SWITCH] = kept[0]
+        constants.ENABLE_RAY_CLUSTER = kept[1]

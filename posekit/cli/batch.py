@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -117,7 +117,8 @@ def batch(
         shard_frames=shard_frames,
     )
     try:
-        with _shown(show_progress) as progress:
+        # Ray prints from a thread of its own that a worker died.
+        with _shown(show_progress) as progress, redirect_stdout(sys.stderr):
             summary = run_batch(
                 inputs,
                 output,
