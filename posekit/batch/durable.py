@@ -48,10 +48,12 @@ def whole(path: Path, parts: Path) -> Iterator[BinaryIO]:
             file.close()
             part.replace(path)
             _sync_folder(path.parent)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):  # it tries once more to write what the disk refused
             file.close()
         part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno in DISK_FULL_ERRORS:
+            raise _refused(path, error) from None
         raise
 
 
@@ -61,11 +63,15 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = cut(error.strerror or str(error))
-        remedy = "make space" if error.errno in DISK_FULL_ERRORS else "check the folder and its permissions"
-        raise OutputError(
-            str(refusal(path, "", reason, "a file that can be written", f"{remedy}, and run it again"))
-        ) from None
+        raise _refused(path, error) from None
+
+
+def _refused(path: Path, error: OSError) -> OutputError:
+    reason = cut(error.strerror or str(error))
+    remedy = "make space" if error.errno in DISK_FULL_ERRORS else "check the folder and its permissions"
+    return OutputError(
+        str(refusal(path, "", reason, "a file that can be written", f"{remedy}, and run it again"))
+    )
 
 
 def write_document(path: Path, document: object, parts: Path) -> None:

@@ -26,6 +26,7 @@ from posekit.batch import (
     run_batch,
     run_shard,
     shard_paths,
+    staging,
     write_view_table,
 )
 from posekit.batch import run as run_module
@@ -302,19 +303,23 @@ def test_a_full_disk_is_an_error_and_nothing_half_written_counts(archive: Path, 
     assert run_batch([archive / "a.parquet"], out, large).frames == 9
 
 
-@pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_disk_that_fails_at_the_end_leaves_nothing(
-    call: str, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("of", "call"),
+    [(staging, "write_rows"), (os, "fsync"), (Path, "replace")],
+    ids=["staging", "fsync", "replace"],
+)
+def test_a_disk_that_fails_leaves_nothing(
+    of: Any, call: str, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
     run_batch([archive / "c.parquet"], out, RECIPE)
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
         raise full
 
     with monkeypatch.context() as patch:
-        patch.setattr(os if call == "fsync" else Path, call, refuse)
+        patch.setattr(of, call, refuse)
         with pytest.raises(InputError, match="No space left on device"):
             run_batch([archive], out, RECIPE)
     assert len(shard_paths(out)) == 1 and list((out / PARTS_FOLDER).iterdir()) == []
