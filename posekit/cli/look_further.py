@@ -8,7 +8,9 @@ from pathlib import Path
 from posekit.cli.terminal import say
 
 
-def further_lines(result: Path, view: Path | None, program: str = "posekit") -> list[str]:
+def further_lines(
+    result: Path, view: Path | None, program: str = "posekit", *, moving: str = ".bvh"
+) -> list[str]:
     """List the commands that show, draw and convert a result.
 
     Parameters
@@ -17,9 +19,10 @@ def further_lines(result: Path, view: Path | None, program: str = "posekit") -> 
         The file that was written.
     view : Path, optional
         The view that it was recovered from.
-
     program : str
         How this command is called.
+    moving : str
+        The end of the name of a format that carries what moves.
 
     Examples
     --------
@@ -30,18 +33,21 @@ def further_lines(result: Path, view: Path | None, program: str = "posekit") -> 
       posekit view out.npz --view 'my walk.json'
       posekit render out.npz -o out.png
       posekit convert out.npz out.bvh
+    >>> further_lines(Path("out.json.gz"), None)[-1]
+    '  posekit convert out.json.gz out.bvh'
     """
     name = shlex.quote(str(result))
+    plain = result.with_suffix("") if result.suffix == ".gz" else result
     beside = "" if view is None else f" --view {shlex.quote(str(view))}"
     return [
         "look further:",
         f"  {program} view {name}{beside}",
-        f"  {program} render {name} -o {shlex.quote(str(result.with_suffix('.png')))}",
-        f"  {program} convert {name} {shlex.quote(str(result.with_suffix('.bvh')))}",
+        f"  {program} render {name} -o {shlex.quote(str(plain.with_suffix('.png')))}",
+        f"  {program} convert {name} {shlex.quote(str(plain.with_suffix(moving)))}",
     ]
 
 
-def tell_further(result: Path, view: Path | None = None) -> None:
+def tell_further(result: Path, view: Path | None = None, *, moving: str = ".bvh") -> None:
     """Print what to type next.
 
     Parameters
@@ -50,8 +56,10 @@ def tell_further(result: Path, view: Path | None = None) -> None:
         The file that was written.
     view : Path, optional
         The view that it was recovered from.
+    moving : str
+        The end of the name of a format that carries what moves.
     """
     from posekit.cli.demo import program
 
-    for line in further_lines(result, view, program()):
+    for line in further_lines(result, view, program(), moving=moving):
         say(line)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from posekit.cli.judging_options import Tolerances
+from posekit.cli.look_further import tell_further
 from posekit.cli.options import about, progress
 from posekit.cli.terminal import say
 from posekit.errors import InputError
@@ -60,3 +61,5 @@ def recover_object(
     for line in objects.object_lines(result):
         say(line)
     say(f"written: {output}")
+    if any(len(frame) for frame in result.frames):
+        tell_further(output, moving=".trc")

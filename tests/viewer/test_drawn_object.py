@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -158,3 +159,16 @@ def test_the_page_shows_one_posture_or_all(arm, chromium, tmp_path):
     assert tab.evaluate("document.documentElement.scrollWidth") <= 420
     tab.close()
     assert wrong == []
+
+
+def test_the_commands_that_recover_names_next_run(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_samples(tmp_path)
+    words = ("--linkage", "panda", "--scale", "closure")
+    done = command("recover", "gripper.json", "-o", "arm.out.json", *words)
+    told = [shlex.split(line)[1:] for line in done.out.partition("look further:\n")[2].splitlines()]
+    assert [one[0] for one in told] == ["view", "render", "convert"]
+    for one in told[1:]:
+        ended = command(*one)
+        assert ended.code == 0, ended.err
+    assert {"arm.out.png", "arm.out.trc"} <= {path.name for path in tmp_path.iterdir()}
