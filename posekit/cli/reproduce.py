@@ -11,19 +11,21 @@ from posekit.cli.options import Pictures, examples, option
 from posekit.cli.terminal import say
 from posekit.errors import InputError
 
-PAPER_NAMES = ("lee-chen", "taylor")
-REPRODUCE_EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
+PAPER_NAMES = ("all", "lee-chen", "taylor")
+REPRODUCE_EXAMPLES = examples(
+    "posekit reproduce all -o papers", "posekit reproduce lee-chen -o tables --effort fine"
+)
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen or taylor.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="all, lee-chen or taylor.")],
     output: Annotated[Path, option("--output", "DIR", "Where to write the tables.", short="-o")],
     pictures: Pictures = True,
     effort: Annotated[
         str, option("--effort", "quick|fine", "Over how many settings of the walker lee-chen counts.")
     ] = "quick",
 ) -> None:
-    """Write a paper's tables, reproduced, beside what it prints."""
+    """Write what a paper prints, reproduced beside it; of all, each row with its check in one page."""
     from posekit import papers
     from posekit.safe_io.writing import make_folder
 
@@ -33,13 +35,17 @@ def reproduce(
         )
     work = _effort(effort)
     make_folder(output)
-    if paper == "lee-chen":
-        lines = papers.reproduce_lee_chen(output, pictures=pictures, effort=work)
-    else:
+    if paper == "taylor":
         lines = papers.reproduce_taylor(output, pictures=pictures)
+    else:
+        make = papers.reproduce_all if paper == "all" else papers.reproduce_lee_chen
+        lines = make(output, pictures=pictures, effort=work)
     for line in lines:
         say(line)
-    say(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")
+    names = (
+        ("papers.html", "papers.md", "papers.json") if paper == "all" else (f"{paper}.md", f"{paper}.json")
+    )
+    say(f"written: {', '.join(str(output / name) for name in names)}")
 
 
 def _effort(text: str) -> Literal["quick", "fine"]:

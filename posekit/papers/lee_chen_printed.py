@@ -80,3 +80,41 @@ PRINTED_MOTION: Final = {
 
 PRINTED_FINAL: Final = {"seq1": (32, 16, 2), "seq2": (6, 6, 1)}
 """Frame 1 after Rules 1-2, after grouping, after Rules 3-5 (§4.2)."""
+
+TABLE_1: Final = {
+    "shoulder.flexion": (-50.0, 180.0),
+    "shoulder.abduction": (-50.0, 180.0),
+    "elbow.flexion": (0.0, 160.0),
+    "hip.flexion": (-40.0, 120.0),
+    "hip.flexion_with_straight_knee": (-40.0, 90.0),
+    "hip.abduction": (-30.0, 45.0),
+    "knee.flexion": (0.0, 130.0),
+    "pelvis.flexion": (-30.0, 75.0),
+    "pelvis.rotation": (-30.0, 30.0),
+    "pelvis.bending": (-35.0, 35.0),
+    "neck.flexion": (-55.0, 45.0),
+    "neck.rotation": (-70.0, 70.0),
+    "neck.bending": (-40.0, 40.0),
+}
+"""Table 1, degrees: extension and adduction are the negative sides of flexion and abduction."""
+
+TABLE_A1: Final = {
+    ("neck", "right_shoulder"): 20.5,
+    ("neck", "left_shoulder"): 20.5,
+    ("neck", "pelvis"): 46.3,
+    ("right_shoulder", "pelvis"): 50.2,
+    ("left_shoulder", "pelvis"): 50.2,
+    ("right_shoulder", "left_shoulder"): 40.3,
+    ("right_shoulder", "right_elbow"): 30.0,
+    ("left_shoulder", "left_elbow"): 30.0,
+    ("right_elbow", "right_wrist"): 26.0,
+    ("left_elbow", "left_wrist"): 26.0,
+    ("pelvis", "right_hip"): 19.0,
+    ("pelvis", "left_hip"): 19.0,
+    ("right_hip", "left_hip"): 32.2,
+    ("right_hip", "right_knee"): 38.0,
+    ("left_hip", "left_knee"): 38.0,
+    ("right_knee", "right_ankle"): 37.0,
+    ("left_knee", "left_ankle"): 37.0,
+}
+"""Table A.1, centimetres."""

@@ -8,17 +8,15 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.formats.markdown import table_lines
-from posekit.papers.taylor_constrained import Constrained, constrained, constrained_lines
-from posekit.papers.taylor_random_views import RandomViews, random_views_lines, view_at_random
-from posekit.papers.taylor_study import Study, synthetic_study
+from posekit.papers.taylor_constrained import Constrained, constrained_lines
+from posekit.papers.taylor_random_views import RandomViews, random_views_lines
+from posekit.papers.taylor_rows import TaylorWork, find_taylor
+from posekit.papers.taylor_study import Study
 from posekit.recovery.taylor_figure.proportions import TABLE_1
 from posekit.safe_io.writing import write_json, write_lines
 
-N_PICTURES = 100
-"""Synthetic photographs: enough for a table in half a minute."""
 
-
-def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
+def reproduce_taylor(folder: Path, *, pictures: bool = True, work: TaylorWork | None = None) -> list[str]:
     """Write ``taylor.md`` and ``taylor.json`` into a folder, the curves of Figs. 7b and 8b, and random views.
 
     Parameters
@@ -27,15 +25,15 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         Must exist.
     pictures : bool
         Whether to draw the curves too.
+    work : TaylorWork, optional
+        What was calculated before.
 
     Returns
     -------
     list of str
         The lines of the report.
     """
-    objects = constrained()
-    views = [view_at_random(one, posed=posed) for posed in (False, True) for one in objects]
-    study = synthetic_study(N_PICTURES)
+    objects, views, study = work or find_taylor()
     lines = [
         "# Taylor 2000, reproduced",
         "",
