@@ -12,15 +12,23 @@ import numpy as np
 from posekit.display.plural import plural
 from posekit.errors import ViewerError
 from posekit.formats.own.object_result import ObjectResult
-from posekit.viewer.scene.drawn_object import DrawnObject, add_object
+from posekit.geometry import Array
+from posekit.viewer.page.shown_survivors import most_of_each
+from posekit.viewer.scene.drawn_object import JOINT_SHARE, SEGMENT_SHARE, DrawnObject, add_slot
 from posekit.viewer.scene.framing import fitted_eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.stage import add_stage
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import script_json, standalone_page
 
-MOST_PAGE_OBJECTS: Final = 1500
-"""Postures in one page: 10 MB at most."""
+PAGE_OBJECT_BYTES: Final = 8_000_000
+"""Bytes of the postures in a page, which is below 10 MB then."""
+
+POINT_BYTES, SAID_BYTES = 30, 160
+"""Bytes of one point of a posture, and of what is said of it."""
+
+OBJECTS_AT_ONCE: Final = 12
+"""Postures that are drawn in each other."""
 
 PAGE_AZIMUTH, PAGE_ELEVATION, PAGE_FOV = 35.0, 14.0, 25.0
 """Degrees: from where the page looks at first."""
@@ -31,7 +39,9 @@ PAGE_BODY: Final = """
 <p>{said}</p>
 <label id="frame-row">frame <input id="frame" type="range" min="0" max="{last}" value="0">
 <output id="frame-said"></output></label>
-<div id="postures" role="group" aria-label="postures of the frame"></div>
+<label id="posture-row">posture <input id="posture" type="range" min="0" value="0">
+<output id="number"></output></label>
+<button id="all" type="button"></button>
 <p id="posture-said" role="status"></p>
 </div>
 """
@@ -52,7 +62,7 @@ def object_page(result: ObjectResult, *, title: str = "posekit", frames: Sequenc
     Raises
     ------
     ViewerError
-        Where there is no posture, or more than fit a page.
+        Where there is no posture, or no such frame.
     """
     subject = DrawnObject.of(result)
     chosen = range(len(subject.frames)) if frames is None else frames
@@ -60,29 +70,37 @@ def object_page(result: ObjectResult, *, title: str = "posekit", frames: Sequenc
         raise ViewerError(
             f"--frames: {chosen[0]}-{chosen[-1]}; expected numbers from 0 to {len(subject.frames) - 1}"
         )
-    count = sum(len(subject.frames[k]) for k in chosen)
-    if count > MOST_PAGE_OBJECTS:
-        raise ViewerError(
-            f"{plural(count, 'posture')} in one page; expected at most {MOST_PAGE_OBJECTS:,}; choose frames, as "
-            "--frames 0-9"
-        )
-    world = upright_world(np.concatenate([subject.frames[k].points.reshape(-1, 3) for k in chosen]))
-    scene, data, drawn = Scene(), [], []
-    for place, k in enumerate(chosen):
-        postures = []
-        for number, points in zip(
-            subject.rows[k].tolist(), world.place(subject.frames[k].points), strict=True
-        ):
-            add_object(scene, f"frame-{place}/posture-{number}", points, subject)
-            drawn.append(points)
-            postures.append([number, _said(result, k, number)])
-        scene.show(f"/meshcat/frame-{place}", place == 0)
-        data.append(
-            {"number": k, "time": result.frames[k].time, "postures": postures, "none": _none(result, k)}
-        )
-    points = np.concatenate(drawn)
+    counts = [len(subject.frames[k]) for k in chosen]
+    each = most_of_each(counts, PAGE_OBJECT_BYTES // (SAID_BYTES + POINT_BYTES * len(result.points)))
+    held = [world_points[:each] for world_points in (subject.frames[k].points for k in chosen)]
+    world = upright_world(np.concatenate([one.reshape(-1, 3) for one in held]))
+    placed = [world.place(one) for one in held]
+    data = {
+        "segments": subject.segments.tolist(),
+        "joint": JOINT_SHARE * subject.extent,
+        "segment": SEGMENT_SHARE * subject.extent,
+        "slots": OBJECTS_AT_ONCE,
+        "frames": [
+            {
+                "number": k,
+                "time": result.frames[k].time,
+                "count": len(subject.frames[k]),
+                "none": result.frames[k].reason or "no posture is left",
+                "postures": [
+                    {"number": row, "said": _said(result, k, row), "points": _points(points)}
+                    for row, points in zip(subject.rows[k].tolist(), bodies, strict=False)
+                ],
+            }
+            for k, bodies in zip(chosen, placed, strict=True)
+        ],
+    }
+    scene = Scene()
+    for slot in range(min(OBJECTS_AT_ONCE, max(counts))):
+        add_slot(scene, f"slot-{slot}", subject)
+    points = np.concatenate([one.reshape(-1, 3) for one in placed])
     add_stage(scene, points, ground=subject.to_scale)
-    eye = fitted_eye(points, world, azimuth=PAGE_AZIMUTH, elevation=PAGE_ELEVATION, fov=PAGE_FOV)
+    count = sum(counts)
+    eye = fitted_eye(points, world, azimuth=PAGE_AZIMUTH, elevation=PAGE_ELEVATION, fov=PAGE_FOV, aspect=1.0)
     told = f"{plural(count, 'posture')} of {result.linkage} in {plural(len(chosen), 'frame')}"
     return standalone_page(
         scene,
@@ -99,12 +117,12 @@ def _said(result: ObjectResult, frame: int, row: int) -> str:
     one = result.frames[frame]
     verdict = {True: "its robot reaches it", False: "no configuration within limits was found", None: ""}
     unit = "a metre" if result.unit is not None else "a unit"
-    said = [verdict[one.certified[row]], one.reasons[row], f"{one.scales[row]:.5g} pixels {unit}"]
+    said = [one.reasons[row] or verdict[one.certified[row]], f"{one.scales[row]:.5g} pixels {unit}"]
     return "; ".join(part for part in said if part)
 
 
-def _none(result: ObjectResult, frame: int) -> str:
-    return result.frames[frame].reason or "no posture is left"
+def _points(points: Array) -> list[list[float] | None]:
+    return [np.round(point, 4).tolist() if np.isfinite(point).all() else None for point in points]
 
 
 def _file(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 from dataclasses import replace
 
@@ -18,6 +20,10 @@ from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.drawn_object import DrawnObject, compose_object
 from posekit.viewer.scene.world import upright_world
 from tests.viewer.driving import wait_until
+
+NODE_AT = """let node = viewer.scene_tree; for (const name of path.split("/")) node = node.children[name];"""
+VISIBLE_NODE = f"(path) => {{ {NODE_AT} return node.object.visible; }}"
+MATRIX_OF_NODE = f"(path) => {{ {NODE_AT} node.object.updateMatrix(); return node.object.matrix.elements; }}"
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +127,23 @@ def test_configurations_are_judged_by_the_robot_that_they_are_of(arm, command):
     assert "none of which a configuration within limits is known" in done.err
 
 
+def test_a_page_of_many_postures_stays_small_and_says_how_many_it_holds(arm, monkeypatch):
+    _, result = arm
+    one = result.frames[0]
+    pick = np.resize([0, 1], 9000)
+    many = replace(
+        one,
+        **{name: getattr(one, name)[pick] for name in ("points", "flips", "scales", "q", "fk_distance")},
+        **{name: tuple(getattr(one, name)[k] for k in pick) for name in ("branches", "certified", "reasons")},
+        margins={},
+    )
+    page = object_page(replace(result, frames=[many] * 10))
+    assert len(page.encode()) < 10e6
+    data = json.loads(re.search(r"const OBJECT = (.*);\n", page)[1])
+    assert {frame["count"] for frame in data["frames"]} == {9000}
+    assert {len(frame["postures"]) for frame in data["frames"]} == {2162}
+
+
 def test_a_picture_has_every_segment(arm, tmp_path):
     _, result = arm
     assert posekit.render(result, tmp_path / "arm.png") == 1
@@ -143,19 +166,29 @@ def test_the_page_shows_one_posture_or_all(arm, chromium, tmp_path):
     tab.goto(path.as_uri())
     wait_until(tab, "typeof objectPage === 'object'")
     assert "4 postures of panda in 2 frames" in tab.inner_text("#object")
-    assert tab.locator("#postures button").all_inner_texts() == ["0", "1", "all"]
-    assert "its robot reaches it; 500 pixels a metre" in tab.inner_text("#posture-said")
-    shown = """(path) => { let node = viewer.scene_tree; for (const name of path.split("/")) node = node.children[name];
-        return node.object.visible; }"""
-    places = [f"meshcat/frame-{k}/posture-{n}" for k in (0, 1) for n in (0, 1)]
-    assert [tab.evaluate(shown, place) for place in places[:2]] == [True, False]
-    tab.focus("#postures button >> nth=2")
+    assert "posture 0: its robot reaches it; 500 pixels a metre" in tab.inner_text("#posture-said")
+    # A cylinder stands where its segment is, and is as long.
+    subject = DrawnObject.of(result)
+    world = upright_world(np.concatenate([one.points.reshape(-1, 3) for one in subject.frames]))
+    for number in (0, 1):
+        ends = world.place(subject.frames[0].points[number])[subject.segments]
+        for k, (start, end) in enumerate(ends):
+            node = f"meshcat/slot-0/segment-{k}"
+            matrix = np.reshape(tab.evaluate(MATRIX_OF_NODE, node), (4, 4)).T
+            np.testing.assert_allclose(matrix[:3, 3], (start + end) / 2, atol=2e-4)
+            np.testing.assert_allclose(matrix[:3, 1], end - start, atol=2e-4)
+            assert np.linalg.det(matrix[:3, :3]) > 0
+        tab.focus("#posture")
+        tab.keyboard.press("ArrowRight")
+    assert "posture 1: " in tab.inner_text("#posture-said")
+    shown = [f"meshcat/slot-{k}" for k in (0, 1)]
+    assert [tab.evaluate(VISIBLE_NODE, one) for one in shown] == [True, False]
+    tab.focus("#all")
     tab.keyboard.press("Enter")
-    assert [tab.evaluate(shown, place) for place in places[:2]] == [True, True]
+    assert [tab.evaluate(VISIBLE_NODE, one) for one in shown] == [True, True]
     tab.focus("#frame")
     tab.keyboard.press("ArrowRight")
     assert "1 (0.500 s)" in tab.inner_text("#frame-row")
-    assert [tab.evaluate(shown, f"meshcat/frame-{k}") for k in (0, 1)] == [False, True]
     assert tab.evaluate("document.documentElement.scrollWidth") <= 420
     tab.close()
     assert wrong == []

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +17,7 @@ from posekit.viewer.scene.colours import GROUP_RGB, rgb
 from posekit.viewer.scene.compose import MAX_POSTURES_DRAWN, Composition, Style, side_by_side
 from posekit.viewer.scene.drawn_subject import Shown
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.shapes import add_ball, add_tubes, matte
+from posekit.viewer.scene.shapes import UNIT_BALL, add_ball, add_tubes, glow, matte
 from posekit.viewer.scene.stage import add_stage
 from posekit.viewer.scene.world import World
 
@@ -123,6 +124,15 @@ def add_object(scene: Scene, name: str, points: Array, subject: DrawnObject) -> 
     add_tubes(scene, f"{name}/segments", starts, ends, colours, radius=SEGMENT_SHARE * subject.extent)
     for k, point in enumerate(points):
         add_ball(scene, f"{name}/joint-{k}", point, JOINT_SHARE * subject.extent, matte(OBJECT_JOINT_RGB))
+
+
+def add_slot(scene: Scene, name: str, subject: DrawnObject) -> None:
+    """Add balls and cylinders of the unit's size below ``/meshcat/NAME``, for a page to put in place."""
+    for k in range(len(subject.segments)):
+        colour = glow(GROUP_RGB[k % len(GROUP_RGB)])
+        scene.meshcat[f"{name}/segment-{k}"].set_object(mg.Cylinder(1.0, 1.0), colour)
+    for k in range(subject.frames[0].points.shape[1]):
+        scene.meshcat[f"{name}/joint-{k}"].set_object(UNIT_BALL, matte(OBJECT_JOINT_RGB))
 
 
 def compose_object(
