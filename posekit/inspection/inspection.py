@@ -65,11 +65,15 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
         from posekit.robots import load_robot
 
         robot = load_robot(path)
-        bodies = 0 if robot.geometry is None else robot.geometry.ngeoms
+        can = (
+            f"{plural(len(robot.collision_pairs), 'pair')} of which"
+            if robot.collision_pairs
+            else "no pair of which"
+        )
         return [
             *lines,
             f"{plural(robot.model.njoints - 1, 'joint')}, {robot.model.nq} numbers in a configuration, "
-            f"{bodies} collision bodies",
+            f"{plural(len(robot.body_names), 'collision body')}, {can} can collide",
         ]
     if what.holds is Content.CONFIGURATIONS:
         found = configurations_of(path, what)

@@ -34,8 +34,9 @@ def draw_configurations(robot: Robot, count: int, rng: np.random.Generator) -> A
     q = np.tile(pin.neutral(robot.model), (count, 1))
     for at in space.bounded_q:
         lower, upper = float(space.lower[at]), float(space.upper[at])
-        if upper - lower > 2 * math.pi:
-            lower, upper = max(lower, -math.pi), min(upper, math.pi)
+        if upper - lower > 2 * math.pi:  # the turn that is nearest to zero
+            lower = min(max(lower, -math.pi), upper - 2 * math.pi)
+            upper = lower + 2 * math.pi
         q[:, at] = rng.uniform(lower, upper, count)
     for at in space.turn_q:
         angle = rng.uniform(-np.pi, np.pi, count)

@@ -132,6 +132,8 @@ def said_of(report: ValidationReport) -> list[str]:
         angle != EXACT_TOLERANCE.angle or str(told.get("contact_margin")).startswith("-")
     ):
         lines.append(f"judged with {angle:g} degrees of tolerance")
+    if told.get("bodies_because"):
+        lines.append(f"collision is judged by bodies that are made up: {told['bodies_because']}")
     if told.get("why"):
         lines.append(str(told["why"]))
     return lines

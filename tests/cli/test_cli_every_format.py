@@ -81,7 +81,11 @@ def test_inspect_tells_a_robot_and_a_table_of_survivors(
 ) -> None:
     told = command("inspect", walks["urdf"] / "figure.urdf")
     assert told.out.splitlines()[0].endswith("figure.urdf: a robot")
-    assert "29 numbers in a configuration" in told.out
+    assert "29 numbers in a configuration, 11 collision bodies, 34 pairs of which can collide" in told.out
+    (tmp_path / "one.urdf").write_text(
+        '<robot name="r"><link name="a"><collision><geometry><sphere radius="1"/></geometry></collision></link></robot>'
+    )
+    assert ", 1 collision body, no pair of which can collide" in command("inspect", tmp_path / "one.urdf").out
     assert command("recover", walks["view"], "-o", tmp_path / "r.npz").code == 0
     assert command("convert", tmp_path / "r.npz", tmp_path / "r.csv", "--posture", "all").code == 0
     assert "a table of survivors (csv)" in command("inspect", tmp_path / "r.csv").out

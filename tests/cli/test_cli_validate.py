@@ -47,6 +47,7 @@ def test_joints_are_judged_on_a_robot_by_name(run) -> None:
     bent[0, JOINTS.index("right_ankle")] += [0.30, 0.0, 0.0]  # the shank longer by a third
     np.savez("p.npz", joints=np.concatenate([STANDING, bent, STANDING]))
     outcome = run("p.npz", "--urdf", "human", "-o", "report.json")
+    assert "made up: no pair of the robot's own bodies can collide" in outcome.out
     assert (outcome.code, outcome.err) == (1, "")
     assert outcome.out.splitlines()[0] == "3 postures: 2 valid, 1 invalid, 0 undecided"
     assert "rigid-parts/right_knee-right_ankle 1" in outcome.out

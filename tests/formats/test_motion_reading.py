@@ -150,6 +150,11 @@ def test_clips_are_taken_by_name():
     assert (run.rate, run.actions, run.clips) == (25.0, ("fast",), ("run",))
     with pytest.raises(InputError, match="did you mean run"):
         two.of_clip("runn")
+    empty = motion(
+        clip=0 * clip, clips=("walk", "run"), actions=("on foot", "fast"), rates=np.array([50.0, 25.0])
+    )
+    with pytest.raises(InputError, match='clip "run": got no frame'):
+        empty.of_clip("run")
 
 
 def test_each_format_says_what_it_is():

@@ -12,12 +12,34 @@ from posekit.objects import (
 )
 from posekit.objects.certify import Certifier
 from posekit.objects.drawn_views import draw_configurations
+from posekit.robots import Robot
 
 
 def robot_of(thing):
     """Return the robot of an object that has one."""
     assert thing.robot is not None
     return thing.robot
+
+
+@pytest.mark.parametrize(
+    ("limits", "window"),
+    [
+        ((10, 20), (10, 10 + 2 * np.pi)),
+        ((-20, -10), (-10 - 2 * np.pi, -10)),
+        ((-20, 20), (-np.pi, np.pi)),
+        ((-1, 20), (-1, 2 * np.pi - 1)),
+        ((1, 1.5), (1, 1.5)),
+    ],
+)
+def test_a_joint_is_drawn_within_its_limits_over_the_turn_nearest_to_zero(limits, window):
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 0 1"/><limit lower="{}" upper="{}" effort="1" velocity="1"/></joint></robot>'
+    )
+    robot = Robot(urdf=text.format(*limits), free_flyer=False)
+    (drawn,) = draw_configurations(robot, 2000, np.random.default_rng(0)).T
+    np.testing.assert_allclose((drawn.min(), drawn.max()), window, atol=0.02)
+    assert drawn.min() >= limits[0] and drawn.max() <= limits[1]
 
 
 class TestCertifier:

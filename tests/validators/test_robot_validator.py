@@ -88,7 +88,9 @@ def test_what_was_judged_is_described() -> None:
     assert "stick figure's SRDF" in settings["pairs_from"]
     own = Validator("talos").describe()
     assert own["pairs_from"] == "the SRDF"
-    assert "collision bodies" in own["bodies"]
+    assert "collision bodies" in own["bodies"] and "bodies_because" not in own
+    assert settings["bodies_because"] == "no pair of the robot's own bodies can collide"
+    assert "bodies_because" not in Validator(HUMAN, bodies="capsules").describe()
 
 
 @pytest.mark.parametrize("subject", ["human", "figure"])

@@ -174,6 +174,8 @@ class Models:
                 "pairs_from": PAIRS_FROM[self.robot.pairs_from if self.bodies == "urdf" else self.bodies],
                 "pairs": list(self.own.subject.pair_names),
             }
+            if self.settings.bodies != self.bodies == "capsules":
+                settings["bodies_because"] = "no pair of the robot's own bodies can collide"
         return settings
 
     def _scaled(self, lengths: Mapping[str, float], behind: bool | None) -> JudgedModel:

@@ -151,13 +151,17 @@ class Motion(Pictured):
         Raises
         ------
         InputError
-            Where there is no such clip.
+            Where there is no such clip, or no frame in it.
         """
         if name not in self.clips:
             near = nearest(name, self.clips)
             raise refusal(self.source, "clips", shown(name), f"one of its {len(self.clips)}", cut(near))
         index = self.clips.index(name)
         rows = np.flatnonzero(self.clip == index)
+        if not len(rows):
+            raise refusal(
+                self.source, f"clip {shown(name)}", "no frame", "one or more", "choose another clip"
+            )
         return Motion(
             names=self.names,
             points=self.points[rows],
