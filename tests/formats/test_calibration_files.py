@@ -394,7 +394,8 @@ def test_colmap_pictures_have_poses_but_no_metres(tmp_path: Path) -> None:
         ("1 PINHOLE 1.5 10 1 2 3 4", "whole"),
         ("1 PINHOLE 10 10 1 2 3 4\n1 PINHOLE 10 10 1 2 3 4", "twice"),
         ("# nothing", "no camera"),
-        ("1 PINHOLE", "2 words"),
+        ("1 PINHOLE", 'got "1 PINHOLE"; expected CAMERA_ID'),
+        ("fx=900", "as in COLMAP's cameras.txt; correct the file, or name a calibration in TOML"),
     ],
 )
 def test_damaged_colmap_cameras(text: str, says: str, tmp_path: Path) -> None:

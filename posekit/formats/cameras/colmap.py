@@ -87,9 +87,9 @@ def _read_cameras(path: Path) -> dict[str, dict[str, Any]]:
             continue
         place = f"line {number}"
         if len(words) < 5:
-            raise refusal(
-                path, place, f"{len(words)} words", "CAMERA_ID MODEL WIDTH HEIGHT PARAMS", "correct the file"
-            )
+            expected = "CAMERA_ID MODEL WIDTH HEIGHT PARAMS, as in COLMAP's cameras.txt"
+            remedy = "correct the file, or name a calibration in TOML, YAML, XML, JSON or NPZ"
+            raise refusal(path, place, shown(" ".join(words)), expected, remedy)
         name, model = words[0], words[1]
         if model in OTHER_MODELS or model not in MODEL_PARAMETERS:
             remedy = (
