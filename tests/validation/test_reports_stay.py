@@ -4,20 +4,17 @@ A change of a number here changes verdicts of archives: it is meant, said in CHA
 ``python tests/validation/test_reports_stay.py``.
 """
 
-import contextlib
-import io
 import json
-import math
-import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
 
 from posekit.samples import write_samples
+from tests.kept_files import differences, keep, run
 
 KEPT_REPORTS = Path(__file__).parent / "reports"
 FRAMES = 60
@@ -99,13 +96,9 @@ def write_clips(folder: Path) -> None:
 
 def report(folder: Path, case: str) -> dict[str, Any]:
     """Judge a clip, and return what is kept of its report."""
-    main = __import__("posekit.cli", fromlist=["main"]).main
     name, options = CASES[case]
     output = folder / f"{case}.json"
-    arguments = ["posekit", "validate", str(folder / f"{name}.npz"), "-o", str(output), "--all", *options]
-    silent = contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO())
-    with mock.patch.object(sys, "argv", arguments), silent[0], silent[1], contextlib.suppress(SystemExit):
-        main()
+    run("validate", folder / f"{name}.npz", "-o", output, "--all", *options)
     written = json.loads(output.read_text(encoding="utf-8"))
     for clip in written["clips"]:
         del clip["file"]
@@ -120,15 +113,6 @@ def report(folder: Path, case: str) -> dict[str, Any]:
     }
 
 
-def rounded(document: Any) -> Any:
-    """Return a document with six digits a number."""
-    if isinstance(document, dict):
-        return {key: rounded(value) for key, value in document.items()}
-    if isinstance(document, list):
-        return [rounded(value) for value in document]
-    return float(f"{document:.6g}") if isinstance(document, float) else document
-
-
 @pytest.fixture(scope="module")
 def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("clips")
@@ -136,40 +120,13 @@ def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def differences(kept: Any, found: Any, where: str = "") -> list[str]:
-    """Name the places where two documents differ, numbers by more than what another machine's rounding does."""
-    if isinstance(kept, dict) and isinstance(found, dict):
-        names = [f"{where}: {sorted(set(kept) ^ set(found))}"] if set(kept) != set(found) else []
-        return names + [
-            each
-            for key in kept
-            if key in found
-            for each in differences(kept[key], found[key], f"{where}.{key}")
-        ]
-    if isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
-        return [
-            each
-            for k, (one, other) in enumerate(zip(kept, found, strict=True))
-            for each in differences(one, other, f"{where}[{k}]")
-        ]
-    if isinstance(kept, float) or (isinstance(found, float) and isinstance(kept, int)):
-        same = isinstance(found, int | float) and math.isclose(kept, found, rel_tol=1e-4, abs_tol=2e-6)
-    else:
-        same = kept == found and type(kept) is type(found)
-    return [] if same else [f"{where}: {kept!r} -> {found!r}"]
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_said_of_a_clip_stays(case: str, clips: Path) -> None:
-    kept = json.loads((KEPT_REPORTS / f"{case}.json").read_text(encoding="utf-8"))
-    assert differences(kept, report(clips, case)) == []
+    assert differences(KEPT_REPORTS / f"{case}.json", report(clips, case)) == []
 
 
 if __name__ == "__main__":
-    import tempfile
-
     with tempfile.TemporaryDirectory() as made:
         write_clips(Path(made))
         for each in CASES:
-            text = json.dumps(rounded(report(Path(made), each)), separators=(",", ":"))
-            (KEPT_REPORTS / f"{each}.json").write_text(text + "\n", encoding="utf-8")
+            keep(KEPT_REPORTS / f"{each}.json", report(Path(made), each))
