@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from posekit.papers.lee_chen import reproduce_lee_chen
+from posekit.papers.lee_chen_checks import lee_chen_checks
 from posekit.papers.lee_chen_rows import lee_chen_rows
 from posekit.papers.lee_chen_tables34 import WALK_GRIDS, Effort
 from posekit.papers.lee_chen_work import LeeChenWork
@@ -33,5 +34,5 @@ def reproduce_all(folder: Path, *, pictures: bool = True, effort: Effort = "quic
     lee_chen, taylor = LeeChenWork(grid=WALK_GRIDS[effort]), find_taylor()
     reproduce_lee_chen(folder, pictures=pictures, work=lee_chen)
     reproduce_taylor(folder, pictures=pictures, work=taylor)
-    rows = [*lee_chen_rows(lee_chen), *taylor_rows(taylor)]
+    rows = [*lee_chen_checks(lee_chen), *lee_chen_rows(lee_chen), *taylor_rows(taylor)]
     return write_rows(folder, rows, ("lee-chen.md", "taylor.md"))

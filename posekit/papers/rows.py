@@ -60,6 +60,21 @@ def agreement(fits: bool) -> Verdict:
     return "agrees" if fits else "differs"
 
 
+def compared(
+    paper: str, place: str, printed: str, here: str, fits: bool, check: str, why: str = "not explained"
+) -> PaperRow:
+    """Make a row that can be compared: it agrees, or differs for a reason that may not be known."""
+    return PaperRow(
+        paper=paper,
+        place=place,
+        printed=printed,
+        here=here,
+        verdict=agreement(fits),
+        check=check,
+        why="" if fits else why,
+    )
+
+
 def write_rows(folder: Path, rows: Sequence[PaperRow], beside: Iterable[str]) -> list[str]:
     """Write ``papers.md``, ``papers.html`` and ``papers.json``.
 

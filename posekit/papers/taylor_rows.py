@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from posekit.body import load_figure
-from posekit.papers.rows import PaperRow, Verdict, agreement
+from posekit.linkages import LinkageFamily, name_nearer, search
+from posekit.papers.rows import PaperRow, Verdict, agreement, compared
 from posekit.papers.taylor_constrained import Constrained, constrained
 from posekit.papers.taylor_protocol import PRINTED_ERRORS
 from posekit.papers.taylor_random_views import RandomViews, view_at_random
 from posekit.papers.taylor_study import Study, synthetic_study
-from posekit.skeleton import SEGMENTS
+from posekit.recovery.taylor_figure.human import taylor_human
+from posekit.recovery.taylor_figure.proportions import figure_of
+from posekit.skeleton import JOINT, SEGMENTS
 from posekit.synthesis import CameraSphere, random_views
 
 PAPER_TITLE = "Taylor 2000"
 N_BODIES = 200
+STATURE_METRES = 1.75
+PRINTED_SCALES = (2.3569, 2.9461, 3.5353)
+PRINTED_LENGTHS = {
+    "forearm": (14.0, (("right_elbow",), ("right_wrist",))),
+    "upper arm": (15.0, (("right_shoulder",), ("right_elbow",))),
+    "shoulder girdle": (18.0, (("right_shoulder",), ("left_shoulder",))),
+    "foreleg": (20.0, (("right_knee",), ("right_ankle",))),
+    "thigh": (19.0, (("right_hip",), ("right_knee",))),
+    "pelvic girdle": (14.0, (("right_hip",), ("left_hip",))),
+    "spine": (24.0, (("right_shoulder", "left_shoulder"), ("pelvis",), ("right_hip", "left_hip"))),
+}
+"""Table 1: lengths, and between the middles of which joints they lie."""
+
 N_PICTURES = 100
 """Synthetic photographs: enough for a table in half a minute."""
 
@@ -40,7 +58,10 @@ def find_taylor() -> TaylorWork:
 def taylor_rows(found: TaylorWork) -> Iterator[PaperRow]:
     """Yield the rows of the paper."""
     yield from _method_rows(found.study)
+    yield from _family_rows()
+    yield from _proportion_rows()
     for one in found.objects:
+        yield _zero_row(one)
         within = float((one.worst <= one.printed).mean())
         yield _row(
             f"{one.figure}, {one.constraint}",
@@ -67,6 +88,9 @@ def _row(place: str, print_: str, here: str, verdict: Verdict, check: str, why: 
     return PaperRow(
         paper=PAPER_TITLE, place=place, printed=print_, here=here, verdict=verdict, check=check, why=why
     )
+
+
+_compared = partial(compared, PAPER_TITLE)
 
 
 def _method_rows(study: Study) -> Iterator[PaperRow]:
@@ -99,6 +123,72 @@ def _method_rows(study: Study) -> Iterator[PaperRow]:
         f"{none.count.mean():g} in each of {len(none.count)} pictures",
         agreement(bool((none.count == 2**11).all())),
         "2^11 flips of 11 segments",
+    )
+
+
+def _family_rows() -> Iterator[PaperRow]:
+    """Look at all postures behind one picture, and at the scales of Fig. 4."""
+    human = taylor_human()
+    linkage, points = human.linkage, np.random.default_rng(2000).normal(size=(12, 3))
+    unknown, measured = 2 + 2 * len(linkage.segments) + 1, 2 * len(linkage.points)
+    yield _compared(
+        "§2: unknowns and measurements",
+        "25 and 24",
+        f"{unknown} and {measured}",
+        (unknown, measured) == (25, 24),
+        "two for the place, two for the direction of each of 11 segments, one for s; two for each of 12 points",
+    )
+    lengths, image = human.measure(points[None]), 100.0 * points[None, :, :2]
+    leaves = human.grow(image, lengths[0], 1.2 * human.bound(image, lengths))
+    postures = human.twelve(leaves.positions(range(len(human.points)), np.arange(len(leaves.code))))
+    off = float(np.abs(human.measure(postures) - lengths[0]).max())
+    different = len(np.unique(np.round(postures, 6).reshape(len(postures), -1), axis=0))
+    yield _compared(
+        "§2, §4: solutions at one s",
+        "2048, each with the segments' lengths",
+        f"{different} different, {off:.0e} off at most",
+        different == 2048 and off < 1e-9,
+        "all postures behind a picture of a random body, measured again",
+    )
+    family = LinkageFamily(linkage=linkage, image=points[:, :2])
+    depths = family.foreshortening(family.minimum_scale * np.array(PRINTED_SCALES) / PRINTED_SCALES[0])
+    yield _compared(
+        "Fig. 4: s = 2.3569, 2.9461, 3.5353",
+        "the larger the scale, the deeper the posture",
+        f"{(np.diff(depths, axis=0) > 0).all(axis=0).sum()} of {depths.shape[1]} segments grow deeper at each step",
+        bool((np.diff(depths, axis=0) > 0).all()),
+        "a random picture at its bound and at 1.25 and 1.5 times it, the print's ratios",
+    )
+
+
+def _proportion_rows() -> Iterator[PaperRow]:
+    """Measure Table 1 on the body that is made from it."""
+    figure, unit = figure_of(STATURE_METRES), STATURE_METRES / 70
+    points = figure.neutral_points
+    for name, (length, chain) in PRINTED_LENGTHS.items():
+        ends = [np.mean([points[JOINT[joint]] for joint in joints], axis=0) for joints in chain]
+        found = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(ends)) / unit
+        yield _compared(
+            f"Table 1, {name}",
+            f"{length:g}, with a height of 70",
+            f"{found:.6g}",
+            abs(found - length) < 1e-9,
+            f"the body of {STATURE_METRES:g} m, measured between its joints by Pinocchio",
+        )
+
+
+def _zero_row(one: Constrained) -> PaperRow:
+    """Look for all scales at which the constraint holds, flips given by hand."""
+    family = LinkageFamily(linkage=one.linkage, image=one.points[:, :2] * one.s)
+    flips = name_nearer(one.linkage, family.flips_of(one.points))
+    found = search(family, {one.constraint: 1.0}, nearer=flips)
+    exact = found.s[found.residual < 1e-20] / one.s
+    return _compared(
+        f"{one.figure}b, the residual over s",
+        "its zero gives the posture",
+        f"zero at {', '.join(f'{s:.9g}' for s in exact) or 'no'} times the true s",
+        len(exact) == 1 and abs(exact[0] - 1) < 1e-9,
+        "an object like it without noise, flips by hand: all minima",
     )
 
 

@@ -20,6 +20,7 @@ from posekit.formats.own import (
     read_result,
     read_view,
 )
+from posekit.papers import lee_chen_tables34
 from posekit.skeleton import JOINTS, POINTS
 from posekit.synthesis import random_postures
 
@@ -290,6 +291,17 @@ def test_reproduce_writes_the_tables(run) -> None:
     assert written == expected | {"lee-chen.json", "lee-chen.md"}
     assert "# Lee & Chen 1985, reproduced" in outcome.out
     assert outcome.out.rstrip().endswith("written: deep/tables/lee-chen.md, deep/tables/lee-chen.json")
+
+
+def test_reproduce_all_writes_one_page_over_both_papers(run, monkeypatch) -> None:
+    grid = lee_chen_tables34.WalkGrid(velocities=(0.9,), leans=(0.0,), phases=2)
+    monkeypatch.setitem(lee_chen_tables34.WALK_GRIDS, "fine", grid)
+    outcome = run("reproduce", "all", "-o", "tables", "--no-pictures", "--effort", "fine")
+    assert (outcome.code, outcome.err) == (0, "")
+    reports = {f"{name}.{ending}" for name in ("lee-chen", "taylor", "papers") for ending in ("md", "json")}
+    assert {path.name for path in Path("tables").iterdir()} == reports | {"papers.html"}
+    assert json.loads(Path("tables/lee-chen.json").read_text(encoding="utf-8"))["settings"]["phases"] == 2
+    assert outcome.out.rstrip().endswith("tables/papers.json")
 
 
 def test_demo_does_all_of_it(run) -> None:

@@ -306,6 +306,7 @@ def test_a_bad_option_of_recover_is_refused(
         ),
         (("reproduce", "gavrila", "-o", "x"), ("'gavrila'", "lee-chen, taylor")),
         (("reproduce", "lee-chen", "-o", "view.json"), ("view.json", "folder")),
+        (("reproduce", "all", "-o", "x", "--effort", "coarse"), ("'coarse'", "quick or fine")),
         (("demo", "-o", "view.json/x"), ("view.json/x", "folder")),
     ],
 )
