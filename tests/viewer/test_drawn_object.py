@@ -139,7 +139,7 @@ def test_a_page_of_many_postures_stays_small_and_says_how_many_it_holds(arm, mon
     )
     page = object_page(replace(result, frames=[many] * 10))
     assert len(page.encode()) < 10e6
-    data = json.loads(re.search(r"const OBJECT = (.*);\n", page)[1])
+    data = json.loads(re.findall(r"const OBJECT = (.*);\n", page)[0])
     assert {frame["count"] for frame in data["frames"]} == {9000}
     assert {len(frame["postures"]) for frame in data["frames"]} == {2162}
 
