@@ -68,12 +68,12 @@ def private_copies(
         copies: dict[str, Path] = {}
         for kind in kinds:
             for name, path, data in _looked_through(robot, package_dirs, source, kind):
-                copies[name] = (
-                    Path(folder) / str(len(copies)) / path.name
-                )  # coal goes by the suffix, and names it
-                make_folder(copies[name].parent)
-                with replacing(copies[name]) as file:
-                    file.write(data)
+                if name not in copies:
+                    # Of the same name as the file: coal goes by the suffix, and says it.
+                    copies[name] = Path(folder) / str(len(copies)) / path.name
+                    make_folder(copies[name].parent)
+                    with replacing(copies[name]) as file:
+                        file.write(data)
         yield copies
 
 

@@ -423,6 +423,25 @@ def test_a_mesh_with(folder: Path, name: str) -> None:
             assert str(error).isprintable()
 
 
+def test_meshes_of_one_name_in_several_folders_stay_apart(folder: Path) -> None:
+    def bodies(kind: str, *names: str) -> str:
+        return "".join(
+            f'<{kind}><geometry><mesh filename="{name}/m.stl"/></geometry></{kind}>' for name in names
+        )
+
+    for count, name in enumerate("pqr", 1):
+        (folder / name).mkdir()
+        (folder / name / "m.stl").write_bytes(
+            stl(count, *[triangle(k, 0, 0, k, 1, 0, 0, 1, k) for k in range(1, count + 1)])
+        )
+    links = bodies("visual", "p", "r", "q") + bodies("collision", "p", "q")
+    (folder / "x.urdf").write_text(f'<robot name="r"><link name="a">{links}</link></robot>')
+    robot = load_robot(folder / "x.urdf", visuals=True)
+    assert robot.geometry is not None and robot.visuals is not None
+    assert [one.geometry.num_tris for one in robot.geometry.geometryObjects] == [1, 2]
+    assert [one.geometry.num_tris for one in robot.visuals.geometryObjects] == [1, 3, 2]
+
+
 def test_visual_bodies_beyond_the_limit_are_refused_where_they_are_loaded(folder: Path) -> None:
     many = '<visual><geometry><sphere radius="1"/></geometry></visual>' * 501
     (folder / "x.urdf").write_text(VALID.replace("</link>", many + "</link>", 1))
