@@ -176,6 +176,10 @@ bench-all: $(VENV)/dev.stamp ## run every file of benchmarks/
 mutants: $(VENV)/dev.stamp ## plant small faults in tree, cameras, validators, closed forms and schemas: do tests find them?
 	$(BIN)/python -m benchmarks.mutants
 
+.PHONY: fuzz
+fuzz: $(VENV)/dev.stamp ## attack every reader, command and option for an hour
+	$(BIN)/python -m benchmarks.fuzz -o fuzz-results
+
 .PHONY: clean
 clean: ## remove everything that make made
 	rm -rf $(VENV) build dist *.egg-info docs/_build docs/gallery docs/sg_execution_times.rst $(DEMO_RESULTS) $(BENCH_RESULTS)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import random
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.fuzz.damage import damaged
 from posekit.body import load_figure
 from posekit.body.urdf import parse
 from posekit.errors import FigureError, InputError, PosekitError
@@ -32,62 +34,12 @@ FIGURE = load_figure()
 LINKS = [frame.name for frame in FIGURE.model.frames]
 URDF, SRDF = FIGURE.urdf.encode(), FIGURE.srdf.encode()
 TABLE = (Path(find("stick_figure").urdf).parent / "ranges" / "table1.toml").read_bytes()
-# What a mutation likes to put in: marks of the grammars, numbers that are none, half characters.
-SPICE = [
-    *(
-        b"<",
-        b">",
-        b"/>",
-        b'"',
-        b"'",
-        b"&",
-        b"&#0;",
-        b"<!DOCTYPE a>",
-        b"<!ENTITY b 'c'>",
-        b"]]>",
-        b"<![CDATA[",
-    ),
-    *(
-        b"nan",
-        b"inf",
-        b"-1",
-        b"1e999",
-        b"0",
-        b"",
-        b"1_0",
-        b"9" * 400,
-        b"\0",
-        b"\xff\xfe",
-        b"\xef\xbb\xbf",
-        b"\xed\xa0\x80",
-    ),
-    *(b"[", b"]", b"{", b"}", b",", b":", b"[" * 100, b"=", b"\n", b"#", b"a.b.c.d", b"'''", b'"""'),
-]
 
 
 @st.composite
 def mutated(draw: st.DrawFn, whole: bytes) -> bytes:
-    """Change a text in one to four places."""
-    data = whole
-    for _ in range(draw(st.integers(1, 4))):
-        start = draw(st.integers(0, max(0, len(data) - 1)))
-        length = draw(st.one_of(st.integers(0, 8), st.integers(0, len(data) // 2)))
-        kind = draw(st.sampled_from(["spice", "cut", "double", "move", "byte", "end"]))
-        piece = data[start : start + length]
-        if kind == "spice":
-            data = data[:start] + draw(st.sampled_from(SPICE)) + data[start + min(length, 8) :]
-        elif kind == "cut":
-            data = data[:start] + data[start + length :]
-        elif kind == "double":
-            data = data[:start] + piece + data[start:]
-        elif kind == "move":
-            place = draw(st.integers(0, max(0, len(data) - 1)))
-            data = data[:place] + piece + data[place:]
-        elif kind == "byte":
-            data = data[:start] + bytes([draw(st.integers(0, 255))]) + data[start + 1 :]
-        else:
-            data = data[:start]
-    return data
+    """Change a text in one to four places, as `make fuzz` does."""
+    return damaged(whole, random.Random(draw(st.integers(0, 2**32))))
 
 
 def one_line(error: PosekitError) -> None:

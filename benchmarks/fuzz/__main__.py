@@ -1,0 +1,73 @@
+"""Attack for some minutes, keep what is found, and print the counts."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import pkgutil
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import posekit
+from benchmarks.fuzz.cases import Case, file_case, option_case, write_seeds
+from benchmarks.fuzz.damage import damaged
+from benchmarks.fuzz.trial import Outcome, in_fork, tried
+from posekit.formats.markdown import table_lines
+
+OPTION_SHARE = 0.25
+"""The share of cases that are odd options; the others are damaged files."""
+
+
+def keep(folder: Path, number: int, case: Case, outcome: Outcome) -> None:
+    """Keep a case that is not clean: its file, and what came of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if case.name:
+        (folder / f"{number}.{case.name}").write_bytes(case.data)
+    said = {"arguments": case.arguments, "name": case.name, "what": outcome.what, "detail": outcome.detail}
+    (folder / f"{number}.case.json").write_text(json.dumps(said, indent=1), encoding="utf-8")
+
+
+def main() -> int:
+    """Attack."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("fuzz-results"), help="where finds are kept"
+    )
+    given = parser.parse_args()
+    for module in pkgutil.walk_packages(posekit.__path__, "posekit."):
+        importlib.import_module(module.name)
+    counts: Counter[tuple[str, str]] = Counter()
+    with tempfile.TemporaryDirectory() as made:
+        seeds_folder, folder = Path(made) / "seeds", Path(made) / "case"
+        seeds_folder.mkdir()
+        said = Path(made) / "said"
+        seeds = write_seeds(seeds_folder, lambda arguments: in_fork(arguments, said, 120.0) or 0)
+        ends, number = time.monotonic() + 60 * given.minutes, 0
+        while time.monotonic() < ends:
+            rng = random.Random(f"{given.seed}.{number}")
+            case = option_case(rng) if rng.random() < OPTION_SHARE else file_case(seeds, rng, damaged)
+            outcome = tried(case, seeds_folder, folder)
+            counts[case.kind, outcome.what] += 1
+            if not outcome.clean:
+                keep(given.output, number, case, outcome)
+                print(f"{number}: {outcome.what}: {' '.join(case.arguments)}", file=sys.stderr, flush=True)
+            number += 1
+    whats = sorted({what for _, what in counts})
+    kinds = sorted({kind for kind, _ in counts})
+    rows = [(kind, *(counts[kind, what] for what in whats)) for kind in kinds]
+    print(
+        *table_lines(("kind", *whats), [*rows, ("all", *(sum(counts[k, w] for k in kinds) for w in whats))]),
+        sep="\n",
+    )
+    return int(any(not Outcome(what).clean for what in whats))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

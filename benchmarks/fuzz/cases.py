@@ -1,0 +1,189 @@
+"""What is attacked: whole files of every kind that posekit makes, the commands that read them, and their options."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import typer.main
+
+from posekit.cli.main import application
+from posekit.formats.keypoints import key_point_formats
+from posekit.formats.own import read_view, schema_text
+from posekit.robots.find import find
+from posekit.samples import write_samples
+from tests.detector_files import view_keypoints, write_keypoints
+
+MOTION_ENDINGS: Final = ("bvh", "trc", "c3d", "mot", "glb", "csv", "parquet", "npz", "json")
+POSTURE_COMMANDS: Final = (
+    "validate IN -o OUT.json",
+    "inspect IN",
+    "convert IN OUT.bvh",
+    "convert IN OUT.npz",
+)
+RESULT_COMMANDS: Final = (*POSTURE_COMMANDS, "convert IN OUT.trc", "render IN -o OUT.html", "inspect IN")
+COMMANDS: Final = {
+    "motion": POSTURE_COMMANDS,
+    "result": RESULT_COMMANDS,
+    "view": ("recover IN -o OUT.json", "inspect IN", "recover IN -o OUT.npz --deviation 1"),
+    "key points": ("inspect IN", "recover IN -o OUT.json --fov 60 --stature 175cm --size 1280x720"),
+    "camera": ("recover SEEDS/keypoints -o OUT.json --stature 175cm --camera IN",),
+    "ranges": ("validate SEEDS/walk.npz -o OUT.json --ranges IN",),
+    "profile": ("validate SEEDS/walk.npz -o OUT.json --profile IN",),
+    "linkage": ("recover SEEDS/gripper.json -o OUT.json --linkage IN --scale min", "inspect IN"),
+    "skeleton": ("inspect SEEDS/coco.json --skeleton IN",),
+    "robot": ("validate SEEDS/robot.npz -o OUT.json --urdf IN", "inspect IN"),
+    "robot motion": ("validate IN -o OUT.json --urdf g1", "inspect IN"),
+    "report": ("inspect IN",),
+}
+"""Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files."""
+OPTION_COMMANDS: Final = (
+    "recover SEEDS/walk.json -o OUT.json",
+    "recover SEEDS/photo.json -o OUT.npz",
+    "recover SEEDS/keypoints -o OUT.json --camera SEEDS/calibration.toml --stature 175cm",
+    "validate SEEDS/walk.npz -o OUT.json",
+    "validate SEEDS/robot.npz -o OUT.json --urdf g1",
+    "convert SEEDS/walk.npz OUT.bvh",
+    "convert SEEDS/result.npz OUT.trc",
+    "inspect SEEDS/result.json",
+    "render SEEDS/result.json -o OUT.html --view SEEDS/walk.json",
+    "evaluate SEEDS/walk.npz -o OUT.json --frames-per-clip 2 --yaw-step 180",
+    "synth walker -o OUT.json",
+    "synth random -o OUT.json",
+    "synth object -o OUT.json",
+    "synth mocap SEEDS/walk.npz -o OUT.json",
+)
+ODD_VALUES: Final = (
+    *(
+        "nan",
+        "inf",
+        "-inf",
+        "-1",
+        "0",
+        "",
+        " ",
+        "1e308",
+        "1e308cm",
+        "9" * 30,
+        "1,2,3",
+        "0,0",
+        "x",
+        "-",
+        "--",
+        "a:b",
+        "1:2",
+    ),
+    *(
+        "../..",
+        "/",
+        "/dev/null",
+        "/dev/zero",
+        "SEEDS",
+        "SEEDS/walk.npz",
+        "SEEDS/photo.json",
+        "\x1b[31m",
+        "ä\u202e",
+        "%s",
+    ),
+    *(
+        "1e-320",
+        "0x10",
+        "175",
+        "175cm",
+        "1cm",
+        "2deg",
+        "min",
+        "all",
+        "+y",
+        "largest",
+        "1-",
+        "3-1",
+        "0x0",
+        "1x1",
+        "99999x99999",
+    ),
+)
+
+
+class Case(NamedTuple):
+    """One attack: its kind, the arguments, and the damaged file with the name that it gets."""
+
+    kind: str
+    arguments: list[str]
+    name: str = ""
+    data: bytes = b""
+
+
+def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list[Path]]:
+    """Write whole files of every kind; `run` runs a command."""
+    write_samples(folder)
+    seeds: dict[str, list[Path]] = {kind: [] for kind in COMMANDS}
+    for ending in MOTION_ENDINGS:
+        path = folder / f"motion.{ending}"
+        if run(["convert", str(folder / "walk.npz"), str(path)]) == 0:
+            seeds["motion"].append(path)
+    for name, source in (("result", "walk.json"), ("photo", "photo.json")):
+        for ending in ("json", "npz"):
+            path = folder / f"{name}.{'out.' if name == 'photo' else ''}{ending}"
+            run(["recover", str(folder / source), "-o", str(path)])
+            seeds["result"].append(path)
+    run(["synth", "random", "-o", str(folder / "random.json"), "--frames", "2"])
+    seeds["view"] = [folder / "walk.json", folder / "photo.json", folder / "random.json"]
+    view = read_view(folder / "random.json")
+    for name in key_point_formats():
+        path = folder / (f"{name}.csv" if name in ("deeplabcut",) else f"{name}.json")
+        try:
+            write_keypoints(path, view_keypoints(view, name), name)
+        except (OSError, KeyError, ValueError):
+            continue
+        seeds["key points"] += [path] if path.is_file() else sorted(path.glob("*.*"))[:1]
+    shutil.copy(next(iter((folder / "keypoints").iterdir())), folder / "openpose_keypoints.json")
+    seeds["key points"].append(folder / "openpose_keypoints.json")
+    seeds["camera"] = [folder / "calibration.toml"]
+    built_in = Path(find("stick_figure").urdf).parent
+    for kind, pattern in (
+        ("ranges", "ranges"),
+        ("profile", "profiles"),
+        ("linkage", "linkages"),
+        ("skeleton", "skeleton_maps"),
+    ):
+        seeds[kind] = sorted((built_in / pattern).glob("*.toml"))
+    seeds["robot"] = [built_in / "stick_figure.urdf", Path(find("simple_humanoid").urdf)]
+    seeds["robot motion"] = [folder / "robot.npz"]
+    run(["validate", str(folder / "walk.npz"), "-o", str(folder / "report.json")])
+    (folder / "schema.json").write_text(schema_text("view"), encoding="utf-8")
+    seeds["report"] = [folder / "report.json", folder / "schema.json"]
+    return seeds
+
+
+def file_case(
+    seeds: dict[str, list[Path]], rng: random.Random, damage: Callable[[bytes, random.Random], bytes]
+) -> Case:
+    """Damage a file of some kind, and choose a command that reads it."""
+    kind = rng.choice([kind for kind, files in seeds.items() if files])
+    path = rng.choice(seeds[kind])
+    return Case(kind, rng.choice(COMMANDS[kind]).split(), path.name, damage(path.read_bytes(), rng))
+
+
+def option_case(rng: random.Random) -> Case:
+    """Give a command one to three of its options, with odd values."""
+    arguments = rng.choice(OPTION_COMMANDS).split()
+    for name, is_flag in rng.sample(_options(*arguments[:2]), rng.randint(1, 3)):
+        arguments += [name] if is_flag else [name, rng.choice(ODD_VALUES)]
+    return Case("options", arguments)
+
+
+@cache
+def _options(first: str, second: str) -> list[tuple[str, bool]]:
+    """Return the options of a command, each with whether it is a flag."""
+    command: Any = typer.main.get_command(application(first))
+    if hasattr(command, "commands"):
+        command = command.commands[first]
+    if hasattr(command, "commands"):
+        command = command.commands[second]
+    options = [parameter for parameter in command.params if parameter.opts[0].startswith("-")]
+    return [(name, option.is_flag) for option in options for name in option.opts if name != "--help"]

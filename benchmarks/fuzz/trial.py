@@ -1,0 +1,171 @@
+"""One case in a fork: what it did, and whether that is clean."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from benchmarks.fuzz.cases import Case
+
+MEMORY_BYTES: Final = 4 << 30
+PROCESSOR_SECONDS: Final = 20
+PATIENCE_SECONDS: Final = 120.0
+"""Of the clock: others may use the processor too."""
+LONGEST_REFUSAL: Final = 2000
+CRASHED: Final = 70
+"""The code of a fork that an exception ended."""
+
+
+class Outcome(NamedTuple):
+    """What came of a case: accepted, refused, or a fault in words."""
+
+    what: str
+    detail: str = ""
+
+    @property
+    def clean(self) -> bool:
+        """Whether it is what posekit promises."""
+        return self.what in ("accepted", "refused")
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run a command in this process, and return its exit code."""
+    from posekit.cli import main
+
+    sys.argv = ["posekit", *arguments]
+    try:
+        main()
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    return 0
+
+
+def in_fork(arguments: list[str], said: Path, patience: float = PATIENCE_SECONDS) -> int | None:
+    """Run a command in a fork, its words in `said`, and return its exit code, -N of signal N; None for a hang."""
+    child = os.fork()
+    if child == 0:
+        code = CRASHED
+        try:
+            os.setsid()
+            out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            os.dup2(out, 1)
+            os.dup2(out, 2)
+            sys.stdout, sys.stderr = (os.fdopen(stream, "w", errors="backslashreplace") for stream in (1, 2))
+            used = (
+                int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+            )
+            resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
+            resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS))
+            code = run_command(arguments)
+        except BaseException:
+            os.write(2, traceback.format_exc().encode(errors="replace"))
+        finally:
+            for stream in (sys.stdout, sys.stderr):
+                stream.flush()
+            os._exit(code)
+    ends = time.monotonic() + patience
+    while time.monotonic() < ends:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.005)
+    for kill in (os.killpg, os.kill):
+        try:
+            kill(child, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+    os.waitpid(child, 0)
+    return None
+
+
+def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
+    """Try a case in a folder that is emptied before."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    if case.name:
+        (folder / case.name).write_bytes(case.data)
+    places = {"IN": str(folder / case.name), "OUT": str(folder / "out"), "SEEDS": str(seeds)}
+    arguments = [_placed(argument, places) for argument in case.arguments]
+    before = {path.name for path in folder.iterdir()}
+    here = Path.cwd()
+    os.chdir(folder)
+    try:
+        code = in_fork(arguments, folder.with_suffix(".said"))
+    finally:
+        os.chdir(here)
+    if code in (None, -signal.SIGXCPU, -signal.SIGKILL):
+        return Outcome("hang", " ".join(arguments))
+    said = folder.with_suffix(".said").read_text(encoding="utf-8", errors="replace")
+    written = [path for path in folder.iterdir() if path.name not in before]
+    if code < 0:
+        return Outcome(f"signal {-code}", said[-300:])
+    if code == CRASHED or "Traceback (most recent call last)" in said:
+        return Outcome("traceback", said[-1500:])
+    if code == 2:
+        return _refusal(said, written)
+    if code not in (0, 1):
+        return Outcome(f"exit {code}", said[-300:])
+    return _accepted(written, folder)
+
+
+def _placed(argument: str, places: dict[str, str]) -> str:
+    """Put the place in of a word that an argument begins with."""
+    for word, place in places.items():
+        if argument == word or argument.startswith((f"{word}/", f"{word}.")):
+            return place + argument[len(word) :]
+    return argument
+
+
+def _refusal(said: str, written: list[Path]) -> Outcome:
+    """Judge a refusal: one line, and nothing is written."""
+    lines = [line for line in said.splitlines() if line.startswith("posekit: error:")]
+    if len(lines) != 1 or len(lines[0]) > LONGEST_REFUSAL:
+        return Outcome("not one line", said[-600:])
+    if not lines[0].isprintable():
+        return Outcome("not printable", repr(lines[0])[:600])
+    if written:
+        return Outcome("half-written", f"{[path.name for path in written]} {lines[0]}")
+    return Outcome("refused")
+
+
+def _accepted(written: list[Path], folder: Path) -> Outcome:
+    """Judge what was written: posekit reads it again, and JSON holds finite numbers only."""
+    for path in sorted(
+        path for top in written for path in ((top, *top.rglob("*")) if top.is_dir() else (top,))
+    ):
+        if path.is_dir():
+            continue
+        if path.name.endswith(".part"):
+            return Outcome("left over", path.name)
+        if path.suffix == ".json":
+            try:
+                json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
+            except ValueError as error:
+                return Outcome("not finite", f"{path.name}: {error}")
+        if path.suffix == ".npz":
+            with np.load(path) as held:
+                infinite = [
+                    name for name in held.files if held[name].dtype.kind == "f" and np.isinf(held[name]).any()
+                ]
+            if infinite:
+                return Outcome("not finite", f"{path.name}: {infinite}")
+        if path.suffix in (".json", ".npz", ".bvh", ".trc") and path.parent == folder:
+            again = folder.with_suffix(".again")
+            if in_fork(["inspect", str(path)], again) != 0:
+                return Outcome("not read again", f"{path.name}: {again.read_text(errors='replace')[-400:]}")
+    return Outcome("accepted")
+
+
+def _not_finite(word: str) -> float:
+    raise ValueError(f"{word} is no number")

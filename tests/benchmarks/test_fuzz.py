@@ -1,0 +1,71 @@
+"""The attack: damage is the same for a seed, and what is not clean is told from what is."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from benchmarks.fuzz.cases import Case, option_case
+from benchmarks.fuzz.damage import damaged
+from benchmarks.fuzz.trial import Outcome, tried
+from posekit.samples import write_samples
+
+VALIDATE = ["validate", "SEEDS/walk.npz", "-o", "OUT.json"]
+
+
+@pytest.mark.parametrize("data", [b"", b"1", b"a = [1, 2.5e3]\n" * 50, bytes(range(256)) * 9])
+def test_damage_is_the_same_for_a_seed(data: bytes) -> None:
+    found = [damaged(data, random.Random(seed)) for seed in range(200)]
+    assert found == [damaged(data, random.Random(seed)) for seed in range(200)]
+    assert len(set(found)) > (5 if len(data) < 2 else 100)
+
+
+def test_options_are_those_of_the_command() -> None:
+    cases = [option_case(random.Random(seed)) for seed in range(300)]
+    given = {word for case in cases for word in case.arguments if word.startswith("--") and len(word) > 2}
+    assert given >= {"--rigid-tolerance", "--urdf", "--frames", "--posture", "--camera"}
+    assert "--help" not in given
+
+
+@pytest.fixture(scope="module")
+def seeds(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("seeds")
+    write_samples(folder)
+    return folder
+
+
+def outcome(seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> Outcome:
+    """Try `validate`, which does what is said instead."""
+
+    def main() -> None:
+        exec(command, {"folder": Path.cwd()})
+
+    if command:
+        monkeypatch.setattr("posekit.cli.main", main)
+    return tried(Case("options", VALIDATE), seeds, tmp_path / "case")
+
+
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        ("", "accepted"),
+        ("raise SystemExit(2)", "not one line"),
+        ("print('posekit: error: a'); raise SystemExit(2)", "refused"),
+        ("print('posekit: error: a\\x07'); raise SystemExit(2)", "not printable"),
+        ("(folder / 'x').touch(); print('posekit: error: a'); raise SystemExit(2)", "half-written"),
+        ("raise KeyError(1)", "traceback"),
+        ("raise SystemExit(3)", "exit 3"),
+        ("import os; os.abort()", "signal 6"),
+        ("(folder / 'x.json').write_text('[NaN]')", "not finite"),
+        ("(folder / 'x.part').touch()", "left over"),
+        ("import time; time.sleep(9)", "hang"),
+    ],
+)
+def test_what_is_not_clean_is_told(
+    seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, what: str
+) -> None:
+    if what == "hang":
+        monkeypatch.setattr("benchmarks.fuzz.trial.in_fork", lambda *given: None)
+    found = outcome(seeds, tmp_path, monkeypatch, command)
+    assert found.what == what, found
+    assert found.clean == (what in ("accepted", "refused"))
