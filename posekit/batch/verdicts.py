@@ -121,10 +121,23 @@ def validate_archive(
     extra("pyarrow.parquet", "parquet", "verdicts in a folder")
     if output.exists() and not output.is_dir():
         raise refusal(output, "", "a file", "a folder of verdicts", "choose another name")
+    made = not output.exists()
     make_folder(output)
+    try:
+        return _judge_parts(list(parts_of(files, output, asked)), workers or Workers(), progress)
+    except BaseException:
+        if made and not any(output.iterdir()):  # what is impossible leaves nothing behind
+            output.rmdir()
+        raise
+
+
+def _judge_parts(
+    parts: Sequence[VerdictPart], workers: Workers, progress: Callable[[int], None] | None
+) -> VerdictTotals:
+    """Judge the parts that have no verdicts, and count all."""
     totals = VerdictTotals()
     missing = []
-    for part in parts_of(files, output, asked):
+    for part in parts:
         totals.parts += 1
         if part.report.is_file():
             totals.skipped += 1
@@ -132,7 +145,7 @@ def validate_archive(
             _tell(progress, part)
         else:
             missing.append(part)
-    with (workers or Workers()).pool() as pool:
+    with workers.pool() as pool:
         for outcome in pool.run(judge_part, missing):
             if outcome.error:
                 raise InputError(outcome.error)

@@ -229,6 +229,12 @@ def test_settings_that_are_impossible_are_refused_whatever_the_files_hold(folder
 # --- archives --------------------------------------------------------------------------------------------
 
 
+def test_an_archive_that_cannot_be_judged_leaves_no_folder(run, folder: Path, tmp_path: Path) -> None:
+    outcome = run("clips", "-o", "out", "--urdf", "g1", "--package-dir", "nowhere", "--jobs", "1")
+    assert outcome.code == 2 and outcome.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_archive_goes_on_where_it_was(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
