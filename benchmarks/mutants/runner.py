@@ -24,10 +24,12 @@ from benchmarks.mutants.mutations import Mutant
 
 FIRST_TESTS: Final = 25
 """The first few usually find a fault: the others are not collected for them."""
-TESTED_SECONDS: Final = 40.0
+TESTED_SECONDS: Final = 60.0
 """How long the tests that run a fault's line may take by the map: more may find more."""
 FILE_SECONDS: Final = 20.0
-"""Up to how long near tests of other lines of its file are added."""
+"""How long near tests of other lines of its file may take besides."""
+ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
+"""Rooms whose tests are near, beside the file's own."""
 PATIENCE_SECONDS: Final = 60.0
 """Beyond three times what the map says: a fault that does not end is found."""
 MEMORY_BYTES: Final = 8 << 30
@@ -57,16 +59,19 @@ def chosen_tests(mutant: Mutant, lines: dict[int, set[str]], seconds: dict[str, 
     """Order the tests that run a fault's line, the nearest and fastest first, as many as there is time for.
 
     After them come near ones that run another line of the file: what is kept from one test to the next ran its lines
-    in one of them only.
+    in one of them only. What runs when the file is imported is asked of all near tests: any of them may read it.
     """
-    parts = mutant.file.split("/")[1:]
+    rooms = {room for part in mutant.file.split("/")[1:] for room in (part, *ALSO_NEAR.get(part, ()))}
+    near = {name for name in seconds if name.split("/")[1] in rooms}
     of_file = {name for name in lines.get(0, set()) if name in seconds}
-    near = {name for name in of_file if name.split("/")[1] in parts}
-    of_line = of_file if mutant.on_loading else lines.get(mutant.line, of_file) & of_file
+    of_line = (of_file | near) if mutant.on_loading else lines.get(mutant.line, of_file) & of_file
     chosen: list[str] = []
     total = 0.0
-    for names, limit in ((of_line, TESTED_SECONDS), (near - of_line, FILE_SECONDS)):
-        for name in sorted(names, key=lambda n: (n not in near, seconds[n], n)):
+    for names, limit in (
+        (of_line, TESTED_SECONDS),
+        ((near & of_file) - of_line, TESTED_SECONDS + FILE_SECONDS),
+    ):
+        for name in sorted(names, key=lambda n: (n not in of_file, n not in near, seconds[n], n)):
             if total + seconds[name] <= limit or not chosen:
                 chosen.append(name)
                 total += seconds[name]
