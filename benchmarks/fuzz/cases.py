@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 import typer.main
 
 from posekit.cli.main import application
@@ -121,6 +122,11 @@ class Case(NamedTuple):
 def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list[Path]]:
     """Write whole files of every kind; `run` runs a command."""
     write_samples(folder)
+    for path, kept in ((folder / "robot.npz", 20), (folder / "walk.npz", 40)):
+        with np.load(path) as held:  # fewer frames are more attacks
+            arrays = {name: held[name] for name in held.files}
+        frames = {name: array[:kept] for name, array in arrays.items() if array.shape[:1] == (90,)}
+        np.savez(path, **(arrays | frames))
     seeds: dict[str, list[Path]] = {kind: [] for kind in COMMANDS}
     for ending in MOTION_ENDINGS:
         path = folder / f"motion.{ending}"

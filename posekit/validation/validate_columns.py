@@ -46,13 +46,13 @@ def columns_of(
         judgements = judgements.of(asked)
     worst = _Worst.of(n)
     found: list[_Judged] = []
-    silent = np.where(verdicts.complete, 0, 1).astype(np.int16)
+    silent = np.where(verdicts.complete, 0, 1).astype(np.int64)
     for judgement in judgements:
         if not judgement.where:
             continue  # a robot without limits is inside them
         if not judgement.over_time:
             says_nothing = np.isnan(judgement.worst) & ~judgement.violated.any(axis=1)
-            silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
+            silent[asked[says_nothing]] |= 2 << checks.index(judgement.check)
         if judgement.by_pairs and contacts is not None:
             index = _indices(places, [ReportPlace(judgement.check, name, "m") for name in contacts.names])
             lower = lower_margin(judgement)

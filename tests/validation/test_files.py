@@ -1,5 +1,6 @@
 """Any number of files in one report: what is judged alone is judged so among others, and broken ones are named."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,8 @@ from posekit.batch.run import Workers
 from posekit.errors import InputError
 from posekit.formats.held import HeldPostures
 from posekit.formats.own import NamedConfigurations, Postures, read_report
+from posekit.formats.own.report import columns_of
+from posekit.samples import write_samples
 from posekit.skeleton import JOINT, JOINTS
 from posekit.validation import (
     AskedValidation,
@@ -227,6 +230,22 @@ def test_settings_that_are_impossible_are_refused_whatever_the_files_hold(folder
 
 
 # --- archives --------------------------------------------------------------------------------------------
+
+
+def test_a_row_without_numbers_is_undecided_and_its_report_is_read(run, tmp_path: Path) -> None:
+    """There are more checks over time than a short number has bits."""
+    write_samples(tmp_path)
+    with np.load(tmp_path / "robot.npz") as held:
+        robot = {name: held[name] for name in held.files}
+    for name in ("root_pos", "root_quat_xyzw", "dof_pos"):
+        robot[name] = robot[name][:12]
+    robot["dof_pos"][6, 3] = np.nan
+    np.savez(tmp_path / "gap.npz", **robot)
+    run("gap.npz", "--urdf", "g1", "-o", "gap.json")
+    written = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))
+    report = read_report(tmp_path / "gap.json")
+    assert len(report.checks or ()) > 15
+    assert sorted(columns_of(report).silent_checks(6)) == sorted(written["postures"][6]["undecided_by"])
 
 
 def test_an_archive_that_cannot_be_judged_leaves_no_folder(run, folder: Path, tmp_path: Path) -> None:

@@ -183,7 +183,8 @@ def columns_of(report: ValidationReport) -> VerdictColumns:
         )
     least_numbers = np.array([numbers for _, *numbers in worst]).reshape(-1, 3).T
     outside = np.array([numbers for _, _, *numbers in violations]).reshape(-1, 3).T
-    checks = list(dict.fromkeys(place.check for place in places))
+    unsaid = [name for posture in report.postures for name in posture.undecided_by or () if name != "joints"]
+    checks = list(dict.fromkeys([*(place.check for place in places), *unsaid]))
     part = VerdictColumns(
         places=tuple(places),
         verdict=np.array(
@@ -201,7 +202,7 @@ def columns_of(report: ValidationReport) -> VerdictColumns:
         value=outside[0],
         bound=outside[1],
         margin=outside[2],
-        silent=np.array([_silent(posture, checks) for posture in report.postures], dtype=np.int16),
+        silent=np.array([_silent(posture, checks) for posture in report.postures], dtype=np.int64),
         checks=checks,
     )
     return joined([part], part.places, checks)

@@ -119,7 +119,7 @@ class VerdictColumns:
     margin: Array
     value: Array
     bound: Array
-    silent: NDArray[np.int16]
+    silent: NDArray[np.int64]
     checks: Sequence[str] = ()
 
     def __len__(self) -> int:
@@ -194,7 +194,7 @@ def joined(
         "worst_place": np.zeros(0, dtype=np.int32),
         "place": np.zeros(0, dtype=np.int32),
         **{name: np.zeros(0) for name in NUMBER_COLUMNS},
-        "silent": np.zeros(0, dtype=np.int16),
+        "silent": np.zeros(0, dtype=np.int64),
     }
     arrays = {
         name: np.concatenate([none, *(getattr(part, name) for part in parts)]) for name, none in empty.items()
