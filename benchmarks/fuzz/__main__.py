@@ -14,13 +14,28 @@ from collections import Counter
 from pathlib import Path
 
 import posekit
-from benchmarks.fuzz.cases import Case, file_case, option_case, write_seeds
+from benchmarks.fuzz.cases import Case, file_case, kill_case, option_case, write_seeds
 from benchmarks.fuzz.damage import damaged
+from benchmarks.fuzz.structure import rearranged
 from benchmarks.fuzz.trial import Outcome, in_fork, tried
 from posekit.formats.markdown import table_lines
 
-OPTION_SHARE = 0.25
-"""The share of cases that are odd options; the others are damaged files."""
+OPTION_SHARE, KILL_SHARE = 0.25, 0.05
+"""The shares of cases that are odd options, and whole commands that are killed; the others are damaged files."""
+
+
+def changed(data: bytes, rng: random.Random) -> bytes:
+    """Damage the bytes of a file, or what it says."""
+    said = rearranged(data, rng) if rng.random() < 0.4 else None
+    return damaged(data, rng) if said is None else said
+
+
+def drawn(seeds: dict[str, list[Path]], rng: random.Random) -> Case:
+    """Draw a case."""
+    share = rng.random()
+    if share < OPTION_SHARE:
+        return option_case(rng)
+    return kill_case(rng) if share < OPTION_SHARE + KILL_SHARE else file_case(seeds, rng, changed)
 
 
 def keep(folder: Path, number: int, case: Case, outcome: Outcome) -> None:
@@ -28,7 +43,13 @@ def keep(folder: Path, number: int, case: Case, outcome: Outcome) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if case.name:
         (folder / f"{number}.{case.name}").write_bytes(case.data)
-    said = {"arguments": case.arguments, "name": case.name, "what": outcome.what, "detail": outcome.detail}
+    said = {
+        "kind": case.kind,
+        "arguments": case.arguments,
+        "name": case.name,
+        "what": outcome.what,
+        "detail": outcome.detail,
+    }
     (folder / f"{number}.case.json").write_text(json.dumps(said, indent=1), encoding="utf-8")
 
 
@@ -52,7 +73,7 @@ def main() -> int:
         ends, number = time.monotonic() + 60 * given.minutes, 0
         while time.monotonic() < ends:
             rng = random.Random(f"{given.seed}.{number}")
-            case = option_case(rng) if rng.random() < OPTION_SHARE else file_case(seeds, rng, damaged)
+            case = drawn(seeds, rng)
             outcome = tried(case, seeds_folder, folder)
             counts[case.kind, outcome.what] += 1
             if not outcome.clean:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+import signal
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -55,8 +56,13 @@ OPTION_COMMANDS: Final = (
     "evaluate SEEDS/walk.npz -o OUT.json --frames-per-clip 2 --yaw-step 180",
     "synth walker -o OUT.json",
     "synth random -o OUT.json",
-    "synth object -o OUT.json",
+    "synth object ur5 -o OUT.json",
     "synth mocap SEEDS/walk.npz -o OUT.json",
+)
+KILLED_COMMANDS: Final = (
+    *OPTION_COMMANDS,
+    "batch SEEDS/walk.json -o OUT",
+    "batch SEEDS/keypoints -o OUT",
 )
 ODD_VALUES: Final = (
     *(
@@ -117,6 +123,8 @@ class Case(NamedTuple):
     arguments: list[str]
     name: str = ""
     data: bytes = b""
+    killed_by: int = 0
+    killed_after: float = 0.0
 
 
 def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list[Path]]:
@@ -172,7 +180,15 @@ def file_case(
     """Damage a file of some kind, and choose a command that reads it."""
     kind = rng.choice([kind for kind, files in seeds.items() if files])
     path = rng.choice(seeds[kind])
-    return Case(kind, rng.choice(COMMANDS[kind]).split(), path.name, damage(path.read_bytes(), rng))
+    data = damage(path.read_bytes(), rng)
+    return Case(f"{kind} {path.suffix}", rng.choice(COMMANDS[kind]).split(), path.name, data)
+
+
+def kill_case(rng: random.Random) -> Case:
+    """Let a signal end a whole command after up to two seconds."""
+    killer = rng.choice((signal.SIGTERM, signal.SIGINT, signal.SIGKILL))
+    arguments = rng.choice(KILLED_COMMANDS).split()
+    return Case(f"killed by {killer.name}", arguments, killed_by=killer, killed_after=rng.uniform(0.0, 2.0))
 
 
 def option_case(rng: random.Random) -> Case:

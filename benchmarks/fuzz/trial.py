@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import shutil
@@ -35,7 +36,7 @@ class Outcome(NamedTuple):
     @property
     def clean(self) -> bool:
         """Whether it is what posekit promises."""
-        return self.what in ("accepted", "refused")
+        return self.what in ("accepted", "refused", "killed, all whole")
 
 
 def run_command(arguments: list[str]) -> int:
@@ -50,13 +51,19 @@ def run_command(arguments: list[str]) -> int:
     return 0
 
 
-def in_fork(arguments: list[str], said: Path, patience: float = PATIENCE_SECONDS) -> int | None:
-    """Run a command in a fork, its words in `said`, and return its exit code, -N of signal N; None for a hang."""
+def in_fork(
+    arguments: list[str], said: Path, patience: float = PATIENCE_SECONDS, kill: tuple[int, float] = (0, 0.0)
+) -> int | None:
+    """Run a command in a fork, its words in `said`, and return its exit code, -N of signal N; None for a hang.
+
+    `kill` is a signal that it gets, and after how many seconds; 0 for none.
+    """
     child = os.fork()
     if child == 0:
         code = CRASHED
         try:
             os.setsid()
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
             os.dup2(out, 1)
@@ -74,15 +81,19 @@ def in_fork(arguments: list[str], said: Path, patience: float = PATIENCE_SECONDS
             for stream in (sys.stdout, sys.stderr):
                 stream.flush()
             os._exit(code)
-    ends = time.monotonic() + patience
+    started = time.monotonic()
+    ends, killer = started + patience, kill[0]
     while time.monotonic() < ends:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             return os.waitstatus_to_exitcode(status)
+        if killer and time.monotonic() > started + kill[1]:
+            os.kill(child, killer)
+            killer = 0
         time.sleep(0.005)
-    for kill in (os.killpg, os.kill):
+    for end in (os.killpg, os.kill):
         try:
-            kill(child, signal.SIGKILL)
+            end(child, signal.SIGKILL)
         except ProcessLookupError:
             continue
     os.waitpid(child, 0)
@@ -101,9 +112,11 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
     here = Path.cwd()
     os.chdir(folder)
     try:
-        code = in_fork(arguments, folder.with_suffix(".said"))
+        code = in_fork(arguments, folder.with_suffix(".said"), kill=(case.killed_by, case.killed_after))
     finally:
         os.chdir(here)
+    if case.killed_by and code not in (0, 1, 2):
+        return _killed(case, code, folder)
     if code in (None, -signal.SIGXCPU, -signal.SIGKILL):
         return Outcome("hang", " ".join(arguments))
     said = folder.with_suffix(".said").read_text(encoding="utf-8", errors="replace")
@@ -117,6 +130,23 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
     if code not in (0, 1):
         return Outcome(f"exit {code}", said[-300:])
     return _accepted(written, folder)
+
+
+def _killed(case: Case, code: int | None, folder: Path) -> Outcome:
+    """Judge what a signal left: no traceback, whole files only, and beside them none but of SIGKILL."""
+    said = folder.with_suffix(".said").read_text(encoding="utf-8", errors="replace")
+    if code is None:
+        return Outcome("hang", said[-300:])
+    if "Traceback (most recent call last)" in said:
+        return Outcome("traceback", said[-1500:])
+    # A batch ends alike on both: 130, and what to run to go on.
+    if code not in (-case.killed_by, 128 + case.killed_by, 128 + signal.SIGINT):
+        return Outcome(f"exit {code} of signal {case.killed_by}", said[-300:])
+    if case.killed_by == signal.SIGKILL:
+        for part in [path for path in folder.rglob("*.part*") if path.is_file()]:
+            part.unlink()
+    found = _accepted(list(folder.iterdir()), folder)
+    return Outcome("killed, all whole") if found.clean else found
 
 
 def _placed(argument: str, places: dict[str, str]) -> str:
@@ -150,7 +180,7 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
             return Outcome("left over", path.name)
         if path.suffix == ".json":
             try:
-                json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
+                _in_domain(json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite))
             except ValueError as error:
                 return Outcome("not finite", f"{path.name}: {error}")
         if path.suffix == ".npz":
@@ -162,9 +192,24 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
                 return Outcome("not finite", f"{path.name}: {infinite}")
         if path.suffix in (".json", ".npz", ".bvh", ".trc") and path.parent == folder:
             again = folder.with_suffix(".again")
-            if in_fork(["inspect", str(path)], again) != 0:
+            refused = in_fork(["inspect", str(path)], again) != 0
+            # `inspect` reads views of people only, and says so of a view of an object.
+            if refused and "recover it with --linkage" not in again.read_text(errors="replace"):
                 return Outcome("not read again", f"{path.name}: {again.read_text(errors='replace')[-400:]}")
     return Outcome("accepted")
+
+
+def _in_domain(held: object) -> None:
+    """Refuse a number too large for a double, and a probability that is none."""
+    if isinstance(held, float) and not math.isfinite(held):
+        raise ValueError(f"{held} is no number")
+    if isinstance(held, dict):
+        probability = held.get("probability")
+        if isinstance(probability, float | int) and not -1e-9 <= probability <= 1.0 + 1e-9:
+            raise ValueError(f"{probability} is no probability")
+    if isinstance(held, dict | list):
+        for value in held.values() if isinstance(held, dict) else held:
+            _in_domain(value)
 
 
 def _not_finite(word: str) -> float:
