@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import json
 import random
@@ -74,7 +75,7 @@ def _entry_changed(holder: Any, key: Any, rng: random.Random) -> None:
     if kind == "drop":
         del holder[key]
     elif kind == "retype":
-        holder[key] = rng.choice(ODD_WORTHS)
+        holder[key] = copy.deepcopy(rng.choice(ODD_WORTHS))
     elif kind == "nest":
         holder[key] = {"": holder[key]} if rng.random() < 0.5 else [holder[key]]
     elif isinstance(holder, list):

@@ -1,15 +1,24 @@
 """The attack: damage is the same for a seed, and what is not clean is told from what is."""
 
+import io
+import json
 import random
+from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
+import pyarrow as arrow
 import pytest
+from pyarrow import parquet
 
 from benchmarks.fuzz.cases import Case, option_case
 from benchmarks.fuzz.damage import damaged
+from benchmarks.fuzz.structure import rearranged
 from benchmarks.fuzz.trial import Outcome, tried
+from posekit.robots.find import find
 from posekit.samples import write_samples
 
+FINDS = Path(__file__).parent / "finds"
 VALIDATE = ["validate", "SEEDS/walk.npz", "-o", "OUT.json"]
 
 
@@ -18,6 +27,30 @@ def test_damage_is_the_same_for_a_seed(data: bytes) -> None:
     found = [damaged(data, random.Random(seed)) for seed in range(200)]
     assert found == [damaged(data, random.Random(seed)) for seed in range(200)]
     assert len(set(found)) > (5 if len(data) < 2 else 100)
+
+
+@pytest.mark.parametrize("name", ["walk.json", "stick_figure.urdf", "motion.parquet"])
+def test_what_a_file_says_is_changed_and_its_grammar_stays(seeds: Path, name: str) -> None:
+    data = whole(seeds, name)
+    readers: dict[str, Callable[[bytes], object]] = {
+        "walk.json": json.loads,
+        "stick_figure.urdf": ElementTree.fromstring,
+        "motion.parquet": table_of,
+    }
+    found = [rearranged(data, random.Random(seed)) for seed in range(60)]
+    assert found == [rearranged(data, random.Random(seed)) for seed in range(60)]
+    changed = [one for one in found if one is not None and one != data]
+    assert len(set(changed)) > 30
+    for one in changed:
+        readers[name](one)
+
+
+@pytest.mark.parametrize("kept", sorted(FINDS.glob("*.case.json")), ids=lambda path: path.name)
+def test_a_find_of_before_is_clean(seeds: Path, tmp_path: Path, kept: Path) -> None:
+    held = json.loads(kept.read_text(encoding="utf-8"))
+    data = kept.with_name(kept.name.replace("case.json", held["name"])).read_bytes() if held["name"] else b""
+    found = tried(Case(held["kind"], held["arguments"], held["name"], data), seeds, tmp_path / "case")
+    assert found.clean, found
 
 
 def test_options_are_those_of_the_command() -> None:
@@ -32,6 +65,22 @@ def seeds(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("seeds")
     write_samples(folder)
     return folder
+
+
+def whole(seeds: Path, name: str) -> bytes:
+    """Return a whole file."""
+    if name.endswith(".urdf"):
+        return Path(find("stick_figure").urdf).read_bytes()
+    if name.endswith(".parquet"):
+        out = io.BytesIO()
+        parquet.write_table(arrow.table({"a": [1.0, 2.0, 3.0], "b": [1, 2, 3], "c": ["x", "y", "z"]}), out)
+        return out.getvalue()
+    return (seeds / name).read_bytes()
+
+
+def table_of(data: bytes) -> object:
+    """Read a table."""
+    return parquet.ParquetFile(io.BytesIO(data)).metadata
 
 
 def outcome(seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> Outcome:
@@ -65,7 +114,7 @@ def test_what_is_not_clean_is_told(
     seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, what: str
 ) -> None:
     if what == "hang":
-        monkeypatch.setattr("benchmarks.fuzz.trial.in_fork", lambda *given: None)
+        monkeypatch.setattr("benchmarks.fuzz.trial.in_fork", lambda *given, **named: None)
     found = outcome(seeds, tmp_path, monkeypatch, command)
     assert found.what == what, found
     assert found.clean == (what in ("accepted", "refused"))
