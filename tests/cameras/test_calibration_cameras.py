@@ -204,3 +204,8 @@ def test_one_camera_is_chosen_and_several_are_named() -> None:
     with pytest.raises(InputError, match="cam0") as refused:
         choose_camera(many, "cam_0")
     assert len(str(refused.value)) < 500
+
+
+def test_whole_numbers_become_floating_ones() -> None:
+    whole = np.array([[1000, 0, 640], [0, 1000, 360], [0, 0, 1]])
+    assert CalibratedCamera(name="left", K=whole).K.dtype == np.float64
