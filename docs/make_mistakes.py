@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sys
 import tempfile
 from itertools import groupby
@@ -21,9 +22,11 @@ HEAD: Final = """# What the answers to mistakes look like
 
 Whatever is wrong, `posekit` writes one line to the standard error, ends with 2, and leaves nothing half-written. The
 line says where and what was found, what is expected, and what to do. These are made in the tests, among the files that
-`posekit samples` writes, a result `postures.npz`, and files of other programs.
+`posekit samples` writes, a result `postures.npz`, and files of other programs; long lists of names are cut here.
 
 """
+LONG_LIST: Final = re.compile(r"((?:[\w.-]+, ){3})(?:[\w.-]+, ){4,}([\w.-]+)")
+"""Eight names and more: the first three and the last are shown."""
 
 
 def answers() -> str:
@@ -47,14 +50,18 @@ def answers() -> str:
             for group, mistakes in groupby(
                 sorted(MISTAKES, key=lambda one: one.group), key=lambda one: one.group
             ):
-                parts.append(f"\n\n## {group}\n")
-                for one in mistakes:
-                    said = answer(*one.command.split()).removeprefix("posekit: error: ").strip()
-                    what = one.what[0].upper() + one.what[1:]
-                    parts.append(f"\n{what}\n\n```text\n$ posekit {one.command}\n{said}\n```\n")
+                said = "\n".join(
+                    f"$ posekit {one.command}\n{shown(answer(*one.command.split()))}\n" for one in mistakes
+                )
+                parts.append(f"\n\n## {group}\n\n```text\n{said}```")
         finally:
             os.chdir(here)
-    return "".join(parts)
+    return "".join(parts) + "\n"
+
+
+def shown(said: str) -> str:
+    """Cut the program's name, and the middle of long lists, from an answer."""
+    return LONG_LIST.sub(r"\1…, \2", said.removeprefix("posekit: error: ").strip())
 
 
 def answer(*words: str) -> str:

@@ -22,7 +22,8 @@ PAGE_HEAD = """# Every result, every command, every format
 
 Made and checked in the tests: each kind of result that `posekit recover` writes, given to each command, and converted
 to each format that is written. *yes*: it is done. *filled*: it is done, and a line says which frames or joints were
-interpolated, held or left out (`--gaps` chooses). A number is a refusal, with its reason below the table.
+interpolated, held or left out (`--gaps` chooses). A number is a refusal, with its reason below the table. Kinds, and
+commands and formats, that come out alike share a column or a row.
 """
 
 
@@ -115,7 +116,7 @@ def attempt(command: Command, result: Path, column: str, folder: Path) -> Any:
 
 
 def page(cells: dict[str, dict[str, Any]], results: dict[str, Path]) -> str:
-    """Write the page: a row a command or format, a column a kind of result, and the reasons of refusals."""
+    """Write the page: commands and formats down, kinds of result across, and the reasons of refusals."""
     reasons: list[str] = []
 
     def word(kind: str, column: str) -> str:
@@ -123,13 +124,27 @@ def page(cells: dict[str, dict[str, Any]], results: dict[str, Path]) -> str:
         if outcome.code in (0, 1):
             return "filled" if column not in COMMANDS and any(one in outcome.out for one in FILLED) else "yes"
         said = outcome.err.strip().removeprefix("posekit: error: ").replace(str(results[kind]), "RESULT")
+        said = said.replace(f"got {column.partition(', ')[0]}, of", "got FORMAT, of")
         if said not in reasons:
             reasons.append(said)
         return str(reasons.index(said) + 1)
 
-    kinds = list(results)
-    lines = [PAGE_HEAD, f"| | {' | '.join(kinds)} |", "|---" * (len(kinds) + 1) + "|"]
-    for column in columns():
-        lines.append(f"| {column} | {' | '.join(word(kind, column) for kind in kinds)} |")
+    table = {column: tuple(word(kind, column) for kind in results) for column in columns()}
+    rows = alike(table)
+    across = alike(dict(zip(results, zip(*table.values(), strict=True), strict=True)))
+    lines = [PAGE_HEAD, f"| | {' | '.join('; '.join(kinds) for kinds in across)} |"]
+    lines.append("|---" * (len(across) + 1) + "|")
+    place = {kind: k for k, kind in enumerate(results)}
+    for columns_alike in rows:
+        said = (table[columns_alike[0]][place[kinds[0]]] for kinds in across)
+        lines.append(f"| {'; '.join(columns_alike)} | {' | '.join(said)} |")
     lines += ["", *(f"{k}. `{reason}`" for k, reason in enumerate(reasons, start=1))]
     return "\n".join(lines) + "\n"
+
+
+def alike(words: dict[str, tuple[str, ...]]) -> list[list[str]]:
+    """Put names together that have the same words, in the order of the first of each."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for name, said in words.items():
+        found.setdefault(said, []).append(name)
+    return list(found.values())
