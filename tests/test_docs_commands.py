@@ -27,7 +27,6 @@ NOT_RUN = {
     r"make ": "sets up the environment that this runs in: .ci/run runs demo, test and docs",
     r"(pip|uvx|\.venv/bin/|\. \.venv|git clone|cd )": "installs: benchmarks/newcomer.py does",
     r"python (-m )?benchmarks": "measures, by recordings that are not posekit's to ship",
-    r"python -c .*pandas": "another package's",
     r"detector \|": "a camera and a detector write into it",
     r"posekit view ": "serves until somebody stops it",
     r"posekit demo ": "tests/cli runs it",
