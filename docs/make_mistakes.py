@@ -21,8 +21,9 @@ PAGE: Final = ROOT / "docs/reference/mistakes.md"
 HEAD: Final = """# What the answers to mistakes look like
 
 Whatever is wrong, `posekit` writes one line to the standard error, ends with 2, and leaves nothing half-written. The
-line says where and what was found, what is expected, and what to do. These are made in the tests, among the files of
-`posekit samples`, a result `postures.npz`, and files of other programs; long lists of names are cut here.
+line says where and what was found, what is expected, and what to do. Below is what is typed behind `posekit`, and what
+it answers, made in the tests among the files of `posekit samples`, a result `postures.npz`, and files of other
+programs; long lists of names are cut here.
 
 """
 LONG_LIST: Final = re.compile(r"((?:[\w.-]+, ){2})(?:[\w.-]+, ){3,}([\w.-]+)")
@@ -51,7 +52,7 @@ def answers() -> str:
                 sorted(MISTAKES, key=lambda one: one.group), key=lambda one: one.group
             ):
                 said = "\n".join(
-                    f"posekit {one.command}\n  {shown(answer(*one.command.split()))}\n" for one in mistakes
+                    f"{one.command}\n  {shown(answer(*one.command.split()))}\n" for one in mistakes
                 )
                 parts.append(f"\n\n## {group}\n\n```text\n{said}```")
         finally:

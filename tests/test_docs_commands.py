@@ -50,7 +50,6 @@ FRAGMENT_PAGES = {
     "docs/explanation/placement.md": "a camera and image of one's own",
     "docs/formats/csv.md": "pandas is another package",
     "docs/formats/glb.md": "configurations of one's own",
-    "docs/formats/parquet.md": "trials of one's own",
 }
 """Pages whose Python is a fragment, with what it lacks: it is compiled alone."""
 
