@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import importlib.machinery
 import json
+import math
 import os
 import pkgutil
 import resource
@@ -31,7 +32,9 @@ FILE_SECONDS: Final = 20.0
 ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
 """Rooms whose tests are near, beside the file's own."""
 PATIENCE_SECONDS: Final = 60.0
-"""Beyond three times what the map says: a fault that does not end is found."""
+"""Of processor, beyond three times what the map says: a fault that does not end is found."""
+BUSY_MACHINE: Final = 10.0
+"""How many times as long that may last by the clock, where other processes run."""
 MEMORY_BYTES: Final = 8 << 30
 
 Outcome = Literal["killed", "survived", "endless"]
@@ -109,6 +112,8 @@ def in_fork(mutant: Mutant | None, tests: list[str], patience: float) -> str | N
             for stream in (0, 1, 2):
                 os.dup2(null, stream)
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+            allowed = math.ceil(sum(os.times()[:2]) + patience)
+            resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 60))
             os.chdir(ROOT)
             if mutant is not None:
                 plant(mutant)
@@ -127,7 +132,7 @@ def in_fork(mutant: Mutant | None, tests: list[str], patience: float) -> str | N
 
 def _waited(child: int, reading: int, tests: list[str], patience: float) -> str | None:
     """Wait for a fork, and end it when its time is over."""
-    ends = time.monotonic() + patience
+    ends = time.monotonic() + BUSY_MACHINE * patience
     status = None
     while status is None and time.monotonic() < ends:
         done, found = os.waitpid(child, os.WNOHANG)
@@ -145,6 +150,8 @@ def _waited(child: int, reading: int, tests: list[str], patience: float) -> str 
             return None
         os.set_blocking(pipe.fileno(), False)
         said = (pipe.read() or b"").decode()
+    if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU:
+        return None
     if not said and (os.WIFSIGNALED(status) or os.waitstatus_to_exitcode(status) != 0):
         return tests[0]
     return said

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Final
+import itertools
 
 import numpy as np
 
 from posekit.geometry import Array
 
-HULL_DIRECTIONS: Final = 96
-"""Of which edges of supports are taken: distances are short by 0.05 % at most."""
-
 
 def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
     r"""Return how far points are, along the ground, beyond the convex hull of what bears.
 
-    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u.
+    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u: it is
+    greatest for the normal of an edge, or for the way from the nearest corner.
 
     Parameters
     ----------
@@ -33,9 +31,16 @@ def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
     """
     first = np.cross(up, np.eye(3)[np.abs(up).argmin()])
     first = first / np.linalg.norm(first)
-    angle = np.arange(HULL_DIRECTIONS) * (2 * np.pi / HULL_DIRECTIONS)
-    around = np.outer(np.cos(angle), first) + np.outer(np.sin(angle), np.cross(up, first))
-    beyond = np.full(len(points), -np.inf)
-    for direction in around:
-        beyond = np.maximum(beyond, points @ direction - np.fmax.reduce(bearing @ direction, axis=1))
-    return beyond
+    across = np.stack([first, np.cross(up, first)], axis=1)
+    at, corners = points @ across, bearing @ across
+    one, other = zip(*itertools.permutations(range(corners.shape[1]), 2), strict=True)
+    edges = corners[:, other] - corners[:, one]
+    normals = edges[..., ::-1] * [1.0, -1.0]
+    ways = np.concatenate([normals, at[:, None] - corners], axis=1)
+    lengths = np.linalg.norm(ways, axis=2, keepdims=True)
+    ways = ways / np.where(lengths > 0, lengths, np.nan)
+    reach = np.fmax.reduce(np.einsum("tdi,tpi->tdp", ways, corners), axis=2)
+    beyond = np.fmax.reduce(np.einsum("tdi,ti->td", ways, at) - reach, axis=1)
+    # On the only corner there is no way from it.
+    on_it = (at[:, None] == corners).all(axis=2).any(axis=1)
+    return np.asarray(np.where(np.isnan(beyond) & on_it, 0.0, beyond))
