@@ -13,7 +13,15 @@ from pathlib import Path
 from benchmarks.mutants.files import ROOT, files_of_rooms, folders_of_tests
 from benchmarks.mutants.line_map import map_lines, read_maps
 from benchmarks.mutants.mutations import Mutant, mutants
-from benchmarks.mutants.runner import PATIENCE_SECONDS, as_line, chosen_tests, in_fork, load_libraries, tried
+from benchmarks.mutants.runner import (
+    PATIENCE_SECONDS,
+    TESTED_SECONDS,
+    as_line,
+    chosen_tests,
+    in_fork,
+    load_libraries,
+    tried,
+)
 
 
 def drawn(files: list[str], seed: int) -> Iterator[Mutant]:
@@ -52,6 +60,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "mutants-results", help="a folder")
     parser.add_argument("--count", type=int, default=1000, help="how many faults")
     parser.add_argument("--seed", type=int, default=1985)
+    parser.add_argument(
+        "--seconds", type=float, default=TESTED_SECONDS, help="of tests that a fault is given"
+    )
     parser.add_argument("--part", default="0/1", help="I/N: this process takes every N-th, from the I-th")
     parser.add_argument("--again", action="store_true", help="try those that survived once more")
     given = parser.parse_args()
@@ -75,7 +86,8 @@ def main() -> None:
         known = last.get(mutant.name)
         if number % parts != part or known in ("killed", "endless") or (known and not given.again):
             continue
-        trial = tried(mutant, chosen_tests(mutant, lines.get(mutant.file, {}), seconds), seconds, fails)
+        tests = chosen_tests(mutant, lines.get(mutant.file, {}), seconds, given.seconds)
+        trial = tried(mutant, tests, seconds, fails)
         with results.open("a", encoding="utf-8") as out:
             print(as_line(mutant, trial), file=out, flush=True)
     outcomes = {

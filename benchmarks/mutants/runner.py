@@ -26,9 +26,10 @@ from benchmarks.mutants.mutations import Mutant
 FIRST_TESTS: Final = 25
 """The first few usually find a fault: the others are not collected for them."""
 TESTED_SECONDS: Final = 60.0
-"""How long the tests that run a fault's line may take by the map: more may find more."""
+"""How long the tests that run a fault's line may take the processor by the map, unless told otherwise: more may find
+more."""
 FILE_SECONDS: Final = 20.0
-"""How long near tests of other lines of its file may take besides."""
+"""How long near tests of other lines of its file may take besides, in that time."""
 ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
 """Rooms whose tests are near, beside the file's own."""
 PATIENCE_SECONDS: Final = 60.0
@@ -58,7 +59,9 @@ def load_libraries() -> None:
         del sys.modules[name]
 
 
-def chosen_tests(mutant: Mutant, lines: dict[int, set[str]], seconds: dict[str, float]) -> list[str]:
+def chosen_tests(
+    mutant: Mutant, lines: dict[int, set[str]], seconds: dict[str, float], tested: float = TESTED_SECONDS
+) -> list[str]:
     """Order the tests that run a fault's line, the nearest and fastest first, as many as there is time for.
 
     After them come near ones that run another line of the file: what is kept from one test to the next ran its lines
@@ -71,8 +74,8 @@ def chosen_tests(mutant: Mutant, lines: dict[int, set[str]], seconds: dict[str, 
     chosen: list[str] = []
     total = 0.0
     for names, limit in (
-        (of_line, TESTED_SECONDS),
-        ((near & of_file) - of_line, TESTED_SECONDS + FILE_SECONDS),
+        (of_line, tested),
+        ((near & of_file) - of_line, tested + FILE_SECONDS * tested / TESTED_SECONDS),
     ):
         for name in sorted(names, key=lambda n: (n not in of_file, n not in near, seconds[n], n)):
             if total + seconds[name] <= limit or not chosen:
