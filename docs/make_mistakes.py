@@ -23,7 +23,7 @@ HEAD: Final = """# What the answers to mistakes look like
 Whatever is wrong, `posekit` writes one line to the standard error, ends with 2, and leaves nothing half-written. The
 line says where and what was found, what is expected, and what to do. Below is what is typed behind `posekit`, and what
 it answers, made in the tests among the files of `posekit samples`, a result `postures.npz`, and files of other
-programs; long lists of names are cut here.
+programs. Long lists of names are cut here, and what an answer above ends with too.
 
 """
 LONG_LIST: Final = re.compile(r"((?:[\w.-]+, ){2})(?:[\w.-]+, ){3,}([\w.-]+)")
@@ -51,8 +51,9 @@ def answers() -> str:
             for group, mistakes in groupby(
                 sorted(MISTAKES, key=lambda one: one.group), key=lambda one: one.group
             ):
+                ends: set[str] = set()
                 said = "\n".join(
-                    f"{one.command}\n  {shown(answer(*one.command.split()))}\n" for one in mistakes
+                    f"{one.command}\n  {shown(answer(*one.command.split()), ends)}\n" for one in mistakes
                 )
                 parts.append(f"\n\n## {group}\n\n```text\n{said}```")
         finally:
@@ -60,9 +61,14 @@ def answers() -> str:
     return "".join(parts) + "\n"
 
 
-def shown(said: str) -> str:
-    """Cut the program's name, and the middle of long lists, from an answer."""
-    return LONG_LIST.sub(r"\1…, \2", said.removeprefix("posekit: error: ").strip())
+def shown(said: str, ends: set[str]) -> str:
+    """Cut the program's name, the middle of long lists, and an end that was shown before, from an answer."""
+    said = LONG_LIST.sub(r"\1…, \2", said.removeprefix("posekit: error: ").strip())
+    start, word, end = said.partition("; expected ")
+    if word and end in ends:
+        return f"{start}{word}…"
+    ends.add(end)
+    return said
 
 
 def answer(*words: str) -> str:
