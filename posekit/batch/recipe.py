@@ -14,6 +14,7 @@ from posekit.formats.own import View
 from posekit.recovery.body import loaded, ranges_of
 from posekit.recovery.noise import refuse_deviation
 from posekit.recovery.person import refuse_settings
+from posekit.safe_io.extras import extra
 from posekit.settings import PartialTolerance, RecoverSettings, Scale, Tolerance
 from posekit.views.camera import split_camera
 from posekit.views.source import Source
@@ -27,6 +28,7 @@ RECORDED_PACKAGES: Final = ("posekit", "pin", "coal", "numpy", "pyarrow")
 
 def versions() -> dict[str, str]:
     """Return the versions of what computes and writes the results."""
+    extra("pyarrow", "parquet", "posekit batch")
     return {name: version(name) for name in RECORDED_PACKAGES}
 
 

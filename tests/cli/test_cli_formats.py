@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 import sys
@@ -333,6 +334,7 @@ def test_lengths_in_another_unit_are_refused(there: Path, command: Run, tmp_path
         ("pyarrow", "parquet", "convert @result.npz OUT.parquet"),
         ("pyarrow", "parquet", "convert @result.npz OUT.parquet --posture all"),
         ("pyarrow", "parquet", "convert @walk.parquet OUT.csv"),
+        ("pyarrow", "parquet", "batch @view.json -o OUT"),
         ("cv2", "opencv", "recover @pictures -o OUT.npz --camera @fisheye.toml"),
     ],
 )
@@ -352,6 +354,14 @@ def test_a_missing_package_is_named_with_its_command(
     for name in [name for name in sys.modules if name.partition(".")[0] == module]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, module, None)
+    installed = importlib.metadata.version
+
+    def version(name: str) -> str:
+        if name == module:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return installed(name)
+
+    monkeypatch.setattr("posekit.batch.recipe.version", version)
     words = [word.replace("OUT", str(tmp_path / "out")) for word in from_file(there, arguments).split()]
     out = Path(next(word for word in words if word.startswith(str(tmp_path))))
     line = refused(command, out, *words)
