@@ -6,12 +6,16 @@ import glob
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.recognising import recognise
 from posekit.safe_io import cut, refusal
 from posekit.safe_io.regular_file import unreadable
+
+MANIFEST_NAME: Final = "posekit-manifest.csv"
+"""What `posekit validate --keep` writes beside the clips; in a folder it is no input."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +104,7 @@ def _of_folder(folder: Path, wanted: Wanted, output: Path | None) -> Iterator[Pa
         if one.is_dir():
             if one.resolve() != output and not one.is_symlink():
                 yield from _of_folder(one, wanted, output)
-        elif one.suffix.lower() in wanted.suffixes and one.resolve() != output:
+        elif one.suffix.lower() in wanted.suffixes and one.name != MANIFEST_NAME and one.resolve() != output:
             yield one
 
 

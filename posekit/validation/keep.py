@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from posekit.display.plural import plural
 from posekit.errors import InputError
+from posekit.formats.listing import MANIFEST_NAME
 from posekit.formats.motion.cutting import cut_motion, cut_name
 from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ReportFrames
@@ -22,9 +23,6 @@ from posekit.formats.own.report_rows import csv_line
 from posekit.formats.own.report_table import said_of_span
 from posekit.safe_io import cut, refusal, write_lines
 from posekit.safe_io.writing import make_folder
-
-MANIFEST_NAME: Final = "posekit-manifest.csv"
-
 
 ROUNDING_SECONDS: Final = 1e-6
 """Seconds that the difference of two times may be off."""

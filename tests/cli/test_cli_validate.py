@@ -133,6 +133,15 @@ def test_a_root_that_is_left_out_stands_at_the_origin() -> None:
         np.testing.assert_array_equal(short.in_order_of(HUMAN.configuration_names), some_q())
 
 
+def test_configurations_of_another_robot_ask_for_its_urdf(run) -> None:
+    write_configurations("q.npz", some_q(), HUMAN.configuration_names)
+    outcome = run("q.npz")
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert "q.npz: configuration_names: got" in outcome.err
+    assert "say which robot it is, as posekit validate --urdf FILE|NAME" in outcome.err
+
+
 def test_a_plain_array_named_q_will_do(run) -> None:
     np.savez("q.npz", q=some_q()[:1].astype(np.float32))
     assert run("q.npz", "--urdf", "human").code == 0

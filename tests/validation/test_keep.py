@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
+from posekit.formats.listing import MANIFEST_NAME, Wanted, listed
 from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.formats.own.report_schema import Verdict
-from posekit.validation.keep import MANIFEST_NAME, keep_clips, names_below
+from posekit.validation.keep import keep_clips, names_below
 
 FRAMES = 10
 
@@ -77,6 +78,12 @@ def test_files_keep_their_names_below_the_folder_that_holds_them_all(tmp_path, t
     assert "longest good span 0.1 s, below 0.5 s" in rows[2]["why"]
     assert kept.said == "2 of 3 clips kept, 1 of them cut to their longest good span"
     assert files_of(tmp_path / "in") == before
+
+
+def test_what_was_kept_is_an_input_again(tmp_path, three):
+    keep_clips(tmp_path / "out", *three, spans=0.5)
+    found = listed([tmp_path / "out"], Wanted(suffixes=(".npz", ".csv"), contents=()))
+    assert [path.relative_to(tmp_path / "out").as_posix() for path in found] == ["a/walk.npz", "b/walk.npz"]
 
 
 def test_without_spans_only_what_passes_is_kept(tmp_path, three):

@@ -78,16 +78,13 @@ class NamedConfigurations(ShortRepr):
                 remedy = "check which robot it is; configuration_names says what is in which place"
                 raise refusal(self.source, "q", f"{self.q.shape[1]} variables", f"{len(names)}", remedy)
         own = tuple(name if name in names else f"{name}_joint" for name in own)  # as some tables shorten them
-        for name in own:
-            if name not in names:
-                expected = "a variable of the robot"
-                raise refusal(
-                    self.source,
-                    "configuration_names",
-                    shown(name.removesuffix("_joint")),
-                    expected,
-                    nearest(name, names)[:200],
-                )
+        unknown = [name.removesuffix("_joint") for name in own if name not in names]
+        if unknown:
+            another = len(unknown) > 1 and not set(own) & set(names[len(ROOT_NAMES) :])
+            expected = f"a variable of the robot{f', as {names[-1]}' if another else ''}"
+            which = "say which robot it is, as posekit validate --urdf FILE|NAME"
+            remedy = which if another else nearest(unknown[0], names)[:200]
+            raise refusal(self.source, "configuration_names", shown(unknown[0]), expected, remedy)
         wanted = names[len(ROOT_NAMES) :] if rooted and not set(own) & set(ROOT_NAMES) else names
         missing = [name for name in wanted if name not in own]
         if missing:
