@@ -104,6 +104,14 @@ def test_pinocchios_capsules_lie_where_the_posture_has_them(subject: DrawnSubjec
             np.testing.assert_allclose(ends[1], wanted, rtol=0, atol=1e-8)
 
 
+def test_postures_of_a_person_have_capsules_of_that_size(walked: Result) -> None:
+    child = Postures(joints=0.7 * walked.frames[0].joints)
+    hips = next(one for one in subject_of(child).figure.capsules if one.link == "hips")
+    adult = next(one for one in subject_of(walked).figure.capsules if one.link == "hips")
+    assert hips.half_length == pytest.approx(0.7 * adult.half_length, abs=1e-3)
+    assert hips.center == pytest.approx(0.7 * adult.center, abs=1e-3)
+
+
 def test_world_is_upright_and_stands_on_the_ground(subject: DrawnSubject) -> None:
     world = upright_world(subject.points())
     placed = world.place(subject.frames[0].points)

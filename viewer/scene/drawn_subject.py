@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure, with_head
+from posekit.body.measured import figure_of, measured_person
 from posekit.errors import FigureError, ViewerError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion.motion_axes import up_rotation
@@ -148,10 +149,9 @@ def subject_of(given: Result | Postures | HeldPostures | View, view: View | None
     if isinstance(given, View):
         return _of_view(given)
     if isinstance(given, HeldPostures):
-        figure, frames = load_figure(), _of_held(given)
+        figure, frames = _figure_measured(given.postures), _of_held(given)
     elif isinstance(given, Postures):
-        frames = [_of_postures(given)]
-        figure = load_figure()
+        figure, frames = _figure_measured(given), [_of_postures(given)]
     else:
         if view is not None and len(view) != len(given.frames):
             raise ViewerError(
@@ -265,6 +265,12 @@ def _of_view(view: View) -> DrawnSubject:
     figure = load_figure()
     figure = figure if view.stature is None else figure.from_stature(view.stature)
     return DrawnSubject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view.camera))
+
+
+def _figure_measured(given: Postures) -> Figure:
+    """Return the built-in figure with the lengths that the postures have in the median."""
+    person = measured_person(np.asarray(given.joints))
+    return figure_of(load_figure(), person.lengths, person.behind)
 
 
 def _figure_of(result: Result) -> Figure:
