@@ -119,7 +119,8 @@ def _key_points(found: KeyPoints) -> list[str]:
     if len(people) > MOST_PEOPLE:
         lines += [f"and {len(people) - MOST_PEOPLE} more people", ""]
     one = choose(found, "largest")
-    lines += [f"person {int(one.person[0])} (the largest):", ""]
+    same = len(np.unique(one.person)) == 1
+    lines += [f"person {int(one.person[0])} (the largest):" if same else "the largest in each picture:", ""]
     lines += _seen(one.landmarks, one.landmark_confidence)
     return lines + [line.partition(": ")[2] for line in check_sides(one).warnings]
 

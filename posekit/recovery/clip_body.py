@@ -122,8 +122,8 @@ def changed_lengths(
     lines = []
     if not sized:
         lines.append(
-            "the pictures do not tell how large the body is, as it looks the same larger and further away: its size is "
-            "the one that was given, and its depth goes with it"
+            "the pictures do not tell how large the body is, as it looks the same larger and further away: size and "
+            "depth are those of the lengths that it was recovered with"
         )
     elif abs(size) > max(2 * known.common, FACTOR_NAMED):
         lines.append(

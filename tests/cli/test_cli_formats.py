@@ -471,6 +471,18 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
             assert part in done.out, (path, part, done.out)
 
 
+def test_points_of_different_people_are_not_told_as_one_persons(command: Run, tmp_path: Path) -> None:
+    pictures = [{"id": k, "file_name": f"{k}.jpg", "width": 640, "height": 480 + k} for k in range(2)]
+    points = [number for j in range(17) for number in (20.0 * j, 10.0 * j, 2)]
+    people = [{"id": k, "image_id": k, "category_id": 1, "keypoints": points} for k in range(2)]
+    category = {"id": 1, "name": "person"}
+    coco = {"images": pictures, "annotations": people, "categories": [category]}
+    done = command("inspect", bad(tmp_path, "coco.json", json.dumps(coco)))
+    assert done.code == 0, done.err
+    assert "the largest in each picture:" in done.out
+    assert "person 0 (" not in done.out
+
+
 @pytest.mark.parametrize("name", ["csv", "npz", "parquet"])
 def test_clips_go_into_tables_together(name: str, there: Path, command: Run, tmp_path: Path) -> None:
     done = command("convert", there / "clips.npz", tmp_path / f"clips.{name}")

@@ -99,7 +99,9 @@ def test_a_size_that_nothing_tells_stays_and_is_said() -> None:
     change = [np.log(said["lengths"][name] / said["start"][name]) for name in SEGMENT_NAMES]
     assert abs(np.mean(change)) < 0.03
     assert said["size_deviation"] == recovery.settings["noise"]["size"] > 0
-    assert "its size is the one that was given" in " ".join(advice_lines(recovery))
+    assert "size and depth are those of the lengths that it was recovered with" in " ".join(
+        advice_lines(recovery)
+    )
 
 
 def test_exact_lengths_stay() -> None:

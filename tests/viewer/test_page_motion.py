@@ -17,6 +17,7 @@ from posekit.validation.page_findings import page_findings
 from posekit.validation.reading import StatedMotion, read_postures_of
 from posekit.viewer.page.answer_page import answer_segments
 from posekit.viewer.page.data import page_data
+from posekit.viewer.page.findings_page import PageFinding, PageFindings
 from posekit.viewer.page.page import write_page
 from tests.viewer.driving import wait_until
 
@@ -60,6 +61,13 @@ def motion():
         time=np.arange(FRAMES) / 20,
         up="+z",
     )
+
+
+def test_findings_without_a_unit_are_numbers():
+    one = PageFinding(check="drift", where="left_knee-left_ankle", unit="1", value=-0.16, bound=-0.025)
+    findings = PageFindings(by_posture={0: [one]})
+    assert findings.described()[0]["unit"] == ""
+    assert findings.numbers()[0][0][1:] == [-0.16, -0.025]
 
 
 def test_a_motion_plays_and_says_what_checks_find(opened, motion):

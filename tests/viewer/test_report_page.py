@@ -123,6 +123,12 @@ def test_clips_are_chosen_by_check(browser, tmp_path):
     )
 
 
+def test_one_clip_is_one_clip(browser, tmp_path):
+    write_report_page(tmp_path / "r.html", a_report(1))
+    browser.open(tmp_path / "r.html")
+    assert browser.evaluate("document.getElementById('lead').textContent").startswith("1 clip: 0 valid")
+
+
 def test_a_page_over_many_clips_is_some_megabytes(tmp_path):
     report = a_report(1000)
     write_report_page(tmp_path / "r.html", report)

@@ -15,7 +15,7 @@ Json = dict[str, Any]
 MOST_OF_POSTURE: Final = 6
 """Findings of one posture that a page has."""
 
-SHOWN_UNITS: Final = {"m": (1000.0, "mm"), "deg": (1.0, "°")}
+SHOWN_UNITS: Final = {"m": (1000.0, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
 """How values are shown, by unit."""
 
 

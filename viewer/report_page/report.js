@@ -147,11 +147,12 @@ function showClips(data) {
 
 function showReport(data) {
   document.getElementById("title").textContent = data.title;
-  const total = Object.values(data.postures).reduce((sum, count) => sum + count, 0);
-  const what = data.clip_counts ? "frames" : "postures";
-  const said = counts => Object.entries(counts).map(([verdict, count]) => `${count} ${verdict}`).join(", ");
-  let lead = `${total} ${what}: ${said(data.postures)}.`;
-  if (data.clip_counts) lead = `${Object.values(data.clip_counts).reduce((a, b) => a + b, 0)} clips: ${said(data.clip_counts)}. ${lead}`;
+  const sum = counts => Object.values(counts).reduce((a, b) => a + b, 0);
+  const counted = (counts, thing) => `${sum(counts).toLocaleString("en")} ${thing}${sum(counts) === 1 ? "" : "s"}`;
+  const total = sum(data.postures), thing = data.clip_counts ? "frame" : "posture", what = `${thing}s`;
+  const said = counts => Object.entries(counts).map(([verdict, count]) => `${count.toLocaleString("en")} ${verdict}`).join(", ");
+  let lead = `${counted(data.postures, thing)}: ${said(data.postures)}.`;
+  if (data.clip_counts) lead = `${counted(data.clip_counts, "clip")}: ${said(data.clip_counts)}. ${lead}`;
   document.getElementById("lead").textContent = lead;
   if (data.settings.why) document.getElementById("lead").after(make("p", {}, data.settings.why));
   showChecks(data, total, what);
