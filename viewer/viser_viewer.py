@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from posekit.errors import ViewerError
 from posekit.formats.motion.glb_capsule import capsule_mesh
+from posekit.formats.own.frame_answer import likeliest_order
 from posekit.geometry import Array
 from posekit.safe_io import extra
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
@@ -92,7 +93,7 @@ class ViserViewer:
             self._body.displayVisuals(False)
             return
         p = frame.probability
-        order = np.arange(len(frame)) if p is None else np.argsort(-p, kind="stable")
+        order = np.arange(len(frame)) if p is None else likeliest_order(p, frame.answer)
         place = min(int(self.posture.value), len(frame) - 1)
         row = int(order[place])
         q = self.subject.figure.configurations(frame.aligned_points[row : row + 1]).q[0]

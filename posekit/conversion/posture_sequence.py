@@ -19,6 +19,7 @@ from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import CameraModel, OpenCVModel, Postures, Result, View
+from posekit.formats.own.frame_answer import likeliest_order
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
@@ -223,17 +224,21 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         return _of_path(result, figure, view, stated)
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
+    sure: list[float] = []
     lost: dict[int, float] = {}
     probability = probabilities(result, figure.lengths)
     for k in range(len(result.frames)):
         order = np.argsort(-probability[k], kind="stable")
+        answer = result.frames[k].answer
         if not len(order):
             lost[k] = result.frames[k].time
             continue
         if posture == "all":
             chosen = order.tolist()
         else:
-            chosen = [int(order[0]) if posture in LIKELIEST_WORDS else _number(posture, len(order), k)]
+            first = likeliest_order(probability[k], answer)[0]
+            chosen = [int(first) if posture in LIKELIEST_WORDS else _number(posture, len(order), k)]
+            sure.append(probability[k][first] if answer is None else answer.probability[0])
         rows += [(k, row) for row in chosen]
         ranks += (np.argsort(order)[chosen] + 1).tolist()
     if not rows:
@@ -246,9 +251,8 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         else []
     )
     if posture in LIKELIEST_WORDS and max(map(len, probability)) > 1:
-        sure = float(np.median([probability[k][row] for k, row in rows]))
         says.append(
-            f"the likeliest posture of each frame, with a probability of {sure:.2g} (median); all: --posture all"
+            f"the likeliest posture of each frame, {percent(float(np.median(sure)))} sure (median); all: --posture all"
         )
     points, up = _placed(
         points, result.camera if view is None else view.camera, stated, says, told=view is not None

@@ -14,6 +14,7 @@ from posekit.display.check_words import check_words
 from posekit.display.plural import plural
 from posekit.formats.motion.rerun_file import RecordedFrame, write_rerun_recording
 from posekit.formats.own import Result, ResultFrame, View
+from posekit.formats.own.frame_answer import likeliest_order
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -80,7 +81,7 @@ def _jpeg(image: Image.Image, size: tuple[int, int] | None) -> bytes:
 def _recorded(k: int, frame: ResultFrame) -> RecordedFrame:
     """Lay out a frame: its postures by probability, and its findings in a line."""
     p = frame.probability
-    order = np.arange(len(frame.joints)) if p is None else np.argsort(-np.asarray(p), kind="stable")
+    order = np.arange(len(frame.joints)) if p is None else likeliest_order(np.asarray(p), frame.answer)
     lost = sorted(frame.rejecting.items(), key=lambda pair: -pair[1])[:MAX_REASONS]
     why = ", ".join(f"{check_words(reason)} {count}" for reason, count in lost)
     return RecordedFrame(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import posekit
+from posekit.answers.wording import percent
 from posekit.errors import InputError
 from posekit.viewer.pictures import Shot
 from posekit.viewer.scene.drawn_subject import Shown
@@ -59,6 +60,15 @@ def test_objects_are_converted_as_their_files(
     np.testing.assert_allclose(posekit.open("motion.csv").points, motion.points, rtol=0, atol=1e-9)
     with pytest.raises(InputError, match="metres, as objects have"):
         posekit.convert(motion, "motion.csv", unit="mm")
+
+
+def test_what_is_converted_is_the_answer(file: str, recovery: posekit.Recovery) -> None:
+    said = posekit.convert(file, "motion.npz")
+    answers = recovery.answers
+    with np.load("motion.npz") as written:
+        np.testing.assert_allclose(written["joints"], [one.posture for one in answers], rtol=0, atol=1e-6)
+    sure = float(np.median([one.sure for one in answers]))
+    assert said[0].startswith(f"the likeliest posture of each frame, {percent(sure)} sure")
 
 
 def test_a_page_is_the_commands(file: str, command) -> None:

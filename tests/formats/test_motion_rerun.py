@@ -70,7 +70,7 @@ def test_a_result_has_every_frame_on_both_timelines(result, tmp_path: Path) -> N
     seconds = [one.total_seconds() for one in column(person, "seconds")]
     assert np.allclose(seconds, [frame.time for frame in result.frames], rtol=0, atol=1e-6)
     lines = np.array(column(person, "strips")[0])
-    best = result.frames[0].joints[result.frames[0].probability.argmax()]
+    best = result.frames[0].joints[result.frames[0].answer.representatives[0]]
     expected = np.array([[best[start], best[end]] for start, end in TREE_SEGMENTS])
     np.testing.assert_allclose(lines, expected, rtol=0, atol=1e-6)
     assert column(found["/findings"], "text")[2][0].startswith(

@@ -141,7 +141,7 @@ const page = (() => {
       said = `path ${path} (${sureOf(DATA.paths.probability[path])})` + (bridged ? ", bridged in this frame" : `, posture ${pack.number(here, survivor)}`);
     } else if (here.held) {
       const share = pack.probability(here, survivor);
-      said = DATA.kind === "motion" ? DATA.clips?.[here.clip] ?? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
+      said = DATA.kind === "motion" ? DATA.clips?.[here.clip] ?? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor ? "" : ": the likeliest" + (here.answer ? `, ${percent(here.answer.sure)} sure to 5 cm` : "")));
     }
     if (state.hand !== null) said = hand.said();
     if (state.example !== null) said += " – dashed: a rejected branch";

@@ -207,9 +207,9 @@ const scene = (() => {
     let drawn = 0;
     for (let index = most - 1; index >= 0; index--) {
       if (index === page.state.survivor) continue;
-      const share = best ? Math.sqrt((pack.probability(frame, index) ?? 0) / best) : 0.5;
+      const share = best ? Math.sqrt(Math.min((pack.probability(frame, index) ?? 0) / best, 1)) : 0.5;
       const ends = stick(pack.points(frame, index));
-      polyline(ends, css(page.groupColour(index), 0.12 + 0.68 * Math.min(1, share)), 1.2 + 1.6 * share);
+      polyline(ends, css(page.groupColour(index), 0.12 + 0.68 * share), 1.2 + 1.6 * share);
       drawn += 1;
     }
     return drawn;

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.held_postures import HeldPostures
+from posekit.formats.own.frame_answer import likeliest_order
 from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.survivor_columns import SurvivorColumns
@@ -159,7 +160,7 @@ def _rows(frame: ResultFrame, most: int) -> NDArray[np.intp]:
     count = len(frame.joints)
     order = np.arange(count)
     if frame.probability is not None:
-        order = np.argsort(-np.nan_to_num(frame.probability, nan=-1.0), kind="stable")
+        order = likeliest_order(frame.probability, frame.answer)
     kept = order[:most]
     if frame.answer is not None and most < count:
         kept = np.concatenate(

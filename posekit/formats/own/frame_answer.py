@@ -99,3 +99,22 @@ class FrameAnswer:
         if (self.representatives >= postures).any():
             got, expected = f"{int(self.representatives.max())}", f"numbers of {postures} postures, from 0"
             raise refusal("result", "answer.representatives", got, expected, "recover the view again")
+
+
+def likeliest_order(probability: Array, answer: FrameAnswer | None) -> NDArray[np.intp]:
+    """Order a frame's postures: the one that its answer begins with, then the others by probability.
+
+    The answer's is the one that holds most with what is within 5 cm of it, which need not be the most probable itself.
+
+    Parameters
+    ----------
+    probability : array (N,)
+        Of each posture; NaN where it is not known.
+    answer : FrameAnswer, optional
+        The frame's.
+    """
+    order = np.argsort(-np.nan_to_num(probability, nan=-1.0), kind="stable")
+    if answer is None or not len(answer.representatives):
+        return order
+    first = answer.representatives[:1]
+    return np.concatenate([first, order[order != first]])
