@@ -2,7 +2,7 @@
 
     python benchmarks/machines.py
 
-Prints the table of docs/install.md. Each machine is made of this one: what it lacks is taken from the commands'
+Prints what docs/install.md sums up. Each machine is made of this one: what it lacks is taken from the commands'
 environment. Its likeliest postures are held against those of this machine as it is. What only root can take away
 (512 MB of memory, a home that takes nothing) is left out for others, and said.
 """

@@ -4,7 +4,7 @@
 
 Everything that is typed is read from the blocks of README and docs: the clone's `make demo`, then each tutorial's
 commands in a folder of its own, with the environment that `make demo` made. pip keeps no cache: all packages are
-fetched. Prints the table of docs/install.md: commands, seconds by the clock, and what there is to look at.
+fetched. Prints what docs/install.md sums up: commands, seconds by the clock, and what there is to look at.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 Perspective pictures (f = 1500 px, 2 px of noise) of twelve joints, recovered as of an unknown adult: of random legal
 postures of the built-in figure, and, with a capture, of real ones of somebody else. Beside each the fixed tolerances
-for photographs on the same pictures, with neck and pelvis seen. Prints the table of docs/how-to/uncalibrated.md.
+for photographs on the same pictures, with neck and pelvis seen. Prints what docs/how-to/uncalibrated.md sums up.
 """
 
 from __future__ import annotations
