@@ -23,6 +23,7 @@ PROCESSOR_SECONDS: Final = 20
 PATIENCE_SECONDS: Final = 120.0
 """Of the clock: others may use the processor too."""
 LONGEST_REFUSAL: Final = 2000
+TRACEBACK: Final = "Traceback (most recent call last)"
 CRASHED: Final = 70
 """The code of a fork that an exception ended."""
 
@@ -123,8 +124,8 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
     written = [path for path in folder.iterdir() if path.name not in before]
     if code < 0:
         return Outcome(f"signal {-code}", said[-300:])
-    if code == CRASHED or "Traceback (most recent call last)" in said:
-        return Outcome("traceback", said[-1500:])
+    if code == CRASHED or TRACEBACK in said:
+        return Outcome("traceback", said[max(said.find(TRACEBACK) - 200, 0) :][:3000])
     if code == 2:
         return _refusal(said, written)
     if code not in (0, 1):
@@ -137,8 +138,8 @@ def _killed(case: Case, code: int | None, folder: Path) -> Outcome:
     said = folder.with_suffix(".said").read_text(encoding="utf-8", errors="replace")
     if code is None:
         return Outcome("hang", said[-300:])
-    if "Traceback (most recent call last)" in said:
-        return Outcome("traceback", said[-1500:])
+    if TRACEBACK in said:
+        return Outcome("traceback", said[max(said.find(TRACEBACK) - 200, 0) :][:3000])
     # A batch ends alike on both: 130, and what to run to go on.
     if code not in (-case.killed_by, 128 + case.killed_by, 128 + signal.SIGINT):
         return Outcome(f"exit {code} of signal {case.killed_by}", said[-300:])

@@ -7,6 +7,7 @@ import gc
 import os
 import signal
 import sys
+import threading
 import warnings
 from importlib import import_module
 from types import FrameType
@@ -25,6 +26,9 @@ MAIN_PROCESS: Final = os.getpid()
 
 NEW_OBJECTS_PER_COLLECTION = 100_000
 """Containers made between two collections of garbage, in a process of the command."""
+
+SECONDS_UNTIL_SENT_AGAIN: Final = 0.02
+"""Until a destructor that met a signal has ended."""
 
 SYSTEM_REMEDIES: Final = {"libgomp.so.1": "on Debian and Ubuntu run: apt-get install libgomp1"}
 """By library of the system that packages of ours load and do not bring: how to get it."""
@@ -102,6 +106,7 @@ def main() -> None:
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     signal.signal(signal.SIGTERM, _terminate)
+    sys.unraisablehook = _signal_again
     try:
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
@@ -150,6 +155,19 @@ def _terminate(number: int, frame: FrameType | None) -> None:
     if os.getpid() == MAIN_PROCESS:
         raise Ended("ended from outside", TERMINATED_CODE)
     os.kill(os.getpid(), number)
+
+
+def _signal_again(lost: sys.UnraisableHookArgs) -> None:
+    """Send a signal once more whose exception came in a destructor or a callback, which no exception leaves."""
+    if not isinstance(lost.exc_value, KeyboardInterrupt | Ended):
+        sys.__unraisablehook__(lost)
+        return
+    number = signal.SIGINT if isinstance(lost.exc_value, KeyboardInterrupt) else signal.SIGTERM
+    if number == signal.SIGTERM:
+        signal.signal(number, _terminate)
+    later = threading.Timer(SECONDS_UNTIL_SENT_AGAIN, os.kill, (os.getpid(), number))
+    later.daemon = True
+    later.start()
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:

@@ -170,24 +170,44 @@ def recover(
             refuse_unrecovered(recovery, view)
             recovered.append((one, recovery, scaled))
     for one, recovery, scaled in recovered:
-        for line in one.says:
-            say(line)
         path, figure_path = output, write_urdf
         if len(people) > 1:
             path = of_person(output, one, alone=False)
             figure_path = None if write_urdf is None else of_person(write_urdf, one, alone=False)
-        if figure_path is not None:
-            recovery.figure.write(figure_path)
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
-        files.write_result(path, _with_pictures(result, one))
-        summarize(recovery, one.pictures)
-        _tell(recovery, scaled, following, None if truth is None else one.view)
-        say(f"written: {path}")
+        further = _further_lines(recovery, scaled, following, None if truth is None else one.view)
+        _write(result, path, figure_path, one, recovery, further)
     first, found, _ = recovered[0]
     if any(len(frame) for frame in found.frames):
         written = output if len(people) == 1 else of_person(output, first, alone=False)
         tell_further(written, None if first.says else view)
+
+
+def _write(
+    result: Result,
+    path: Path,
+    figure_path: Path | None,
+    one: Opened,
+    recovery: Recovery,
+    further: Sequence[str],
+) -> None:
+    """Write what was recovered of a person, and say it; what is refused on the way to its words leaves no file."""
+    from posekit.formats import own as files
+    from posekit.recovery.advice import advice_lines
+    from posekit.recovery.summary import summary_lines
+
+    lines = [*one.says, *summary_lines(recovery, one.pictures), *advice_lines(recovery)]
+    warnings = warnings_of(recovery)
+    if figure_path is not None:
+        recovery.figure.write(figure_path)
+    files.write_result(path, _with_pictures(result, one))
+    for line in lines:
+        say(line)
+    for line in warnings:
+        say(f"posekit: warning: {line}", err=True)
+    for line in [*further, f"written: {path}"]:
+        say(line)
 
 
 def _with_pictures(result: Result, one: Opened) -> Result:
@@ -205,24 +225,21 @@ def _check_urdf_path(path: Path | None) -> None:
         )
 
 
-def _tell(
+def _further_lines(
     recovery: Recovery, scaled: ScaledFollowing | None, following: Following | None, truth: View | None
-) -> None:
-    """Print the scale that was found, the paths, and how far the survivors are from the truth of a view."""
-    if scaled is not None:
-        say(_scale_line(scaled))
+) -> list[str]:
+    """Say the scale that was found, the paths, and how far the survivors are from the truth of a view."""
+    lines = [] if scaled is None else [_scale_line(scaled)]
     if following is not None:
         from posekit.recovery.summary import following_line
         from posekit.recovery.swapped_labels import swapped_line
 
-        if line := swapped_line(recovery):
-            say(line)
-        say(following_line(following))
+        lines += [line for line in (swapped_line(recovery), following_line(following)) if line]
     if truth is not None:
         from posekit.evaluate.comparison import compare
 
-        for line in compare(recovery, truth.truth).lines:
-            say(line)
+        lines += compare(recovery, truth.truth).lines
+    return lines
 
 
 def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, paths: int) -> Following | None:
@@ -250,18 +267,15 @@ def _scale_line(scaled: ScaledFollowing) -> str:
     return f"lengths times {scaled.scale:.3f}, standard deviation {scaled.deviation:.3f} ({len(tried)} tried{end})"
 
 
-def summarize(recovery: Recovery, pictures: Sequence[str] = ()) -> None:
-    """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
+def warnings_of(recovery: Recovery) -> list[str]:
+    """Warn of lengths that were moved, of frames that were not recovered, and of those without a posture."""
     from posekit.body.closing import closing_line
     from posekit.formats.own import OpenCVModel
-    from posekit.recovery.advice import advice_lines
-    from posekit.recovery.summary import summary_lines
 
-    for line in [*summary_lines(recovery, pictures), *advice_lines(recovery)]:
-        say(line)
+    lines = []
     changed = closing_line(recovery.figure.moved_lengths)
     if changed:
-        say(f"posekit: warning: {changed}", err=True)
+        lines.append(changed)
     total = len(recovery.frames)
     reasons = sorted(recovery.unrecovered.items(), key=lambda pair: -len(pair[1]))
     for reason, frames in reasons[:REASONS_SHOWN]:
@@ -269,16 +283,11 @@ def summarize(recovery: Recovery, pictures: Sequence[str] = ()) -> None:
             ", …" if len(frames) > FRAMES_NAMED_IN_WARNINGS else ""
         )
         which = f"frame{'s' if len(frames) > 1 else ''} {named}"
-        say(
-            f"posekit: warning: {len(frames)} of {plural(total, 'frame')} not recovered: {reason} ({which})",
-            err=True,
-        )
+        lines.append(f"{len(frames)} of {plural(total, 'frame')} not recovered: {reason} ({which})")
     others = sum(len(frames) for _, frames in reasons[REASONS_SHOWN:])
     if others:
-        say(
-            f"posekit: warning: {others} more not recovered, each with its reason in the result's "
-            "settings.unrecovered",
-            err=True,
+        lines.append(
+            f"{others} more not recovered, each with its reason in the result's settings.unrecovered"
         )
     empty = sum(not len(frame) and not frame.reason for frame in recovery.frames)
     if empty:
@@ -286,9 +295,8 @@ def summarize(recovery: Recovery, pictures: Sequence[str] = ()) -> None:
         calibrated = recovery.grower is not None and isinstance(recovery.grower.view.camera, OpenCVModel)
         noise = "their noise said (--deviation PX), or more tolerance" if calibrated else "more tolerance"
         head = "" if recovery.frames[0].family else ", and a noisy head a given root"
-        say(
-            f"posekit: warning: {empty} of {plural(total, 'frame')} have no posture; the table says what "
-            "rejected most; noisy "
-            f"points need {noise} (--rigid-tolerance, --angle-tolerance, --tangent-tolerance){head}",
-            err=True,
+        lines.append(
+            f"{empty} of {plural(total, 'frame')} have no posture; the table says what rejected most; noisy "
+            f"points need {noise} (--rigid-tolerance, --angle-tolerance, --tangent-tolerance){head}"
         )
+    return lines

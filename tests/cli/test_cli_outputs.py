@@ -94,18 +94,26 @@ def test_a_disk_that_takes_nothing_is_one_line(
     assert outcome.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("where", ["in the command", "in a destructor"])
 @pytest.mark.parametrize(
     ("signal", "code", "says"), [("SIGTERM", 143, "ended from outside"), ("SIGINT", 130, "interrupted")]
 )
 def test_a_command_that_is_ended_leaves_nothing_half_written(
-    signal: str, code: int, says: str, tmp_path: Path
+    where: str, signal: str, code: int, says: str, tmp_path: Path
 ) -> None:
-    # The signal comes when the file is written and has not its name yet.
+    # The signal comes when the file is written and has not its name yet; no exception leaves a destructor.
+    end = (
+        "end()"
+        if where == "in the command"
+        else "(type('Ending', (), {'__del__': end})().__class__, time.sleep(30))"
+    )
     program = f"""
-import os, pathlib, signal, sys
+import os, pathlib, signal, sys, time
 from posekit.cli.main import main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-pathlib.Path.replace = lambda self, target: os.kill(os.getpid(), signal.{signal})
+def end(*_):
+    os.kill(os.getpid(), signal.{signal})
+pathlib.Path.replace = lambda self, target: {end}
 sys.argv = ["posekit", "synth", "walker", "-o", "view.json", "--frames", "1"]
 main()
 """

@@ -225,7 +225,7 @@ BAD = [
     (
         ("camera",),
         {"model": "scaled-orthographic", "scale": 1e308},
-        "camera: got scale must be positive and finite",
+        "camera: got scale must be from 1e-09 to 1e+09",
     ),
     (("unit",), "inch", "unit: got \"inch\"; expected 'm', 'cm' or 'mm'"),
     (("unit",), ..., "unit: got nothing"),

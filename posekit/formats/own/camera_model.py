@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from posekit.cameras import PinholeCamera
 from posekit.cameras.calibrated import UP_AXES
 from posekit.errors import CameraError
-from posekit.formats.own.units import PER_METRE, Unit, from_metres
+from posekit.formats.own.units import FARTHEST_COORDINATE, PER_METRE, Unit, from_metres
 from posekit.safe_io import shown
 
 Array = NDArray[np.float64]
@@ -135,9 +134,11 @@ def camera_fields(camera: CameraModel, unit: Unit) -> dict[str, Any]:
 
 
 def check_positive(name: str, value: float) -> None:
-    """Refuse a focal length or a scale that is not positive and finite."""
-    if not (math.isfinite(value) and value > 0):
-        raise CameraError(f"{name} must be positive and finite; got {value:g}")
+    """Refuse a focal length or a scale that no camera has."""
+    if not 1 / FARTHEST_COORDINATE <= value <= FARTHEST_COORDINATE:
+        raise CameraError(
+            f"{name} must be from {1 / FARTHEST_COORDINATE:g} to {FARTHEST_COORDINATE:g}; got {value:g}"
+        )
 
 
 def check_intrinsics(K: list[list[float]]) -> None:
