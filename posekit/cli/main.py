@@ -5,30 +5,23 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-import signal
 import sys
-import threading
 import warnings
 from importlib import import_module
-from types import FrameType
 from typing import Annotated, Any, Final, TextIO
 
 import typer
 
 from posekit.cli.guarded_command import GuardedCommand
 from posekit.cli.options import examples
-from posekit.cli.terminal import INTERRUPTED_CODE, TERMINATED_CODE, Ended, say
+from posekit.cli.signals import take_signals
+from posekit.cli.terminal import INTERRUPTED_CODE, Ended, say
 from posekit.errors import PosekitError
 
 BAD_INPUT = 2
 
-MAIN_PROCESS: Final = os.getpid()
-
 NEW_OBJECTS_PER_COLLECTION = 100_000
 """Containers made between two collections of garbage, in a process of the command."""
-
-SECONDS_UNTIL_SENT_AGAIN: Final = 0.02
-"""Until a destructor that met a signal has ended."""
 
 SYSTEM_REMEDIES: Final = {"libgomp.so.1": "on Debian and Ubuntu run: apt-get install libgomp1"}
 """By library of the system that packages of ours load and do not bring: how to get it."""
@@ -105,8 +98,7 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    signal.signal(signal.SIGTERM, _terminate)
-    sys.unraisablehook = _signal_again
+    take_signals()
     try:
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
@@ -147,27 +139,6 @@ def main() -> None:
         place = f"{error.filename}: " if error.filename is not None else ""
         code = _fail(f"{place}{error.strerror or error}; expected a file or folder that can be used")
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _terminate(number: int, frame: FrameType | None) -> None:
-    """End by an exception, which takes half-written files away; a child process ends at once, as it would have."""
-    signal.signal(number, signal.SIG_DFL)
-    if os.getpid() == MAIN_PROCESS:
-        raise Ended("ended from outside", TERMINATED_CODE)
-    os.kill(os.getpid(), number)
-
-
-def _signal_again(lost: sys.UnraisableHookArgs) -> None:
-    """Send a signal once more whose exception came in a destructor or a callback, which no exception leaves."""
-    if not isinstance(lost.exc_value, KeyboardInterrupt | Ended):
-        sys.__unraisablehook__(lost)
-        return
-    number = signal.SIGINT if isinstance(lost.exc_value, KeyboardInterrupt) else signal.SIGTERM
-    if number == signal.SIGTERM:
-        signal.signal(number, _terminate)
-    later = threading.Timer(SECONDS_UNTIL_SENT_AGAIN, os.kill, (os.getpid(), number))
-    later.daemon = True
-    later.start()
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:

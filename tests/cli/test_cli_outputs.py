@@ -94,26 +94,33 @@ def test_a_disk_that_takes_nothing_is_one_line(
     assert outcome.err.count("\n") == 1
 
 
-@pytest.mark.parametrize("where", ["in the command", "in a destructor"])
+SIGNALS_COME = {
+    "in the command": "end()",
+    "in a destructor": "(type('Ending', (), {'__del__': lambda _: end()})().__class__, time.sleep(30))",
+    "in an import that takes every exception": "(__import__('taker'), time.sleep(30))",
+}
+
+
+@pytest.mark.parametrize("where", SIGNALS_COME)
 @pytest.mark.parametrize(
     ("signal", "code", "says"), [("SIGTERM", 143, "ended from outside"), ("SIGINT", 130, "interrupted")]
 )
 def test_a_command_that_is_ended_leaves_nothing_half_written(
     where: str, signal: str, code: int, says: str, tmp_path: Path
 ) -> None:
-    # The signal comes when the file is written and has not its name yet; no exception leaves a destructor.
-    end = (
-        "end()"
-        if where == "in the command"
-        else "(type('Ending', (), {'__del__': end})().__class__, time.sleep(30))"
+    # The signal comes when the file is written and has not its name yet.
+    (tmp_path / "modules").mkdir()
+    (tmp_path / "modules" / "taker.py").write_text(
+        f"import os, signal\ntry:\n os.kill(os.getpid(), signal.{signal})\nexcept BaseException: pass\n"
     )
     program = f"""
 import os, pathlib, signal, sys, time
 from posekit.cli.main import main
+sys.path.append("modules")
+sys.dont_write_bytecode = True
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-def end(*_):
-    os.kill(os.getpid(), signal.{signal})
-pathlib.Path.replace = lambda self, target: {end}
+end = lambda: os.kill(os.getpid(), signal.{signal})
+pathlib.Path.replace = lambda self, target: {SIGNALS_COME[where]}
 sys.argv = ["posekit", "synth", "walker", "-o", "view.json", "--frames", "1"]
 main()
 """
@@ -126,7 +133,7 @@ main()
         check=False,
     )
     assert (ended.returncode, ended.stderr) == (code, f"posekit: error: {says}\n")
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == ["modules"]
 
 
 def test_a_long_list_is_no_name_of_a_file(run: Callable[..., Any]) -> None:
