@@ -125,8 +125,7 @@ class LocalPool:
             self._bury(idle)  # it died of nothing that it was given
         worker = next((one for one in self.workers if not one.busy), None)
         if worker is None:
-            worker = _start()
-            self.workers.append(worker)
+            worker = self._started()
         worker.busy, worker.work, worker.item, worker.attempts = True, work, item, tries + 1
         if worker.ready:
             self._send(worker)
@@ -164,9 +163,15 @@ class LocalPool:
                 f"({_end_of(worker.process)}); expected "
                 "memory for them, and `if __name__ == '__main__'` in a script; take fewer jobs"
             )
-        fresh = _start()
+        fresh = self._started()
         fresh.busy, fresh.work, fresh.item, fresh.attempts = True, worker.work, worker.item, worker.attempts
-        self.workers.append(fresh)
+
+    def _started(self) -> _Worker:
+        """Start a process that is ended with this pool."""
+        with _held_back(signal.SIGINT, signal.SIGTERM):
+            worker = _start()
+            self.workers.append(worker)
+        return worker
 
     def _bury(self, worker: _Worker) -> None:
         worker.process.join()
@@ -175,6 +180,23 @@ class LocalPool:
 
 
 _END: Any = object()
+
+
+@contextlib.contextmanager
+def _held_back(*numbers: signal.Signals) -> Iterator[None]:
+    """Let signals wait for the end of the block: a process that was not told what it is for prints a traceback."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    kept = {number: signal.signal(number, lambda number, _: came.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+        for one in came:
+            signal.raise_signal(one)
 
 
 def _start() -> _Worker:

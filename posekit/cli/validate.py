@@ -129,7 +129,7 @@ def validate(
         _validate_archive(files, output, asked_of(body, stated, judged), jobs, parse_fail_over(fail_over))
         return
     outputs = ValidateOutput(report=output, page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
-    outputs.check()
+    outputs.check(repair)
     _refuse_ignored(outputs.detail, every=every, distances=distances, urdf=body.urdf, jobs=jobs)
     allowed = parse_fail_over(fail_over)
     asked = asked_of(body, stated, judged)

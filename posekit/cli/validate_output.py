@@ -56,8 +56,8 @@ class ValidateOutput:
     def _of_clips(self) -> str:
         return "--timeline" if self.keep is None else "--keep"
 
-    def check(self) -> None:
-        """Refuse names that cannot be written before the work is done."""
+    def check(self, repair: Path | None = None) -> None:
+        """Refuse names that cannot be written before the work is done; `repair` is where repaired motion goes."""
         from posekit.formats.own.npz import suffix
         from posekit.formats.own.report_file import REPORT_SUFFIXES
         from posekit.safe_io import extra
@@ -81,7 +81,8 @@ class ValidateOutput:
         if self.keep is not None:
             from posekit.validation.keep import check_keep_folder
 
-            check_keep_folder(self.keep)
+            written = (self.report, self.page, self.timeline, repair)
+            check_keep_folder(self.keep, *(path for path in written if path is not None))
         elif self.keep_spans is not None:
             raise InputError("--keep-spans: there is no --keep; name the folder that spans are written to")
         if self.keep_spans is not None and not 0 <= self.keep_spans < math.inf:

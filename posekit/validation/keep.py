@@ -64,8 +64,11 @@ class Kept:
         return f"{len(kept)} of {plural(len(self.clips), 'clip')} kept{cut_down}"
 
 
-def check_keep_folder(folder: Path) -> None:
-    """Refuse a folder that holds anything, before the work that it is for is done."""
+def check_keep_folder(folder: Path, *written: Path) -> None:
+    """Refuse a folder that holds anything, or will hold something else, before the work that it is for is done."""
+    for path in written:
+        if path.resolve().is_relative_to(folder.resolve()):
+            raise refusal(path, "", f"a name in {folder}", "clips alone in it", "choose another name")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise refusal(
             folder, "", "something that is there already", "a folder that is new or empty", "name another"
@@ -95,14 +98,16 @@ def keep_clips(
     """
     check_keep_folder(folder)
     make_folder(folder.parent)
-    beside = folder.with_name(f".{secrets.token_hex(8)}.part")
-    beside.mkdir()
+    beside = folder.absolute().with_name(f".{secrets.token_hex(8)}.part")
     try:
+        beside.mkdir()
         kept = Kept(clips=tuple(_written(beside, clips, frames, spans)))
         write_lines(beside / MANIFEST_NAME, map(csv_line, [KeptClip._fields, *kept.clips]))
-        if folder.exists():  # empty; not every system puts a folder in its place
-            folder.rmdir()
-        beside.replace(folder)
+        if folder.exists():  # empty; it may be the one that the command was called in
+            for entry in beside.iterdir():
+                entry.replace(folder / entry.name)
+        else:
+            beside.replace(folder)
     except OSError as error:
         reason = cut(error.strerror or str(error))
         raise refusal(folder, "", reason, "a folder that can be written", "check free space") from None

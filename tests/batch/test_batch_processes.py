@@ -160,6 +160,38 @@ def test_interrupted_and_killed_and_run_to_the_end(archive: Path, tmp_path: Path
     assert_whole(archive, out, "long.parquet", FRAMES)
 
 
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_while_a_process_is_started_is_one_line(archive: Path, tmp_path: Path, name: str) -> None:
+    program = f"""
+import os, signal, sys
+from multiprocessing import util
+from posekit.cli.main import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+spawn = util.spawnv_passfds
+def spawned(path, arguments, handles):
+    number = spawn(path, arguments, handles)
+    if b"--multiprocessing-fork" in arguments or "--multiprocessing-fork" in arguments:
+        os.kill(os.getpid(), signal.{name})
+    return number
+util.spawnv_passfds = spawned
+main()
+"""
+    out = tmp_path / "out"
+    command = [
+        sys.executable,
+        "-c",
+        program,
+        "batch",
+        str(archive / "short.parquet"),
+        "-o",
+        str(out),
+        *OPTIONS,
+    ]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.stderr == f"posekit: error: interrupted; run it again to go on in {out}\n"
+    assert ended.returncode == 130
+
+
 def test_a_ray_cluster_one_worker_of_which_is_killed_gives_the_same_bytes(
     archive: Path, tmp_path: Path, crashing: Any
 ) -> None:

@@ -1,7 +1,9 @@
 """What is kept of several files: each under its own name, whole or not at all, and inputs stay as they are."""
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,6 +113,42 @@ def test_where_something_fails_there_is_no_folder(tmp_path, three, monkeypatch):
     with pytest.raises(InputError, match="No space left"):
         keep_clips(tmp_path / "out", *three)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["busy", "in"]
+
+
+@pytest.mark.parametrize("name", [".", "../here"])
+def test_the_folder_may_be_the_one_that_one_is_in(name, tmp_path, three, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    keep_clips(Path(name), *three)
+    assert set(files_of(Path.cwd())) == {"a/walk.npz", MANIFEST_NAME}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["here", "in"]
+
+
+def test_a_folder_that_cannot_be_made_is_named_as_it_was_given(tmp_path, three, monkeypatch):
+    made = Path.mkdir
+
+    def refuse(self, *given, **named):
+        if self.suffix == ".part":
+            raise OSError(30, "Read-only file system", str(self))
+        made(self, *given, **named)
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    with pytest.raises(InputError, match="out: got Read-only file system"):
+        keep_clips(tmp_path / "out", *three)
+
+
+@pytest.mark.parametrize("option", ["--output", "--page", "--repair"])
+def test_nothing_else_is_written_into_the_folder_for_clips(
+    option, tmp_path, command: Callable[..., Any], monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    np.savez("walk.npz", joints=np.zeros((2, 14, 3)))
+    (tmp_path / "kept").mkdir()
+    name = {"--output": "kept/a.json", "--page": "kept/a.html", "--repair": "kept/a.npz"}[option]
+    outcome = command("validate", "walk.npz", "--keep", "kept", option, name)
+    assert outcome.code == 2
+    assert f"{name}: got a name in kept; expected clips alone in it" in outcome.err
+    assert not list((tmp_path / "kept").iterdir())
 
 
 def test_names_do_not_leave_the_folder():
