@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 import traceback
+from importlib import import_module
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -22,6 +23,7 @@ MEMORY_BYTES: Final = 4 << 30
 PROCESSOR_SECONDS: Final = 20
 PATIENCE_SECONDS: Final = 120.0
 """Of the clock: others may use the processor too."""
+ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 LONGEST_REFUSAL: Final = 2000
 TRACEBACK: Final = "Traceback (most recent call last)"
 CRASHED: Final = 70
@@ -42,11 +44,17 @@ class Outcome(NamedTuple):
 
 def run_command(arguments: list[str]) -> int:
     """Run a command in this process, and return its exit code."""
-    from posekit.cli import main
+    module = import_module("posekit.cli.main")
+    take_signals = module.take_signals
+
+    def begin() -> None:
+        take_signals()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING_SIGNALS)
 
     sys.argv = ["posekit", *arguments]
+    vars(module)["take_signals"] = begin  # in this fork alone
     try:
-        main()
+        module.main()
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     return 0
@@ -59,6 +67,8 @@ def in_fork(
 
     `kill` is a signal that it gets, and after how many seconds; 0 for none.
     """
+    # A signal that comes before the command begins says nothing of the command.
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING_SIGNALS)
     child = os.fork()
     if child == 0:
         code = CRASHED
@@ -82,6 +92,7 @@ def in_fork(
             for stream in (sys.stdout, sys.stderr):
                 stream.flush()
             os._exit(code)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING_SIGNALS)
     started = time.monotonic()
     ends, killer = started + patience, kill[0]
     while time.monotonic() < ends:

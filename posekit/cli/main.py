@@ -98,8 +98,8 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    take_signals()
     try:
+        take_signals()
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
         if callable(code):  # a command with groups of options

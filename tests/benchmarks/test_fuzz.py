@@ -4,6 +4,7 @@ import io
 import json
 import random
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -90,7 +91,7 @@ def outcome(seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, comman
         exec(command, {"folder": Path.cwd()})
 
     if command:
-        monkeypatch.setattr("posekit.cli.main", main)
+        monkeypatch.setattr(import_module("posekit.cli.main"), "main", main)
     return tried(Case("options", VALIDATE), seeds, tmp_path / "case")
 
 
