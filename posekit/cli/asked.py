@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from posekit.cli.judging_options import Judging, Tolerances
 from posekit.cli.noise_options import Uncertain
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.settings import RecoverSettings
     from posekit.views.opened import Opened
+
+MAX_EXPLAINED: Final = 500_000
+"""Pruned branches in a result, 1.5 GB to be read: exact frames have some hundreds, noisy ones a hundred thousand."""
 
 
 def settings_of(
@@ -68,6 +71,16 @@ def refuse_unrecovered(recovery: Recovery, path: Path) -> None:
     """Refuse a view in none of whose frames anything could be grown."""
     if all(frame.reason for frame in recovery.frames):
         raise InputError(f"{path}: {recovery.frames[0].reason}")
+
+
+def refuse_unexplained(recovery: Recovery, path: Path, *, explain: bool) -> None:
+    """Refuse to list more pruned branches than can be written and read again."""
+    count = recovery.pruned_count if explain else 0
+    if count > MAX_EXPLAINED:
+        raise InputError(
+            f"{path}: --explain: {count:,} branches were pruned; expected at most {MAX_EXPLAINED:,}; give fewer "
+            "frames, or leave it out"
+        )
 
 
 def follow_scaled(

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from posekit.cli.asked import check_noise, follow_scaled, leaving_out, refuse_unrecovered, settings_of
+from posekit.cli.asked import (
+    check_noise,
+    follow_scaled,
+    leaving_out,
+    refuse_unexplained,
+    refuse_unrecovered,
+    settings_of,
+)
 from posekit.cli.detector_options import Proportions, Reading, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
@@ -168,6 +175,7 @@ def recover(
                 if paths:
                     recovery = _sides_undone(recovery, view)
             refuse_unrecovered(recovery, view)
+            refuse_unexplained(recovery, view, explain=explain)
             recovered.append((one, recovery, scaled))
     for one, recovery, scaled in recovered:
         path, figure_path = output, write_urdf

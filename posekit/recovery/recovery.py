@@ -421,6 +421,12 @@ class Recovery(Pictured):
                 found.setdefault(re.sub(r"^frames\[\d+\]: ", "", frame.reason), []).append(k)
         return found
 
+    @property
+    def pruned_count(self) -> int:
+        """How many branches were pruned of all trees: what `FrameRecovery.pruned` lists of each frame."""
+        batches = {id(frame.batch): frame.batch for frame in self.frames if frame.batch is not None}
+        return sum(len(group.frame) for batch in batches.values() for group in batch.leaves.pruned)
+
     @cached_property
     def ranking(self) -> Ranking:
         """The probability of every survivor of every frame (`posekit.ranking.rank`)."""

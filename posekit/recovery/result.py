@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -116,7 +117,7 @@ def _frame(
             **{name: counts.tolist() for name, counts in frame.levels.items()},
         },
         rejected=frame.rejected,
-        pruned=[_plain(asdict(branch)) for branch in frame.pruned()] if explain else None,
+        pruned=[_plain(vars(branch)) for branch in frame.pruned()] if explain else None,
         family=None if frame.family is None else replace(frame.family, mirrored=frame.mirrored),
         root=frame.root,
         posture_set=frame.posture_set,
@@ -200,6 +201,6 @@ def _without(table: Any, columns: Mapping[str, Column], others: NDArray[np.bool_
 def _plain(record: dict[str, object]) -> dict[str, object]:
     """Write infinite and unknown numbers as None: JSON has neither."""
     return {
-        key: None if isinstance(value, float) and not np.isfinite(value) else value
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
         for key, value in record.items()
     }

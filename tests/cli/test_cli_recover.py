@@ -29,6 +29,21 @@ from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 FIGURE = load_figure()
 
 
+def test_no_more_branches_are_listed_than_can_be_read_again(
+    run, assert_refused, walk: dict[str, Any], write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = write(walk)
+    assert run("recover", view, "-o", "out.json", "--explain").code == 0
+    listed = sum(len(frame.pruned or ()) for frame in read_result("out.json").frames)
+    assert listed > 100
+    for most in (listed, listed - 1):
+        monkeypatch.setattr("posekit.cli.asked.MAX_EXPLAINED", most)
+        outcome = run("recover", view, "-o", "again.json", "--explain")
+        assert outcome.code == (0 if most == listed else 2), outcome.err
+        Path("again.json").unlink(missing_ok=True)
+    assert_refused(outcome, f"--explain: {listed:,} branches were pruned; expected at most {listed - 1:,}")
+
+
 @pytest.mark.parametrize("suffix", ["json", "npz"])
 def test_recover_writes_what_it_prints(run, walk: dict[str, Any], suffix: str, write) -> None:
     view, target = write(walk), f"out.{suffix}"
