@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
+from posekit.body.steady_angles import steady_angles
 from posekit.conversion.gaps import fill_gaps
 from posekit.conversion.posture_sequence import PostureSequence
 from posekit.display.plural import plural
@@ -168,6 +169,9 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
     off, joint, frame = found.furthest(q, up)
     where = f" (furthest: {joint}, frame {frame})" if off > SAID_OFF_METRES else ""
     q, says = _without_gaps(output, found.figure, q)
+    if output.to == "mot":  # read by people, as curves
+        angles, limits = found.figure.angle_index, found.figure.limits
+        q[:, angles] = steady_angles(q[:, angles], limits.lower, limits.upper)
     if output.to == "urdf":
         write_urdf_folder(output.path, found.figure, q, found.time, up=up)
     else:

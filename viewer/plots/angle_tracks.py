@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure, with_head
+from posekit.body.steady_angles import angles_near, steady_angles
 from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.safe_io import shown as spelled
@@ -116,13 +117,17 @@ def angle_tracks(
     time = np.array([frame.time for frame in frames])
     if not (np.isfinite(time).all() and (np.diff(time) > 0).all() and len(time) > 1):
         time = np.arange(len(frames), dtype=np.float64)
-    every = _angles(frames, figure)
+    ends = np.radians([limits.get(name, (-180.0, 180.0)) for name in DOFS]).T
     line = np.stack([rows[0] if len(rows) else np.full(len(DOFS), np.nan) for rows in _angles(drawn, figure)])
+    line = steady_angles(line, *ends)
+    every = [angles_near(rows, own) for rows, own in zip(_angles(frames, figure), line, strict=True)]
     for row, rows in zip(line, every, strict=True):  # where no survivor's head is known, no path's is
         row[np.isnan(rows).all(axis=0)] = np.nan
     true = np.full((len(frames), len(DOFS)), np.nan)
     if truth is not None:
-        true = _degrees(figure, with_head(truth), None)
+        found = steady_angles(_radians(figure, with_head(truth), None), *ends)
+        true = np.stack([angles_near(one[None], own)[0] for one, own in zip(found, line, strict=True)])
+    line, true, every = np.degrees(line), np.degrees(true), [np.degrees(rows) for rows in every]
     spread = np.stack(
         [_spread(rows, frame.probability) for rows, frame in zip(every, frames, strict=True)], axis=1
     )
@@ -149,28 +154,28 @@ def angle_tracks(
 
 
 def _angles(frames: Sequence[Shown], figure: Figure) -> list[Array]:
-    """Return the angles (N, 22) of each frame's postures, degrees; all that are to be calculated are so at once."""
+    """Return the angles (N, 22) of each frame's postures, radians; all that are to be calculated are so at once."""
     found: list[Array | None] = [
-        None if frame.q is None else _degrees(figure, frame.points, frame.q) for frame in frames
+        None if frame.q is None else _radians(figure, frame.points, frame.q) for frame in frames
     ]
     left = [k for k, one in enumerate(found) if one is None]
     if left:
         counts = np.cumsum([len(frames[k]) for k in left])[:-1]
-        together = _degrees(figure, np.concatenate([frames[k].points for k in left]), None)
+        together = _radians(figure, np.concatenate([frames[k].points for k in left]), None)
         for k, one in zip(left, np.split(together, counts), strict=True):
             found[k] = one
     return [one for one in found if one is not None]
 
 
-def _degrees(figure: Figure, points: Array, q: Array | None) -> Array:
-    """Return the angles (N, 22) of postures in the order of `posekit.skeleton.DOFS`, degrees."""
+def _radians(figure: Figure, points: Array, q: Array | None) -> Array:
+    """Return the angles (N, 22) of postures in the order of `posekit.skeleton.DOFS`, radians."""
     if q is None:
         q = figure.inverse_kinematics(points) if len(points) else np.empty((0, figure.model.nq))
         # Without the head, the neck's angles are not known; inverse kinematics says 0.
         headless = np.isnan(points[:, len(JOINTS) :]).any(axis=(1, 2))
     else:
         headless = np.zeros(len(q), dtype=bool)
-    angles: Array = np.degrees(q[:, figure.angle_index])
+    angles: Array = q[:, figure.angle_index]
     neck = [k for k, name in enumerate(DOFS) if name.startswith("neck.")]
     headless = headless | (angles[:, neck] == 0).all(
         axis=1
