@@ -206,11 +206,13 @@ def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
     """Print how far a result is from the truth."""
     import numpy as np
 
-    from posekit.cli.true_joints import true_joints
+    from posekit.cli.true_joints import before_camera, true_joints
     from posekit.evaluate.comparison import compare
     from posekit.formats.format import Content
+    from posekit.formats.motion import postures_of, read_motion
     from posekit.formats.own import read_result
     from posekit.formats.recognising import recognise
+    from posekit.skeleton import JOINT
 
     for name in given:
         if name != "--truth":
@@ -225,13 +227,10 @@ def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
         )
     result = read_result(path)
     joints, in_camera = true_joints(truth, None, None, np.array([one.time for one in result.frames]))
-    camera = result.camera
     if not in_camera:
-        if camera is None or camera.R is None or camera.t is None:
-            raise InputError(
-                f"--truth {truth}: nothing says how it stands before the camera; expected a view with truth; give it"
-            )
-        joints = joints @ camera.R.T + camera.t
+        joints[:, [JOINT[name] for name in postures_of(read_motion(truth)).derived]] = np.nan
+        joints, said = before_camera(result, joints)
+        say(f"truth {truth}: {said}")
     for line in compare(result, joints).lines:
         say(line)
 

@@ -281,19 +281,14 @@ def _truth_of(
     """Read the truth of a result's frames in the camera's frame."""
     import numpy as np
 
-    from posekit.cli.true_joints import true_joints
+    from posekit.cli.true_joints import before_camera, true_joints
     from posekit.formats.own import Result
 
     if not isinstance(content, Result) or rejected:
         raise InputError("--truth: is drawn beside what was recovered; expected a result, without --rejected")
     times = np.array([one.time for one in content.frames])
     joints, in_camera = true_joints(path, view, view_path, times)
-    if not in_camera:
-        raise InputError(
-            f"--truth {path}: nothing says how it stands before the camera; expected a view with truth, or a --view "
-            "whose camera has R and t; angles need neither: --angles all"
-        )
-    return joints
+    return joints if in_camera else before_camera(content, joints)[0]
 
 
 def _size(text: str) -> tuple[int, int]:

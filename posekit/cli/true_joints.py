@@ -8,8 +8,38 @@ from typing import TYPE_CHECKING
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.formats.own import View
+    from posekit.formats.own import Result, View
     from posekit.geometry import Array
+
+
+def before_camera(result: Result, joints: Array) -> tuple[Array, str]:
+    """Turn motion's joints (F, 14, 3) into the frame of the camera that a result holds; say how.
+
+    Axes are reconciled by the image of the result's postures: those of the motion's world may be others than the
+    calibration's.
+
+    Raises
+    ------
+    InputError
+        Where the camera's place is not known, or the motion is not seen where the postures are.
+    """
+    import numpy as np
+
+    from posekit.cameras import PinholeCamera
+    from posekit.views.truth import turned_before
+
+    camera, image = result.camera, np.full((*joints.shape[:2], 2), np.nan)
+    if camera is not None:
+        sees = PinholeCamera(K=camera.K, distortion=camera.distortion)
+        for k, frame in enumerate(result.frames):
+            if len(frame.joints):
+                first = 0 if frame.answer is None else int(frame.answer.representatives[0])
+                image[k] = sees.project(frame.joints[first])
+    turned, told = turned_before(camera, image, joints)
+    return (
+        turned,
+        f"its axes {told.turn} are the camera's world; it is seen {told.error:.1f} px beside them (median)",
+    )
 
 
 def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> tuple[Array, bool]:

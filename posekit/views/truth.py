@@ -10,7 +10,7 @@ import numpy as np
 
 from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
-from posekit.formats.own import OpenCVModel, View
+from posekit.formats.own import CameraModel, OpenCVModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 
@@ -72,11 +72,6 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, AlignedTru
     InputError
         Where the camera has no R and t, no frame matches, or no turn brings the truth near the key points.
     """
-    model = view.camera
-    if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
-        raise InputError(
-            "--truth: the camera's place in the world is not known; expected R and t: give a calibration that has them"
-        )
     true = np.full((len(view), len(JOINTS), 3), np.nan)
     since = time - time[0]
     steps = [float(np.median(np.diff(each))) for each in (since, view.time) if len(each) > 1]
@@ -88,16 +83,46 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, AlignedTru
             f"--truth: none of its {len(time)} frames is at the time of a picture; expected the same seconds from the "
             "first picture on; say the pictures' rate with --fps"
         )
-    turned = np.einsum("kij,fpj->kfpi", AXIS_TURNS, true) @ model.R.T + model.t
+    turned, told = turned_before(view.camera, view.image, true)
+    return replace(view, truth=turned), replace(told, frames=int(matched.sum()))
+
+
+def turned_before(model: CameraModel | None, image: Array, true: Array) -> tuple[Array, AlignedTruth]:
+    """Turn a truth's axes into those of the camera's world, by the image, and bring it into the camera's frame.
+
+    Parameters
+    ----------
+    model : OpenCVModel
+        Its place in the world is known.
+    image : array (F, 14, 2)
+        Where the joints are seen, pixels; NaN where not known.
+    true : array (F, 14, 3)
+        In the truth's own world, metres; NaN where not known.
+
+    Returns
+    -------
+    joints, told
+        In the camera's frame (F, 14, 3), metres, and how they were laid.
+
+    Raises
+    ------
+    InputError
+        Where the camera has no R and t, or no turn brings the truth near the image.
+    """
+    if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
+        raise InputError(
+            "--truth: the camera's place in the world is not known; expected R and t: give a calibration that has them"
+        )
     camera = PinholeCamera(K=model.K, distortion=model.distortion)
-    away = np.linalg.norm(camera.project(turned) - view.image, axis=-1).reshape(len(AXIS_TURNS), -1)
+    turned = np.einsum("kij,fpj->kfpi", AXIS_TURNS, true) @ model.R.T + model.t
+    away = np.linalg.norm(camera.project(turned) - image, axis=-1).reshape(len(AXIS_TURNS), -1)
     in_front = np.isfinite(away).sum(axis=1)
     errors = [
         float(np.nanmedian(row)) if n == max(in_front) > 0 else np.inf
         for row, n in zip(away, in_front, strict=True)
     ]
     best = int(np.argmin(errors))
-    seen = view.image[np.isfinite(view.image[..., 1]).any(axis=1), :, 1]
+    seen = image[np.isfinite(image[..., 1]).any(axis=1), :, 1]
     height = float(np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)))
     if not errors[best] <= REFUSED_ERROR_SHARE * height:
         raise InputError(
@@ -106,5 +131,5 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, AlignedTru
         )
     turn = AXIS_TURNS[best]
     names = [("" if row[abs(row).argmax()] > 0 else "-") + "xyz"[int(abs(row).argmax())] for row in turn]
-    told = AlignedTruth(turn=f"({', '.join(names)})", error=errors[best], frames=int(matched.sum()))
-    return replace(view, truth=turned[best]), told
+    frames = int(np.isfinite(true).any(axis=(1, 2)).sum())
+    return turned[best], AlignedTruth(turn=f"({', '.join(names)})", error=errors[best], frames=frames)
