@@ -143,6 +143,17 @@ class LimbWalls:
         return above, below
 
     @cached_property
+    def loops(self) -> tuple[Array, Array] | None:
+        """What compiled loops take of all limbs; None where one has other checks, or a ball of the trunk has any."""
+        if self.balls or any(numbers is None for numbers in self._numbers):
+            return None
+        known = [numbers for numbers in self._numbers if numbers is not None]
+        out = np.zeros((len(known), max(map(len, known))))
+        for row, numbers in zip(out, known, strict=True):
+            row[: len(numbers)] = numbers
+        return self._ends, out
+
+    @cached_property
     def _numbers(self) -> list[Array | None]:
         """What loops take for each limb, where a single check with anatomical ranges judges it whole."""
         rules = [checks[0].rule if len(checks) == 1 else None for checks in self.checks.values()]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.least_squares import Damping
-from posekit.refinement.equations import LimitSigns, evaluate, linearise, solve
+from posekit.refinement.equations import DIAGONAL_FLOOR, LimitSigns, evaluate, linearise, solve
+from posekit.refinement.looped_descent import looped_descent, settings_of
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, moved
 
@@ -88,6 +89,27 @@ def descend(
     than `precision` of chi2, be it for a limit in its way, or no step decreases it. It is given up where chi2 is
     beyond `hopeless` and the next step does not promise to halve it.
     """
+    looped = looped_descent(problem, start, settings_of(REFINEMENT_DAMPING, DIAGONAL_FLOOR, steps, precision, hopeless))
+    if looped is None:
+        return stepped_descent(problem, start, steps=steps, precision=precision, hopeless=hopeless)
+    state, chi2, counts, asked = looped
+    found = DescentResult(state, chi2, counts[:, 0], counts[:, 1] > 0, counts[:, 2], counts[:, 3])
+    rows = np.flatnonzero(asked)
+    if rows.size:
+        part = problem.take(rows)
+        found.put(rows, stepped_descent(part, start.take(rows), steps=steps, precision=precision, hopeless=hopeless))
+    return found
+
+
+def stepped_descent(
+    problem: RefinementProblem,
+    start: PostureState,
+    *,
+    steps: int = MAX_STEPS,
+    precision: float = CHI2_PRECISION,
+    hopeless: float = np.inf,
+) -> DescentResult:
+    """Do what `descend` does with all postures at once, step by step."""
     search = _BatchDescent(problem, start)
     rows = np.arange(start.root.shape[1])
     for taken in range(steps + 1):

@@ -12,6 +12,7 @@ from posekit.geometry.batch_last import backward
 from posekit.refinement.descent import BLOCK_POSTURES, REFINEMENT_DAMPING
 from posekit.refinement.equations import DIAGONAL_FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
+from posekit.refinement.looped_descent import looped_limbs, settings_of
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import moved_limbs
 
@@ -33,6 +34,24 @@ def fit_limbs(
     `precision`, or when its chi2 is beyond `hopeless` and the next step does not promise to halve it. Only those that
     are `used` (4, M) are looked at.
     """
+    settings = settings_of(REFINEMENT_DAMPING, DIAGONAL_FLOOR, steps, precision, hopeless)
+    left = looped_limbs(problem, chains, chi2, used, settings)
+    if left is None or left.any():
+        kept = used if left is None else left
+        stepped_limbs(problem, chains, chi2, kept, steps=steps, precision=precision, hopeless=hopeless)
+
+
+def stepped_limbs(
+    problem: RefinementProblem,
+    chains: Chains,
+    chi2: Array,
+    used: NDArray[np.bool_],
+    *,
+    steps: int,
+    precision: float,
+    hopeless: float,
+) -> None:
+    """Do what `fit_limbs` does with all limbs at once, step by step."""
     n = chains.start.shape[2]
     search = _LimbSearch(
         problem=problem,

@@ -162,7 +162,7 @@ def limb_limits(
     weight = np.ones_like(angles)
     weight[0], weight[2] = found.cosines[1, limb, row], found.sines[3, limb, row]
     judge = looped_branches if is_installed() else summed_branches
-    away, best, side, euler = judge(angles, weight, (middle, half), _possible(bounds))
+    away, best, side, euler = judge(angles, weight, (middle, half), possible_branches(bounds))
     beyond = _beyond(away, half)
     over, watched = beyond, np.zeros(len(limb), dtype=np.bool_)
     if watch is not None:
@@ -278,7 +278,7 @@ def _shortened(over: Array) -> Array:
     return out
 
 
-def _possible(bounds: Bounds) -> list[tuple[int, float]]:
+def possible_branches(bounds: Bounds) -> list[tuple[int, float]]:
     """Return the branches into which any limb's limits reach."""
     over_the_top = (np.abs(bounds.lower[:, 1]) > np.pi / 2).any() or (
         np.abs(bounds.upper[:, 1]) > np.pi / 2

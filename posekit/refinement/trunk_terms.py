@@ -232,8 +232,8 @@ def shape_distances(weight: Array, own: Array, shape: Array, *, slopes: bool = T
     J = np.empty((9 if slopes else 0, *shape.shape))
     residual = np.empty_like(shape, order="C")
     each = np.array(np.broadcast_to(weight.reshape(9, -1), shape.shape), order="C")
-    squared = ((_APART @ own) ** 2).sum(axis=1)
-    compiled(descent_kernels).distances(each, squared, _APART, np.array(shape, order="C"), residual, J)
+    squared = ((TRUNK_APART @ own) ** 2).sum(axis=1)
+    compiled(descent_kernels).distances(each, squared, TRUNK_APART, np.array(shape, order="C"), residual, J)
     return residual, J
 
 
@@ -261,5 +261,5 @@ def _places() -> NDArray[np.float64]:
 
 
 _PLACES = _places()
-_APART = np.array([_PLACES[j] - _PLACES[i] for i, j in TRUNK_SEGMENTS])
+TRUNK_APART = np.array([_PLACES[j] - _PLACES[i] for i, j in TRUNK_SEGMENTS])
 """How the shape places the end of each of the trunk's distances against its start (9, 3, 9)."""

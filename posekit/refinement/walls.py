@@ -36,6 +36,11 @@ class Walls(Protocol):
         """Whether legs, too, are judged in the torso's frame."""
         ...
 
+    @property
+    def loops(self) -> tuple[Array, Array] | None:
+        """What compiled loops take: by limb the figure's ends (4, 4, 2) and numbers (4, K); None where they do not do."""
+        ...
+
     def beyond(
         self, limb: int, upper: Array, lower: Array, beside: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
