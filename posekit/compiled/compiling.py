@@ -18,7 +18,7 @@ import pickle
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -140,6 +140,7 @@ def _linked(
     """Make copies of functions that know those before them, each with the other names of the file it is from."""
     filled = {} if parts is None else _of(parts)
     wanted = filled | {name: pair for name, pair in _of(module).items() if name not in filled}
+    wanted = _called(wanted, module.COMPILED_TYPES)
     homes = dict.fromkeys(function.__module__ for function, _ in wanted.values())
     spaces = {home: dict(vars(sys.modules[home])) for home in homes}
     digest = hashlib.sha256()
@@ -161,6 +162,18 @@ def _of(module: ModuleType) -> dict[str, tuple[FunctionType, str]]:
     """Return the functions to compile, with the types they take: those of the modules in `KERNEL_PARTS` first."""
     wanted = {name: each for part in getattr(module, "KERNEL_PARTS", ()) for name, each in _of(part).items()}
     return wanted | {name: (vars(module)[name], types) for name, types in module.COMPILED_TYPES.items()}
+
+
+def _called(
+    wanted: dict[str, tuple[FunctionType, str]], asked: Iterable[str]
+) -> dict[str, tuple[FunctionType, str]]:
+    """Leave out functions of other modules that none of those asked for calls."""
+    called, waiting = set(asked), list(asked)
+    while waiting:
+        new = set(wanted[waiting.pop()][0].__code__.co_names) & wanted.keys() - called
+        called |= new
+        waiting += new
+    return {name: each for name, each in wanted.items() if name in called}
 
 
 @cache

@@ -379,7 +379,7 @@ def limb_block(
     -------
     chi2, slack : float
     folds : int
-        NaN and -1 where a judge must be asked.
+        NaN and -1 where a judge must be asked. Which limits are passed stands in the room's tenth row.
     """
     at, u = LIMBS + 2 * limb, DIRECTIONS + 6 * limb
     first, second = s[at], s[at + 1]
@@ -391,6 +391,8 @@ def limb_block(
     part = part_of(f, limb)
     angles_and_tangents(s, limb, part, g, tangents)
     width = 6 if f[VARIED_LIMBS] > 0.0 else 4
+    for k in range(BOX_ANGLES):
+        o[2, k] = 0.0
     for a in range(6):
         push[a] = 0.0
         for b in range(6):
@@ -643,8 +645,5 @@ COMPILED_TYPES = {
     "limb_block": "",
     "limb_value": "",
     "move_limb": "",
-    "fit_limbs": (
-        "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], b1[:,::1], f8[:,:,::1], f8[:,::1], f8[::1], f8[:,::1], b1[:,::1])"
-    ),
 }
-"""The kernels, in the order in which they need each other, with the types of those that are called."""
+"""The kernels, in the order in which they need each other: compiled into those that call them."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from posekit.compiled import limb_block_kernels
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_block_kernels import (
+    BOX_ANGLES,
     FIRST_LEG,
     FLOOR,
     HOPELESS,
@@ -25,6 +26,7 @@ from posekit.compiled.limb_block_kernels import (
     PRECISION,
     STEPS,
     damped_factor,
+    fit_limbs,  # noqa: F401 - to be compiled
     limb_block,
     limb_value,
     move_limb,
@@ -60,6 +62,7 @@ from posekit.compiled.posture_numbers import (
     VARIED_LIMBS,
     VARIED_SHAPE,
 )
+from posekit.compiled.limb_kernels import limbs_beyond  # noqa: F401 - to be compiled
 from posekit.geometry import Array
 
 STARTS = (1, 2, 4, 5)
@@ -654,6 +657,152 @@ def descend_postures(  # noqa: PLR0912, PLR0915 - one step after the other, on n
             chi2[n], counts[n, 0], counts[n, 3] = value, taken, active
 
 
+def value_postures(
+    states: Array,
+    data: Array,
+    f: Array,
+    apart: Array,
+    ends: Array,
+    numbers: Array,
+    chi2: Array,
+) -> None:
+    """Fill in chi2 (N,) of postures (N, 71); NaN where a judge must be asked."""
+    limb_room, room, offsets, start = np.empty((24, 7)), np.empty((10, 9)), np.empty((6, 3)), np.empty(3)
+    passed, nothing = np.zeros(LIMIT_COUNT, np.int8), np.zeros(4, np.int8)
+    W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
+    W[:, NUMBERS_AT:] = numbers
+    for n in range(len(states)):
+        chi2[n] = posture_value(
+            states[n], data[n], f, apart, ends, W, offsets, start, limb_room, room, nothing, passed
+        )
+
+
+def value_limbs(
+    states: Array, data: Array, f: Array, starts: Array, ends: Array, numbers: Array, chi2: Array
+) -> None:
+    """Fill in chi2 (M, 4) of limbs from their starts (M, 4, 3); NaN where a judge must be asked."""
+    limb_room, passed, nothing = np.empty((24, 7)), np.zeros(4, np.int8), np.zeros(4, np.int8)
+    W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
+    W[:, NUMBERS_AT:] = numbers
+    for m in range(len(states)):
+        for limb in range(LIMB_COUNT):
+            chi2[m, limb] = limb_value(
+                states[m], data[m], f, limb, starts[m, limb], ends[limb], W[limb], limb_room, nothing, passed
+            )
+
+
+def tabulate_trunks(
+    states: Array, data: Array, f: Array, apart: Array, floor: Any, matrix: Array, gradient: Array, head: Array
+) -> None:
+    """Fill in matrices (N, C, C) and gradients (N, C) of trunks alone, and how heads follow (N, 3, 7)."""
+    width = matrix.shape[1]
+    room, offsets, J = np.empty((10, 9)), np.empty((6, 3)), np.empty((6, 3, width))
+    P, g, moving = np.empty((6, 3, 3)), np.empty((6, 3)), np.empty((3, width))
+    L, right, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
+    damped, column, nothing = np.empty(6), np.empty(3), np.zeros(LIMIT_COUNT, np.int8)
+    for n in range(len(states)):
+        s, d = states[n], data[n]
+        place_trunk(s, offsets)
+        joint_jacobian(s, f, offsets, J)
+        trunk_block(s, d, f, apart, offsets, nothing, room, matrix[n], gradient[n], P, g)
+        gather_trunk(J, P, g, matrix[n], gradient[n], moving)
+        curve(offsets, g, matrix[n])
+        if f[HEAD_COUNT] > 0.0:
+            head_block(s, d, f, nothing, room, L, right, own, push)
+            damped_factor(L, 3, 0.0, floor, damped)
+            solve_forward(L, 3, right, 7)
+            leave(right, 3, own, push)
+            for a in range(6):
+                gradient[n, a] += push[a]
+                for b in range(6):
+                    matrix[n, a, b] += own[a, b]
+            for c in range(7):
+                for k in range(3):
+                    column[k] = right[k, c]
+                solve_backward(L, 3, column)
+                for k in range(3):
+                    head[n, k, c] = -column[k]
+        for c in range(width):
+            matrix[n, c, c] += floor
+
+
+def tabulate_limbs(
+    states: Array,
+    data: Array,
+    f: Array,
+    ends: Array,
+    numbers: Array,
+    floor: Any,
+    matrix: Array,
+    gradient: Array,
+    step: Array,
+    slope: Array,
+    tangents: Array,
+    counts: NDArray[np.int64],
+) -> None:
+    """Tabulate limbs on the trunks of postures (M, 71), as `posekit.refinement.joint_step.limb_tables` does.
+
+    Filled are what they add to matrix (4, M, C, C) and gradient (4, M, C), their own step (4, M, U) and how it follows the
+    trunk's (4, M, U, C), tangents (4, M, 4, 3), and how many folds and limits there are (4, M, 2), -1 where a judge must be
+    asked.
+    """
+    width, reach = matrix.shape[2], step.shape[2]
+    limb_room, offsets, J, start = np.empty((24, 7)), np.empty((6, 3)), np.empty((6, 3, width)), np.empty(3)
+    L, right, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
+    damped, column, starts, carried = np.empty(6), np.empty(6), np.zeros((6, width)), np.empty((6, width))
+    nothing = np.zeros(4, np.int8)
+    W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
+    W[:, NUMBERS_AT:] = numbers
+    for m in range(len(states)):
+        s, d = states[m], data[m]
+        place_trunk(s, offsets)
+        joint_jacobian(s, f, offsets, J)
+        for limb in range(LIMB_COUNT):
+            joint = STARTS[limb]
+            turn = TURN_TORSO if limb < FIRST_LEG or f[LEGS_ON_TORSO] > 0.0 else TURN_HIPS
+            for i in range(3):
+                start[i] = s[ROOT + i] + offsets[joint, i]
+                for c in range(width):
+                    starts[i, c] = J[joint, i, c]
+                    starts[3 + i, c] = 1.0 if c == turn + i else 0.0
+            folds = limb_block(
+                s, d, f, limb, start, ends[limb], W[limb], nothing, limb_room, L, right, own, push, tangents[limb, m]
+            )[2]
+            counts[limb, m, 0], counts[limb, m, 1] = folds, 0
+            if folds < 0:
+                continue
+            for k in range(BOX_ANGLES):
+                counts[limb, m, 1] += limb_room[10, k] != 0.0
+            damped_factor(L, reach, 0.0, floor, damped)
+            solve_forward(L, reach, right, 7)
+            leave(right, reach, own, push)
+            for c in range(width):
+                for i in range(6):
+                    carried[i, c] = 0.0
+                    for k in range(6):
+                        carried[i, c] += own[i, k] * starts[k, c]
+            for c in range(width):
+                gradient[limb, m, c] = 0.0
+                for i in range(6):
+                    gradient[limb, m, c] += starts[i, c] * push[i]
+                for e in range(width):
+                    matrix[limb, m, c, e] = 0.0
+                    for i in range(6):
+                        matrix[limb, m, c, e] += starts[i, c] * carried[i, e]
+                for k in range(reach):
+                    slope[limb, m, k, c] = 0.0
+            for a in range(7):
+                for k in range(reach):
+                    column[k] = right[k, a]
+                solve_backward(L, reach, column)
+                for k in range(reach):
+                    if a == 6:  # noqa: PLR2004 - the last column is the gradient
+                        step[limb, m, k] = -column[k]
+                        continue
+                    for c in range(width):
+                        slope[limb, m, k, c] -= column[k] * starts[a, c]
+
+
 KERNEL_PARTS = (limb_block_kernels,)
 
 COMPILED_TYPES = {
@@ -672,8 +821,21 @@ COMPILED_TYPES = {
     "leave": "",
     "add_limb": "",
     "follow": "",
+    "fit_limbs": (
+        "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], b1[:,::1], f8[:,:,::1], f8[:,::1], f8[::1], f8[:,::1], b1[:,::1])"
+    ),
     "descend_postures": (
         "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[::1], f8[::1], i8[:,::1], b1[::1])"
     ),
+    "value_postures": "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[::1])",
+    "value_limbs": "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])",
+    "tabulate_trunks": (
+        "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8, f8[:,:,::1], f8[:,::1], f8[:,:,::1])"
+    ),
+    "tabulate_limbs": (
+        "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,::1], f8, f8[:,:,:,::1], f8[:,:,::1], f8[:,:,::1],"
+        " f8[:,:,:,::1], f8[:,:,:,::1], i8[:,:,::1])"
+    ),
+    "limbs_beyond": "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1])",
 }
 """The kernels, in the order in which they need each other, with the types of those that are called."""

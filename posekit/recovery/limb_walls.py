@@ -11,7 +11,7 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.compiled import limb_kernels
+from posekit.compiled import posture_kernels
 from posekit.compiled.compiling import compiled, is_installed
 from posekit.compiled.screen_kinds import OF_ANATOMICAL_LIMB
 from posekit.geometry import Array
@@ -88,7 +88,7 @@ class LimbWalls:
             return None
         above, below = np.full((2, len(upper), MAX_ANGLES), -np.inf)
         writing = np.full(len(upper), -1)
-        run = partial(compiled(limb_kernels).limbs_beyond, ends=self._ends[limb], numbers=numbers)
+        run = partial(compiled(posture_kernels).limbs_beyond, ends=self._ends[limb], numbers=numbers)
         if beside is not None and len(upper):
             own = np.full(len(beside[0]), -1)
             run(*map(np.ascontiguousarray, beside), above=above, below=below, writing=own)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
-from posekit.refinement.equations import evaluate
+from posekit.refinement.equations import chi2_of
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.joint_step import (
     LimbTables,
@@ -147,7 +147,7 @@ def _step_together(
         found.steps[rows] += 1
         trial = moved(found.state.take(rows), step, tangents)
         chi2 = found.chi2[rows]
-        value, _ = evaluate(part.take(rows), trial)
+        value = chi2_of(part.take(rows), trial)
         better = value <= chi2
         off = value - (chi2 - gain)
         # Of the promise g the quadratic missed e: the next step would gain about e^2 / g, less than is worth it.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.least_squares import Damping
-from posekit.refinement.equations import DIAGONAL_FLOOR, LimitSigns, evaluate, linearise, solve
+from posekit.refinement.equations import BLOCK_POSTURES, DIAGONAL_FLOOR, LimitSigns, evaluate, linearise, solve
 from posekit.refinement.looped_descent import looped_descent, settings_of
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, moved
@@ -18,9 +18,6 @@ MAX_STEPS = 20
 """Steps after which a posture is left where it is."""
 
 REFINEMENT_DAMPING = Damping(initial=1e-4, smallest=1e-12, largest=1e6, growth=8.0, decay=0.1, light=0.1)
-
-BLOCK_POSTURES = 2048
-"""Postures worked on at once: enough to spread the overhead of each operation."""
 
 CHI2_PRECISION = 1e-2
 """Promised decrease of chi2 that ends the search."""

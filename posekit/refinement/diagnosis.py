@@ -25,7 +25,7 @@ from posekit.errors import InputError, PosekitError
 from posekit.refinement.descent import CHI2_PRECISION
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.limb_descent import fit_limbs
-from posekit.refinement.limb_terms import Chains, limb_chi2
+from posekit.refinement.limb_terms import Chains, chi2_of_limbs
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.prior import RootPrior
 from posekit.refinement.problem import RefinementProblem
@@ -363,7 +363,7 @@ class _Limbs(NamedTuple):
         for part in parts:
             lengths[limb, part] *= factor
         chains = relift(self.problem, self.chains._replace(lengths=lengths), self.far)
-        chi2 = limb_chi2(self.problem, chains)[0]
+        chi2 = chi2_of_limbs(self.problem, chains)
         used = np.zeros(chi2.shape, dtype=np.bool_)
         used[limb] = True
         fit_limbs(

@@ -20,6 +20,7 @@ from posekit.refinement.figure_numbers import LIMB_STARTS
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
+from posekit.refinement.looped_descent import looped_chi2
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep, parents, trunk_offsets
 from posekit.refinement.trunk_terms import TrunkTerms, start_jacobian, to_unknowns, trunk_chi2, trunk_terms
@@ -112,6 +113,21 @@ def evaluate(problem: RefinementProblem, state: PostureState) -> tuple[Array, Li
         passed.head[...] = head
     return np.where(chi2 < MAX_CHI2, chi2, np.inf), passed
 
+
+def chi2_of(problem: RefinementProblem, state: PostureState) -> Array:
+    """Return chi2 of postures (N,), infinite where a joint that was seen is behind the camera."""
+    chi2 = looped_chi2(problem, state)
+    rows = np.arange(state.root.shape[1]) if chi2 is None else np.flatnonzero(np.isnan(chi2))
+    if chi2 is None:
+        chi2 = np.empty(len(rows))
+    for at in range(0, len(rows), BLOCK_POSTURES):
+        some = rows[at : at + BLOCK_POSTURES]
+        chi2[some] = evaluate(problem.take(some), state.take(some))[0]
+    return chi2
+
+
+BLOCK_POSTURES = 2048
+"""Postures worked on at once: enough to spread the overhead of each operation."""
 
 MAX_CHI2 = 1e150
 """Sums of squares beyond this come from joints behind the camera (`problem.BEHIND_CAMERA_RESIDUAL`): infinite."""

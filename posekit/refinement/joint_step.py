@@ -18,6 +18,7 @@ from posekit.geometry.batch_last import backward
 from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import DIAGONAL_FLOOR, assemble, eliminate, left_over, linearise
 from posekit.refinement.limb_terms import Chains, limb_terms
+from posekit.refinement.looped_descent import looped_limb_tables, looped_trunk_tables
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep
 from posekit.refinement.trunk_terms import start_jacobian, trunk_terms
@@ -112,6 +113,15 @@ def gain_of(matrix: Array, gradient: Array) -> Array:
 
 def trunk_tables(problem: RefinementProblem, state: PostureState) -> TrunkTables:
     """Tabulate trunks, their limbs left out."""
+    looped = looped_trunk_tables(problem, state, DIAGONAL_FLOOR)
+    if looped is not None:
+        matrix, gradient, follows = looped
+        return TrunkTables(matrix, gradient, follows[..., -1], follows[..., :-1])
+    return stepped_trunk_tables(problem, state)
+
+
+def stepped_trunk_tables(problem: RefinementProblem, state: PostureState) -> TrunkTables:
+    """Do the same with all trunks at once."""
     parts = []
     alone = problem.trunk_alone()
     n = state.root.shape[1]
@@ -132,6 +142,16 @@ def trunk_tables(problem: RefinementProblem, state: PostureState) -> TrunkTables
 
 def limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains) -> LimbTables:
     """Tabulate limbs, each column on its own trunk (M)."""
+    looped = looped_limb_tables(problem, trunks, chains, DIAGONAL_FLOOR)
+    if looped is None:
+        return stepped_limb_tables(problem, trunks, chains)
+    *own, tangents, counts = looped
+    along = np.ascontiguousarray(tangents.reshape(4, -1, 2, 2, 3).transpose(0, 2, 3, 4, 1))
+    return LimbTables(*own, along, counts[..., 0], counts[..., 1])
+
+
+def stepped_limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains) -> LimbTables:
+    """Do the same with all limbs at once."""
     n = chains.start.shape[2]
     parts = []
     for at in range(0, max(n, 1), BLOCK_POSTURES):

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK_POSTURES, DescentResult
+from posekit.refinement.descent import DescentResult
 from posekit.refinement.equations import chains_of
 from posekit.refinement.limb_descent import fit_limbs
-from posekit.refinement.limb_terms import Chains, limb_chi2
+from posekit.refinement.limb_terms import Chains, chi2_of_limbs
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import relift
 from posekit.tree.factors import LimbColumns, Rows, columns_of
@@ -127,10 +127,7 @@ def fit_on_bases(
     rows = problem.take(bases.leaf[columns.base])
     held = chains_of(rows, bases.found.state.take(columns.base)._replace(directions=limbs.directions))
     chains = relift(rows, held, limbs.far)
-    chi2 = np.zeros((4, len(columns.base)))
-    for at in range(0, chi2.shape[1], BLOCK_POSTURES):
-        part = np.arange(at, min(at + BLOCK_POSTURES, chi2.shape[1]))
-        chi2[:, part] = limb_chi2(rows.take(part), chains.take(part))[0]
+    chi2 = chi2_of_limbs(rows, chains)
     chi2[~columns.used] = 0.0
     mine = [np.flatnonzero(chi2[kind] > settings.precision) for kind in range(4)]
     pulled = columns_of([columns.base[own] for own in mine], len(bases.leaf))

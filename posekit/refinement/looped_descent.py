@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled import limb_block_kernels, posture_kernels
+from posekit.compiled import posture_kernels
 from posekit.compiled.compiling import compiled, is_installed
 from posekit.compiled.posture_numbers import STATE_WIDTH
 from posekit.geometry import Array
@@ -71,19 +71,10 @@ def looped_limbs(
     walls = _walls(problem)
     if walls is None:
         return None
-    count = chains.start.shape[2]
-    state = PostureState(
-        root=np.zeros((3, count)),
-        torso=chains.parent[0],
-        hips=chains.parent[2],
-        head=chains.parent[0],
-        directions=chains.directions,
-        shape=np.zeros((9, count)),
-        limbs=chains.lengths,
-    )
+    state = _as_state(chains)
     states, values = _rows(state), np.ascontiguousarray(chi2.T)
     asked = np.zeros(values.shape, dtype=np.bool_)
-    compiled(limb_block_kernels).fit_limbs(
+    compiled(posture_kernels).fit_limbs(
         states,
         _data(problem),
         _figure(problem),
@@ -97,6 +88,64 @@ def looped_limbs(
     found = _state(states, state)
     chains.directions[...], chains.lengths[...], chi2[...] = found.directions, found.limbs, values.T
     return asked.T
+
+
+def looped_chi2(problem: RefinementProblem, state: PostureState) -> Array | None:
+    """Return chi2 of postures (N,), NaN where it is not told; None where there is no loop."""
+    walls = _walls(problem)
+    if walls is None:
+        return None
+    chi2 = np.empty(state.root.shape[1])
+    compiled(posture_kernels).value_postures(_rows(state), _data(problem), _figure(problem), TRUNK_APART, *walls, chi2)
+    return chi2
+
+
+def looped_limb_chi2(problem: RefinementProblem, chains: Chains) -> Array | None:
+    """Return chi2 of limbs (4, M), NaN where it is not told; None where there is no loop."""
+    walls = _walls(problem)
+    if walls is None:
+        return None
+    states, starts = _rows(_as_state(chains)), np.ascontiguousarray(chains.start.transpose(2, 0, 1))
+    chi2 = np.empty((len(states), 4))
+    compiled(posture_kernels).value_limbs(states, _data(problem), _figure(problem), starts, *walls, chi2)
+    return chi2.T
+
+
+def looped_trunk_tables(problem: RefinementProblem, state: PostureState, floor: float) -> tuple[Array, Array, Array] | None:
+    """Return matrices (N, C, C) and gradients (N, C) of trunks alone, and how heads follow (N, 3, 7), or None.
+
+    None where there is no loop; without a head nothing follows (N, 0, 7).
+    """
+    if _walls(problem) is None:
+        return None
+    count, width = state.root.shape[1], problem.trunk_width
+    matrix, gradient = np.empty((count, width, width)), np.empty((count, width))
+    head = np.empty((count, 0 if problem.head_image is None else 3, 7))
+    compiled(posture_kernels).tabulate_trunks(
+        _rows(state), _data(problem), _figure(problem), TRUNK_APART, floor, matrix, gradient, head
+    )
+    return matrix, gradient, head
+
+
+def looped_limb_tables(
+    problem: RefinementProblem, trunks: PostureState, chains: Chains, floor: float
+) -> tuple[Array, Array, Array, Array, Array, NDArray[np.int64]] | None:
+    """Return what `posekit.refinement.joint_step.LimbTables` has, in its order; None where no loop tells it.
+
+    Folds and limits are the last (4, M, 2); tangents are (4, M, 4, 3).
+    """
+    walls = _walls(problem)
+    if walls is None:
+        return None
+    count, width, reach = chains.start.shape[2], problem.trunk_width, problem.limb_width
+    matrix, gradient = np.empty((4, count, width, width)), np.empty((4, count, width))
+    step, slope = np.empty((4, count, reach)), np.empty((4, count, reach, width))
+    tangents, counts = np.empty((4, count, 4, 3)), np.empty((4, count, 2), dtype=np.int64)
+    states = _rows(trunks._replace(directions=chains.directions, limbs=chains.lengths))
+    compiled(posture_kernels).tabulate_limbs(
+        states, _data(problem), _figure(problem), *walls, floor, matrix, gradient, step, slope, tangents, counts
+    )
+    return None if (counts[..., 0] < 0).any() else (matrix, gradient, step, slope, tangents, counts)
 
 
 def settings_of(damping: Damping, floor: float, steps: int, precision: float, hopeless: float) -> Array:
@@ -115,6 +164,20 @@ def _walls(problem: RefinementProblem) -> tuple[Array, Array] | None:
 def _rows(state: PostureState) -> Array:
     """Lay out postures one after the other (N, 71)."""
     return np.ascontiguousarray(np.concatenate([_flat(each) for each in state]).T)
+
+
+def _as_state(chains: Chains) -> PostureState:
+    """Return limbs on the parts by which they are judged as postures; nothing else of them is known."""
+    count = chains.start.shape[2]
+    return PostureState(
+        root=np.zeros((3, count)),
+        torso=chains.parent[0],
+        hips=chains.parent[2],
+        head=chains.parent[0],
+        directions=chains.directions,
+        shape=np.zeros((9, count)),
+        limbs=chains.lengths,
+    )
 
 
 def _flat(array: Array) -> Array:

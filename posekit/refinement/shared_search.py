@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.refinement.bases import BaseTables, assemble
-from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
-from posekit.refinement.equations import chains_of, evaluate
+from posekit.refinement.descent import DescentResult, descend
+from posekit.refinement.equations import chains_of, chi2_of
 from posekit.refinement.limb_fitting import Bases, InitialLimbs, LimbsOnBases, SearchSettings, fit_on_bases
-from posekit.refinement.limb_terms import Chains, limb_chi2
+from posekit.refinement.limb_terms import Chains, chi2_of_limbs
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, sides, state_of
 from posekit.refinement.state import PostureState
@@ -307,11 +307,5 @@ def _first(
     origin: Rows,
 ) -> Array:
     """Return the chi2 of survivors as they were given (N,), from their trunks' and their limbs'."""
-    trunk, limb = np.empty(begin.root.shape[1]), np.empty((4, limbs.start.shape[2]))
-    for at in range(0, len(trunk), BLOCK_POSTURES):
-        part = np.arange(at, min(at + BLOCK_POSTURES, len(trunk)))
-        trunk[part] = evaluate(alone.take(part), begin.take(part))[0]
-    for at in range(0, limb.shape[1], BLOCK_POSTURES):
-        part = np.arange(at, min(at + BLOCK_POSTURES, limb.shape[1]))
-        limb[:, part] = limb_chi2(rows.take(part), limbs.take(part))[0]
+    trunk, limb = chi2_of(alone, begin), chi2_of_limbs(rows, limbs)
     return np.asarray(trunk[trunk_of] + np.take_along_axis(limb, origin, axis=1).sum(axis=0))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.refinement.descent import descend
-from posekit.refinement.equations import evaluate
+from posekit.refinement.equations import chi2_of
 from posekit.refinement.figure_numbers import N_SHAPE_NUMBERS, TRUNK_SEGMENTS
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.start import state_of
@@ -114,7 +114,7 @@ class TrunkEvidence:
         steps = np.concatenate([steps, -follows @ steps], axis=1)
         each = np.repeat(np.arange(len(A)), len(z))
         state = moved(at.take(each), PostureStep(steps.transpose(1, 0, 2).reshape(A.shape[1], -1)), None)
-        chi2 = evaluate(problem.take(each), state)[0]
+        chi2 = chi2_of(problem.take(each), state)
         room = -np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
         return TrunkEvidence(
             found=found,

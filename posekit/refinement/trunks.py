@@ -15,7 +15,6 @@ only needed to find the first.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +25,8 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array, unit
 from posekit.geometry.batch_last import matrix_product
-from posekit.refinement.descent import BLOCK_POSTURES, descend
-from posekit.refinement.equations import evaluate
+from posekit.refinement.descent import descend
+from posekit.refinement.equations import chi2_of
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.merging import groups_of
 from posekit.refinement.observed_frames import ObservedFrames
@@ -192,11 +191,7 @@ def _followed(
     for factor in _depth_factors(observed, known):
         begin = state_of(one.anatomy, _lifts(observed, one, one.root * factor).reshape(-1, 14, 3))
         starts.append(begin)
-        chi2.append(
-            np.concatenate(
-                [evaluate(one.take(every[rows]), begin.take(rows))[0] for rows in _blocks(len(every))]
-            )
-        )
+        chi2.append(chi2_of(one.take(every), begin))
     # Of each near and far choice the depth that fits best, then the choices that fit best.
     depth = np.argmin(chi2, axis=0)
     best_of = np.min(chi2, axis=0).reshape(len(known), N_CHOICES)
@@ -266,12 +261,6 @@ def _depth_factors(observed: ObservedFrames, frames: NDArray[np.intp]) -> Array:
     steps = math.ceil(float(reach.max()) / ROOT_STEP_METRES) if reach.max() > ROOT_STEP_METRES else 0
     spread = float(np.max(reach / far)) if steps else 0.0
     return np.asarray(np.exp(np.linspace(-spread, spread, 2 * min(steps, MAX_DEPTH_STEPS) + 1)))
-
-
-def _blocks(count: int) -> Iterator[NDArray[np.intp]]:
-    """Yield rows that are worked on at once."""
-    for at in range(0, max(count, 1), BLOCK_POSTURES):
-        yield np.arange(at, min(at + BLOCK_POSTURES, count))
 
 
 def _lifts(observed: ObservedFrames, problem: RefinementProblem, root: Array) -> Array:
