@@ -17,12 +17,14 @@ from posekit.compiled import limb_block_kernels
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_block_kernels import (
     BOX_ANGLES,
+    ENDS,
     FIRST_LEG,
     FLOOR,
     HOPELESS,
     INITIAL,
     LARGEST,
     LIGHT,
+    MIDDLES,
     PRECISION,
     STEPS,
     damped_factor,
@@ -38,6 +40,8 @@ from posekit.compiled.limb_block_kernels import (
     within_half_turn,
 )
 from posekit.compiled.posture_numbers import (
+    CAMERA,
+    DIRECTIONS,
     HEAD,
     HEAD_COUNT,
     HEAD_OFFSETS,
@@ -51,6 +55,7 @@ from posekit.compiled.posture_numbers import (
     NECK,
     NECK_LIMITS,
     PELVIS,
+    PERSPECTIVE,
     ROOT,
     ROOT_PRIOR,
     ROOT_WEIGHT,
@@ -79,6 +84,9 @@ LEAST_BALL_COSINE = 0.05
 
 SPINE_WEIGHT = 1e3
 """One over `posekit.refinement.trunk_terms.SPINE_TURN_DEVIATION`."""
+
+ANGLE_INFORMATION, PLACE_INFORMATION, MOST_TURN_INFORMATION, LEAST_LENGTH = 3.0 / math.pi**2, 1e-2, 0.5, 1e-12
+"""As `posekit.refinement.covariance` has them: of what nothing is known, and of a turn that the image hardly shows."""
 
 BEYOND_COUNTING = 1e150
 """As `posekit.refinement.equations.MAX_CHI2`."""
@@ -803,6 +811,120 @@ def tabulate_limbs(
                         slope[limb, m, k, c] -= column[k] * starts[a, c]
 
 
+def know_turns(s: Array, d: Array, limb: Any, x: Array, tangents: Array, room: Array, matrix: Array) -> None:
+    """Add what is known of turns that the image does not show, as `posekit.refinement.covariance` says.
+
+    The limb's middle and end (2, 3), and how the image moves with them, as `limb_block` left it in its room.
+    """
+    for segment in range(2):
+        at, k = DIRECTIONS + 6 * limb + 3 * segment, 2 * segment
+        seen, first, second = 0.0, 0.0, 0.0
+        for c in range(2):
+            moved = 0.0
+            for i in range(3):
+                moved += room[2 * segment + c, i] * s[at + i]
+            seen += moved * moved
+        for i in range(3):
+            ray = x[segment, i] if d[CAMERA + PERSPECTIVE] > 0.0 else 1.0 if i == 2 else 0.0  # noqa: PLR2004 - along z
+            first += tangents[k, i] * ray
+            second += tangents[k + 1, i] * ray
+        size = max(math.sqrt(first * first + second * second), LEAST_LENGTH)
+        known = MOST_TURN_INFORMATION * s[LIMBS + 2 * limb + segment] * math.sqrt(seen) / (size * size)
+        matrix[k, k] += known * first * first + ANGLE_INFORMATION
+        matrix[k, k + 1] += known * first * second
+        matrix[k + 1, k] += known * first * second
+        matrix[k + 1, k + 1] += known * second * second + ANGLE_INFORMATION
+
+
+def know_postures(
+    states: Array,
+    data: Array,
+    f: Array,
+    apart: Array,
+    ends: Array,
+    numbers: Array,
+    matrix: Array,
+    jacobian: Array,
+    factor: Array,
+    right: Array,
+    levers: Array,
+    joints: Array,
+    asked: NDArray[np.bool_],
+) -> None:
+    """Fill in what covariances of postures (N, 71) follow from, as `posekit.refinement.covariance.joint_system` does.
+
+    Arrays have the batch last: the trunk's matrix (C, C, N) and Jacobian (6, 3, C, N); the limbs' factors (U, U, 4, N),
+    couplings and gradients (U, 7, 4, N) and levers (2, 4, 3, U, N); and all joints (14, 3, N).
+    """
+    width, reach = matrix.shape[0], factor.shape[0]
+    limb_room, room, offsets, start = np.empty((24, 7)), np.empty((10, 9)), np.empty((6, 3)), np.empty(3)
+    M, gradient, J, x = np.empty((width, width)), np.empty(width), np.empty((6, 3, width)), np.empty((2, 3))
+    P, g, moving = np.empty((6, 3, 3)), np.empty((6, 3)), np.empty((3, width))
+    L, along, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
+    tangents, damped, nothing = np.empty((4, 3)), np.empty(6), np.zeros(LIMIT_COUNT, np.int8)
+    W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
+    W[:, NUMBERS_AT:] = numbers
+    floor = ANGLE_INFORMATION * 1e-6
+    for n in range(len(states)):
+        s, d = states[n], data[n]
+        place_trunk(s, offsets)
+        joint_jacobian(s, f, offsets, J)
+        trunk_block(s, d, f, apart, offsets, nothing, room, M, gradient, P, g)
+        for joint in range(TRUNK_POINTS):
+            for i in range(3):
+                joints[joint, i, n] = s[ROOT + i] + offsets[joint, i]
+        for limb in range(LIMB_COUNT):
+            for i in range(3):
+                start[i] = joints[STARTS[limb], i, n]
+            told = limb_block(
+                s, d, f, limb, start, ends[limb], W[limb], nothing[:4], limb_room, L, along, own, push, tangents
+            )
+            if told[2] < 0:
+                asked[n] = True
+                break
+            for segment in range(2):
+                length, at = s[LIMBS + 2 * limb + segment], DIRECTIONS + 6 * limb + 3 * segment
+                for i in range(3):
+                    x[segment, i] = (start[i] if segment == 0 else x[0, i]) + length * s[at + i]
+                    joints[MIDDLES[limb] if segment == 0 else ENDS[limb], i, n] = x[segment, i]
+                    for end in range(segment, 2):
+                        levers[end, limb, i, 2 * segment, n] = length * tangents[2 * segment, i]
+                        levers[end, limb, i, 2 * segment + 1, n] = length * tangents[2 * segment + 1, i]
+                        if reach > 4:  # noqa: PLR2004 - lengths are varied
+                            levers[end, limb, i, 4 + segment, n] = length * s[at + i]
+            know_turns(s, d, limb, x, tangents, limb_room, L)
+            damped_factor(L, reach, 0.0, floor, damped)
+            solve_forward(L, reach, along, 7)
+            leave(along, reach, own, push)
+            of_torso = limb < FIRST_LEG or f[LEGS_ON_TORSO] > 0.0
+            add_limb(limb, TURN_TORSO if of_torso else TURN_HIPS, J, own, push, P, g, M, gradient)
+            for a in range(reach):
+                for b in range(reach):
+                    factor[a, b, limb, n] = L[a, b]
+                for b in range(7):
+                    right[a, b, limb, n] = along[a, b]
+        if asked[n]:
+            continue
+        gather_trunk(J, P, g, M, gradient, moving)
+        curve(offsets, g, M)
+        if f[HEAD_COUNT] > 0.0:
+            head_block(s, d, f, nothing, room, L, along, own, push)
+            damped_factor(L, 3, 0.0, floor, damped)
+            solve_forward(L, 3, along, 7)
+            leave(along, 3, own, push)
+            for a in range(6):
+                for b in range(6):
+                    M[a, b] += own[a, b]
+        for a in range(width):
+            turns = TURN_TORSO <= a < TO_SHAPE
+            M[a, a] += ANGLE_INFORMATION if turns else PLACE_INFORMATION
+            for b in range(width):
+                matrix[a, b, n] = M[a, b]
+            for joint in range(TRUNK_POINTS):
+                for i in range(3):
+                    jacobian[joint, i, a, n] = J[joint, i, a]
+
+
 KERNEL_PARTS = (limb_block_kernels,)
 
 COMPILED_TYPES = {
@@ -835,6 +957,11 @@ COMPILED_TYPES = {
     "tabulate_limbs": (
         "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,::1], f8, f8[:,:,:,::1], f8[:,:,::1], f8[:,:,::1],"
         " f8[:,:,:,::1], f8[:,:,:,::1], i8[:,:,::1])"
+    ),
+    "know_turns": "",
+    "know_postures": (
+        "(f8[:,::1], f8[:,::1], f8[::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], f8[:,:,:,::1],"
+        " f8[:,:,:,::1], f8[:,:,:,:,::1], f8[:,:,::1], b1[::1])"
     ),
     "limbs_beyond": "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1])",
 }

@@ -27,11 +27,13 @@ from posekit.errors import InputError
 from posekit.geometry import Array, dot
 from posekit.geometry.batch_last import backward, cholesky, forward, matrix_vector
 from posekit.refinement.descent import BLOCK_POSTURES
-from posekit.refinement.equations import EliminatedBlock, assemble, linearise
+from posekit.refinement.equations import assemble, linearise
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS
 from posekit.refinement.limb_terms import LimbTerms
+from posekit.refinement.looped_descent import looped_knowledge
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, place
+from posekit.refinement.trunk_terms import turns_of
 
 UNKNOWN_PLACE_METRES = 10.0
 """Metres: standard deviation of a place of which nothing is known."""
@@ -61,10 +63,29 @@ def covariances(problem: RefinementProblem, state: PostureState, gain: Array | N
 
 def joint_system(problem: RefinementProblem, state: PostureState, gain: Array | None = None) -> JointSystem:
     """Set up what covariances of whole postures follow from; the gain is (3, N)."""
+    gain = np.zeros((3, state.root.shape[1])) if gain is None else gain
+    looped = None if problem.trunk_only else looped_knowledge(problem, state)
+    if looped is None:
+        return stepped_system(problem, state, gain)
+    matrix, jacobian, factor, right, levers, joints = looped
+    return JointSystem(
+        matrix=matrix,
+        jacobian=jacobian,
+        turns=tuple(turn.start for turn in turns_of(problem)),
+        factor=factor,
+        right=right,
+        levers=levers,
+        joints=joints,
+        gain=gain,
+    )
+
+
+def stepped_system(problem: RefinementProblem, state: PostureState, gain: Array) -> JointSystem:
+    """Do the same with all postures at once."""
     here = linearise(problem, state)
     if here.limbs is None:
         raise InputError("covariances are of whole postures; expected a problem that has its limbs")
-    n, width = state.root.shape[1], problem.trunk_width
+    width = problem.trunk_width
     limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
     arrow = assemble(here._replace(limbs=limbs), 0.0, UNKNOWN_ANGLE_RADIANS**-2 * 1e-6)
     index = np.arange(width)
@@ -73,16 +94,16 @@ def joint_system(problem: RefinementProblem, state: PostureState, gain: Array | 
         UNKNOWN_PLACE_METRES**-2,
         np.where(index < 9, UNKNOWN_ANGLE_RADIANS**-2, UNKNOWN_PLACE_METRES**-2),
     )[:, None]
-    assert arrow.limbs is not None and arrow.starts is not None  # there are limbs
+    assert arrow.limbs is not None  # there are limbs
     return JointSystem(
         matrix=arrow.matrix,
         jacobian=here.trunk.jacobian,
-        starts=arrow.starts,
         turns=tuple(turn.start for turn in here.trunk.turns),
-        limbs=arrow.limbs,
+        factor=arrow.limbs.factor,
+        right=arrow.limbs.right,
         levers=_levers(state, limbs),
         joints=place(state),
-        gain=np.zeros((3, n)) if gain is None else gain,
+        gain=gain,
     )
 
 
@@ -95,12 +116,10 @@ class JointSystem(NamedTuple):
         The trunk's, limbs and head eliminated; with what is known of all.
     jacobian : array (6, 3, C, N)
         How the trunk's unknowns move its joints.
-    starts : array (4, 6, C, N)
-        How they move limbs' starts and turn the parts by which limbs are judged.
     turns : tuple of 4 int
-        The first of the three unknowns that turn that part.
-    limbs : EliminatedBlock
-        The limbs.
+        The first of the three unknowns that turn the part by which each limb is judged.
+    factor, right : array (U, U, 4, N), (U, 7, 4, N)
+        The limbs, eliminated: as `posekit.refinement.equations.EliminatedBlock` has them.
     levers : array (2, 4, 3, U, N)
         How limbs' unknowns move their middles and ends, from their starts.
     joints, gain : array (14, 3, N), (3, N)
@@ -109,9 +128,9 @@ class JointSystem(NamedTuple):
 
     matrix: Array
     jacobian: Array
-    starts: Array
     turns: tuple[int, ...]
-    limbs: EliminatedBlock
+    factor: Array
+    right: Array
     levers: Array
     joints: Array
     gain: Array
@@ -122,7 +141,7 @@ class JointSystem(NamedTuple):
         scaled = np.concatenate([self.joints[order], self.gain[None]])
         found = np.empty((scaled.shape[2], 14, 3, 3))
         turns = np.column_stack([LIMB_STARTS, self.turns])
-        arrays = self.matrix, self.jacobian, turns, self.limbs.factor, self.limbs.right, self.levers, scaled
+        arrays = self.matrix, self.jacobian, turns, self.factor, self.right, self.levers, scaled
         compiled(covariance_kernels).joint_covariances(*map(np.ascontiguousarray, arrays), found)
         out = np.empty_like(found)
         out[:, order] = found
@@ -140,13 +159,17 @@ class JointSystem(NamedTuple):
         root = root - self.joints[None, :6] * shrink[:, None, None]
         np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
         whitened = backward(trunk, np.repeat(np.eye(width)[:, :, None], n, axis=2))
-        shift = np.einsum("licn,cwn->iwln", self.starts, whitened)
-        coupling = self.limbs.right[:, :6]
+        starts = np.zeros((4, 6, width, n))
+        starts[:, :3] = self.jacobian[list(LIMB_STARTS)]
+        for limb, turn in enumerate(self.turns):
+            starts[limb, 3:, turn : turn + 3] = np.eye(3)[..., None]
+        shift = np.einsum("licn,cwn->iwln", starts, whitened)
+        coupling = self.right[:, :6]
         reach = len(coupling)
-        followed = -backward(self.limbs.factor, np.einsum("uiln,iwln->uwln", coupling, shift))
+        followed = -backward(self.factor, np.einsum("uiln,iwln->uwln", coupling, shift))
         own = np.empty((reach, reach, 4, n))
         own[:] = np.eye(reach)[:, :, None, None]
-        own = backward(self.limbs.factor, own)
+        own = backward(self.factor, own)
         for U, ends in zip(self.levers, (list(LIMB_MIDDLES), list(LIMB_ENDS)), strict=True):
             moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
             moving -= self.joints[ends][:, :, None] * shrink

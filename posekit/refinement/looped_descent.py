@@ -7,6 +7,7 @@ limits are judged by what no loop knows, there are none.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +15,10 @@ from numpy.typing import NDArray
 
 from posekit.compiled import posture_kernels
 from posekit.compiled.compiling import compiled, is_installed
-from posekit.compiled.posture_numbers import STATE_WIDTH
+from posekit.compiled.posture_numbers import LIMB_WEIGHTS, SHAPE_WEIGHTS
 from posekit.geometry import Array
 from posekit.least_squares import Damping
-from posekit.refinement.figure_numbers import Bounds
+from posekit.refinement.figure_numbers import Bounds, FigureNumbers
 from posekit.refinement.limits import LIMB_BRANCHES, possible_branches
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState
@@ -148,6 +149,30 @@ def looped_limb_tables(
     return None if (counts[..., 0] < 0).any() else (matrix, gradient, step, slope, tangents, counts)
 
 
+def looped_knowledge(problem: RefinementProblem, state: PostureState) -> tuple[Array, ...] | None:
+    """Return what covariances follow from, as `posekit.refinement.covariance.JointSystem` has it, or None.
+
+    Matrix, Jacobian, factors, couplings, levers and joints; None where there is no loop, or one posture is not told.
+    """
+    walls = _walls(problem)
+    if walls is None:
+        return None
+    count, width, reach = state.root.shape[1], problem.trunk_width, problem.limb_width
+    arrays = (
+        np.empty((width, width, count)),
+        np.empty((6, 3, width, count)),
+        np.empty((reach, reach, 4, count)),
+        np.empty((reach, 7, 4, count)),
+        np.zeros((2, 4, 3, reach, count)),
+        np.empty((14, 3, count)),
+    )
+    asked = np.zeros(count, dtype=np.bool_)
+    compiled(posture_kernels).know_postures(
+        _rows(state), _data(problem), _figure(problem), TRUNK_APART, *walls, *arrays, asked
+    )
+    return None if asked.any() else arrays
+
+
 def settings_of(damping: Damping, floor: float, steps: int, precision: float, hopeless: float) -> Array:
     """Lay out what a search is told, as `posekit.compiled.limb_block_kernels.INITIAL` and what follows it says."""
     own = (damping.initial, damping.smallest, damping.largest, damping.growth, damping.decay, damping.light)
@@ -210,8 +235,7 @@ def _data(problem: RefinementProblem) -> Array:
 def _figure(problem: RefinementProblem) -> Array:
     """Lay out the figure and what is varied of it."""
     anatomy, seen = problem.anatomy, problem.head_image is not None
-    boxes = anatomy.limb_bounds
-    branches = possible_branches(boxes)
+    count, own = _anatomy(anatomy)
     flags = [
         problem.shape_weight is not None,
         problem.limb_weight is not None,
@@ -221,24 +245,34 @@ def _figure(problem: RefinementProblem) -> Array:
         problem.trunk_only,
         anatomy.middle_pelvis,
         (len(anatomy.head) + len(problem.own_head)) * seen,
-        len(branches),
+        count,
     ]
+    out = np.concatenate([np.array(flags, dtype=np.float64), own, np.ravel(problem.own_head)])
+    if problem.shape_weight is not None:
+        out[SHAPE_WEIGHTS : SHAPE_WEIGHTS + 9] = problem.shape_weight
+    if problem.limb_weight is not None:
+        out[LIMB_WEIGHTS : LIMB_WEIGHTS + 8] = np.ravel(problem.limb_weight)
+    return out
+
+
+@lru_cache(maxsize=16)
+def _anatomy(anatomy: FigureNumbers) -> tuple[int, Array]:
+    """Count branches, and lay out what follows the flags: branches, weights (zero as yet), lengths and limits."""
+    branches = possible_branches(anatomy.limb_bounds)
     ways = np.zeros((len(LIMB_BRANCHES), 2))
     ways[: len(branches)] = branches
     parts = [
-        np.array(flags, dtype=np.float64),
         ways,
-        np.zeros(9) if problem.shape_weight is None else problem.shape_weight,
+        np.zeros(9),
         ((TRUNK_APART @ anatomy.shape) ** 2).sum(axis=1),
-        np.zeros(8) if problem.limb_weight is None else problem.limb_weight,
+        np.zeros(8),
         anatomy.limbs,
-        *_middles_and_halves(boxes),
+        *_middles_and_halves(anatomy.limb_bounds),
         *_middles_and_halves(anatomy.pelvis_bounds),
         *_middles_and_halves(anatomy.neck_bounds),
         anatomy.head,
-        problem.own_head,
     ]
-    return np.concatenate([np.ravel(part) for part in parts])
+    return len(branches), np.concatenate([np.ravel(part) for part in parts])
 
 
 def _middles_and_halves(bounds: Bounds) -> tuple[Array, Array]:

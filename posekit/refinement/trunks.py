@@ -26,7 +26,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array, unit
 from posekit.geometry.batch_last import matrix_product
 from posekit.refinement.descent import descend
-from posekit.refinement.equations import chi2_of
+from posekit.refinement.equations import BLOCK_POSTURES, chi2_of
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.merging import groups_of
 from posekit.refinement.observed_frames import ObservedFrames
@@ -186,22 +186,23 @@ def _followed(
     The `effort` is how many choices, and with how many steps.
     """
     choices, steps = effort
-    every = np.repeat(np.arange(len(known)), N_CHOICES)
+    factors, many = _depth_factors(observed, known), len(known) * N_CHOICES
     starts, chi2 = [], []
-    for factor in _depth_factors(observed, known):
-        begin = state_of(one.anatomy, _lifts(observed, one, one.root * factor).reshape(-1, 14, 3))
+    # Depths together, as long as they are few postures.
+    each = max(BLOCK_POSTURES // max(many, 1), 1)
+    for part in (factors[at : at + each] for at in range(0, len(factors), each)):
+        begin, value = _started(observed, one, part)
         starts.append(begin)
-        chi2.append(chi2_of(one.take(every), begin))
+        chi2.append(value.reshape(len(part), many))
+    every = PostureState(*(np.concatenate(arrays, axis=-1) for arrays in zip(*starts, strict=True)))
+    tried = np.concatenate(chi2)
     # Of each near and far choice the depth that fits best, then the choices that fit best.
-    depth = np.argmin(chi2, axis=0)
-    best_of = np.min(chi2, axis=0).reshape(len(known), N_CHOICES)
+    depth = np.argmin(tried, axis=0)
+    best_of = np.min(tried, axis=0).reshape(len(known), N_CHOICES)
     order = np.argsort(best_of, axis=1, kind="stable")[:, :choices]
     chosen = (np.arange(len(known))[:, None] * N_CHOICES + order).reshape(-1)
     which = np.repeat(np.arange(len(known)), order.shape[1])
-    begin = starts[0].take(chosen)
-    for k, other in enumerate(starts[1:], start=1):
-        rows = np.flatnonzero(depth[chosen] == k)
-        begin.put(rows, other.take(chosen[rows]))
+    begin = every.take(depth[chosen] * many + chosen)
     first = descend(one.take(which), begin, steps=steps)
     best = (
         np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
@@ -231,6 +232,17 @@ def _followed(
     np.minimum.at(least, row, np.where(finite, value, np.inf))
     found = _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
     return found, least
+
+
+def _started(observed: ObservedFrames, one: RefinementProblem, factors: Array) -> tuple[PostureState, Array]:
+    """Lift trunks of frames (F,) by every choice at some depths (K,): postures and their chi2 (K F N_CHOICES)."""
+    count = one.root.shape[1]
+    each = np.tile(np.arange(count), len(factors))
+    part = one.take(each)
+    begin = state_of(
+        one.anatomy, _lifts(observed, part, part.root * np.repeat(factors, count)).reshape(-1, 14, 3)
+    )
+    return begin, chi2_of(one.take(np.repeat(each, N_CHOICES)), begin)
 
 
 def _trunks(

@@ -124,7 +124,7 @@ def programme_of(
     checks: Sequence[Sequence[Check]], parents: tuple[int, ...], first: tuple[int, ...], columns: int
 ) -> Programme:
     """Lay out checks by level, for candidates whose joints begin in their `first` of so many columns."""
-    rules: list[tuple[int, Rule, PointTables]] = []
+    rules: list[tuple[int, Rule, tuple[int, ...]]] = []
     stretches: list[Stretch] = []
     levels, begin, number, verdicts = [0], (0, 0), 0, 0
     for level, at in enumerate(checks):
@@ -137,7 +137,7 @@ def programme_of(
                 and len(tables.joints) <= MAX_POINTS
                 and rule.presumed <= MAX_PRESUMED
             ):
-                rules.append((number, rule, tables))
+                rules.append((number, rule, tuple(check.points)))
                 verdicts += tables.choices
             else:
                 stretches.append(_stretch(begin, (level, len(rules)), number, check))
@@ -145,28 +145,43 @@ def programme_of(
             number += 1
         levels.append(len(rules))
     stretches.append(_stretch(begin, (len(checks) - 1, len(rules)), number, None))
-    return _laid_out(rules, len(checks), np.array(levels, dtype=np.int64), tuple(stretches))
+    shape = tuple(
+        (number, rule.kind, rule.presumed, len(rule.numbers), points) for number, rule, points in rules
+    )
+    table, tips, places, verdicts = _tables(shape, parents, first, columns)
+    numbers = np.concatenate([np.zeros(NUMBERS_AT), *(rule.numbers for _, rule, _ in rules)])
+    return Programme(
+        np.array(levels, dtype=np.int64), table, tips, places, numbers, verdicts, tuple(stretches)
+    )
 
 
 def _stretch(begin: tuple[int, int], end: tuple[int, int], number: int, check: Check | None) -> Stretch:
     return Stretch(np.array([*begin, *end], dtype=np.int64), end[0], number, check)
 
 
-def _laid_out(
-    rules: Sequence[tuple[int, Rule, PointTables]], joints: int, levels: Table, stretches: tuple[Stretch, ...]
-) -> Programme:
-    count = len(rules)
+@lru_cache(maxsize=64)
+def _tables(
+    shape: tuple[tuple[int, int, int, int, tuple[int, ...]], ...],
+    parents: tuple[int, ...],
+    first: tuple[int, ...],
+    columns: int,
+) -> tuple[Table, Table, Table, int]:
+    """Return what `Programme` has of rules: number, kind, what they presume, how many numbers, and points of each.
+
+    Kept, since a frame takes little longer: nobody writes to them.
+    """
+    count, joints = len(shape), len(parents)
+    found = [point_tables(points, parents, first, columns) for *_, points in shape]
     table = np.zeros((count, 7), dtype=np.int64)
-    tips = np.zeros((count, max((len(each.tips) for *_, each in rules), default=1), 3), dtype=np.int64)
-    points = np.zeros((count, max((len(each.joints) for *_, each in rules), default=1), 2), dtype=np.int64)
+    tips = np.zeros((count, max((len(each.tips) for each in found), default=1), 3), dtype=np.int64)
+    points = np.zeros((count, max((len(each.joints) for each in found), default=1), 2), dtype=np.int64)
     verdicts, at = 0, NUMBERS_AT
-    for c, (number, rule, each) in enumerate(rules):
-        table[c] = rule.kind, rule.presumed, len(each.tips), len(each.joints), verdicts, at, number
+    for c, ((number, kind, presumed, width, _), each) in enumerate(zip(shape, found, strict=True)):
+        table[c] = kind, presumed, len(each.tips), len(each.joints), verdicts, at, number
         below = np.cumsum(each.bits[::-1])[::-1] - each.bits
         tips[c, : len(each.tips)] = np.stack([PATH_COLUMNS + each.tips, (1 << each.bits) - 1, below], axis=-1)
         points[c, : len(each.joints), 0] = np.where(each.joints < joints, each.joints, -1)
         points[c, : len(each.joints), 1] = each.first
-        at += len(rule.numbers)
+        at += width
         verdicts += each.choices
-    numbers = np.concatenate([np.zeros(NUMBERS_AT), *(rule.numbers for _, rule, _ in rules)])
-    return Programme(levels, table, tips, points, numbers, verdicts, stretches)
+    return table, tips, points, verdicts
