@@ -19,6 +19,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from posekit.compiled import evidence_kernels
+from posekit.compiled.compiling import compiled, is_installed
 from posekit.geometry import Array, dot
 
 N_ANGLES: Final = 41
@@ -153,13 +155,28 @@ class LimbEvidence:
         """
         depth = self.depth[:, None] + best * _SINE * self.forward[:, None]
         seen, blur = self.lower[:, None] * depth, self.blur[1][:, None] * depth
-        known = np.isfinite(self.lower)
         # The least that a length of these would be off.
         short = np.maximum(lengths.min() * _COSINE - seen[:, :, None], 0.0)
         long = np.maximum(seen[:, :, None] - lengths.max() * _COSINE, 0.0)
         off = (short + long) ** 2 / (blur[:, :, None] ** 2 + (lengths.max() * _SINE * _STEP) ** 2 / 12)
         likely = upper[:, :, None] + self.prior - 0.5 * np.nan_to_num(off)
-        n, i, j = np.nonzero(likely > likely.max(axis=(1, 2), keepdims=True) - NEGLIGIBLE_LOG)
+        least = likely.max(axis=(1, 2)) - NEGLIGIBLE_LOG
+        if is_installed():
+            return self._looped(likely, least, (seen, blur, depth), lengths)
+        return self._summed(likely, least, (seen, blur, depth), lengths)
+
+    def _looped(self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array) -> Array:
+        """Add up over the lower segment's angles by a compiled loop, its end found (seen, blur and depth)."""
+        out = np.full((*likely.shape[:2], len(lengths)), LEAST_LOG)
+        spread = np.abs(_SINE) * _STEP / np.sqrt(12)
+        arrays = likely, self.prior, *found, _COSINE, spread, lengths, least
+        compiled(evidence_kernels).weigh_lower(*map(np.ascontiguousarray, arrays), OUTLIER_DENSITY, out)
+        return out
+
+    def _summed(self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array) -> Array:
+        """Do the same with all pairs at once."""
+        (seen, blur, depth), known = found, np.isfinite(self.lower)
+        n, i, j = np.nonzero(likely > least[:, None, None])
         most = self.prior.max(axis=(1, 2))
         weight = np.exp(self.prior[n, i, j] - most[n]) * _COSINE[j]
         bell = _bell(
