@@ -253,11 +253,15 @@ class LimbRange(Check):
         share = np.radians(self.tolerance) / np.maximum(sine, np.finfo(np.float64).tiny)
         return np.asarray(np.degrees(np.tan(np.arcsin(np.minimum(share, 1.0)))))
 
-    @cached_property
+    @property
     def rule(self) -> Rule | None:
         """The screen as numbers: what the limb hangs on, whether it is whole, limits and tolerances."""
-        if self.directions:
-            return None  # tolerances of their own for each angle, which the screen does not know
+        # With directions each angle has a tolerance of its own, which the screen does not know.
+        return None if self.directions else self.passing
+
+    @cached_property
+    def passing(self) -> Rule:
+        """The screen by the tolerance alone: with directions angles may be as far off, or farther."""
         sizes = self.figure.ik.rigid_kind(self._parent), len(self.limb) == 3
         more = [np.radians(self.tolerance), np.radians(UNSEEN_DEGREES), *sizes]
         return _rule(self.figure.ik, self._angles, kernels.OF_LIMB, more)

@@ -105,8 +105,8 @@ def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
     fast = is_fast(0)
     for column, check in enumerate(checks):
         own = points[:, list(check.points)]
-        if fast and check.rule is not None:
-            doubtful[:, column] = screened(check.rule, own)[0] != NO_VIOLATION
+        if fast and check.passing is not None:
+            doubtful[:, column] = screened(check.passing, own)[0] != NO_VIOLATION
         else:
             doubtful[:, column] = check.judge(own).violated.any(axis=1)
     return doubtful

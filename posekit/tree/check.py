@@ -226,6 +226,11 @@ class Check:
         """The K places as files and reports name them: ``("right_elbow.flexion",)``."""
         return tuple(map(str, self.places))
 
+    @property
+    def passing(self) -> Rule | None:
+        """A compiled form that passes nothing the check rejects; it may leave some that the check itself passes."""
+        return self.rule
+
     def judge(self, points: Array) -> Findings:
         """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""
         raise NotImplementedError
