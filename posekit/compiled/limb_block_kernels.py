@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from posekit.compiled import limb_kernels
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_kernels import beyond_limits
-from posekit.compiled.limit_kernels import FULL_TURN, past, within_half_turn  # noqa: F401 - to be compiled
 from posekit.compiled.posture_numbers import (
     BOX,
     BRANCH_COUNT,
@@ -66,8 +65,24 @@ BOX_ANGLES = 4
 INITIAL, SMALLEST, LARGEST, GROWTH, DECAY, LIGHT, FLOOR, STEPS, PRECISION, HOPELESS = range(10)
 """Where a search's settings stand: those of its damping, the floor of diagonals, and when it ends."""
 
+FULL_TURN = 2.0 * math.pi
+
 LEAST_PROMISE = 1e-300
 """As `posekit.least_squares.MIN_PROMISE`."""
+
+
+def within_half_turn(angle: Any) -> Any:
+    """Return an angle less its full turns."""
+    return angle - FULL_TURN * np.rint(angle / FULL_TURN)
+
+
+def past(away: Any, half: Any) -> Any:
+    """Return by what an angle is outside a range about zero; NaN where it is not known."""
+    if away > half:
+        return away - half
+    if away < -half:
+        return away + half
+    return away - away
 
 
 def see(d: Array, x: Any, y: Any, z: Any, point: Any, r: Array, A: Array) -> None:

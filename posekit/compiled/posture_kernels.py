@@ -80,7 +80,7 @@ TURN_TORSO, TURN_HIPS, TO_SHAPE = 3, 6, 9
 """Which unknowns turn torso and hips, and change the trunk's shape."""
 
 LEAST_BALL_COSINE = 0.05
-"""As `posekit.compiled.limit_kernels.LEAST_COSINE`."""
+"""As `posekit.refinement.limits.MIN_COSINE`."""
 
 SPINE_WEIGHT = 1e3
 """One over `posekit.refinement.trunk_terms.SPINE_TURN_DEVIATION`."""
@@ -105,7 +105,7 @@ def place_trunk(s: Array, offsets: Array) -> None:
 
 
 def ball(s: Array, parent: Any, child: Any, f: Array, bounds: Any, watch: NDArray[np.int8], o: Array, J: Array) -> None:
-    """Judge a part on its parent, as `posekit.compiled.limit_kernels.judge_balls` does.
+    """Judge a part on its parent, as `posekit.refinement.limits.ball_limits` does.
 
     Written down are what each angle is over, and which limit is passed (2, 3), and the derivative (3, 3).
     """

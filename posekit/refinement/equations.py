@@ -12,8 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled import descent_kernels
-from posekit.compiled.compiling import compiled, is_installed
 from posekit.geometry import Array
 from posekit.geometry.batch_last import backward, cholesky, forward
 from posekit.refinement.figure_numbers import LIMB_STARTS
@@ -157,25 +155,12 @@ def eliminate(
     """Factor a block (k, k, ...), damped by a fraction of its diagonal."""
     factor = np.array(matrix, order="C")
     right = np.concatenate([coupling, gradient[:, None]], axis=1)
-    if len(factor) and is_installed():
-        return _eliminated(factor, right, damping, floor)
     damped = _damp(factor, damping, floor)
     return (
         EliminatedBlock(cholesky(factor), forward(factor, right), damped)
         if len(factor)
         else EliminatedBlock(factor, right, damped)
     )
-
-
-def _eliminated(factor: Array, right: Array, damping: Array | float, floor: float) -> EliminatedBlock:
-    """Do the same with a compiled loop, in place."""
-    damped = np.empty(factor.shape[1:])
-    each = np.array(np.broadcast_to(damping, factor.shape[2:]), dtype=np.float64, order="C").reshape(-1)
-    kernels, k, B = compiled(descent_kernels), len(factor), len(each)
-    kernels.damp_blocks(factor.reshape(k, k, B), each, floor, damped.reshape(k, B))
-    right = np.ascontiguousarray(right)
-    kernels.eliminate_blocks(factor.reshape(k, k, B), right.reshape(k, right.shape[1], B))
-    return EliminatedBlock(factor, right, damped)
 
 
 def left_over(reduced: EliminatedBlock, matrix: Array, gradient: Array) -> tuple[Array, Array]:

@@ -21,8 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled import limit_kernels
-from posekit.compiled.compiling import compiled, is_installed
 from posekit.geometry import Array, cross, dot
 from posekit.refinement.figure_numbers import Bounds
 
@@ -161,8 +159,7 @@ def limb_limits(
     angles = found.angles[:, limb, row]
     weight = np.ones_like(angles)
     weight[0], weight[2] = found.cosines[1, limb, row], found.sines[3, limb, row]
-    judge = looped_branches if is_installed() else summed_branches
-    away, best, side, euler = judge(angles, weight, (middle, half), possible_branches(bounds))
+    away, best, side, euler = least_branches(angles, weight, (middle, half), possible_branches(bounds))
     beyond = _beyond(away, half)
     over, watched = beyond, np.zeros(len(limb), dtype=np.bool_)
     if watch is not None:
@@ -179,10 +176,10 @@ def limb_limits(
 Branches = list[tuple[int, float]]
 
 
-def summed_branches(
+def least_branches(
     angles: Array, weight: Array, bounds: tuple[Array, Array], possible: Branches
 ) -> tuple[Array, Array, Array, Array]:
-    """Find the branch in which limbs, angles (4, M), are least outside, by sums over all at once.
+    """Find the branch in which limbs, angles (4, M), are least outside.
 
     Parameters
     ----------
@@ -217,22 +214,6 @@ def summed_branches(
         away = np.where(better, other, away)
         side, euler = np.where(better, hinge, side), np.where(better, branch, euler)
     return away, best, side, euler
-
-
-def looped_branches(
-    angles: Array, weight: Array, bounds: tuple[Array, Array], possible: Branches
-) -> tuple[Array, Array, Array, Array]:
-    """Find the same by a compiled loop."""
-    away, chosen = np.empty(angles.shape), np.empty((3, angles.shape[1]))
-    compiled(limit_kernels).least_branches(
-        np.ascontiguousarray(angles),
-        np.ascontiguousarray(weight),
-        np.ascontiguousarray(np.stack(bounds)),
-        np.array(possible),
-        away,
-        chosen,
-    )
-    return away, chosen[0], chosen[1], chosen[2]
 
 
 def limb_rows(found: Limbs, out: Outside, f: Array, e: Array) -> Array:
@@ -315,32 +296,6 @@ class Ball(NamedTuple):
 
 def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None = None) -> Ball:
     """Judge the three angles of a part (3, 3, N) on its parent (3, 3, N); `watch` (3, N) as for limbs."""
-    judge = looped_ball if is_installed() else summed_ball
-    return judge(parent, child, bounds, watch)
-
-
-def looped_ball(parent: Array, child: Array, bounds: Bounds, watch: Signs | None = None) -> Ball:
-    """Judge balls by a compiled loop."""
-    lower, upper = bounds.lower[0], bounds.upper[0]
-    beyond, over, jacobian = (
-        np.empty((3, parent.shape[2])),
-        np.empty((3, parent.shape[2])),
-        np.empty(parent.shape),
-    )
-    felt = compiled(limit_kernels).judge_balls(
-        np.array(parent, order="C"),
-        np.array(child, order="C"),
-        np.stack([(lower + upper) / 2, (upper - lower) / 2]),
-        np.zeros(over.shape) if watch is None else np.array(watch, dtype=np.float64, order="C"),
-        beyond,
-        over,
-        jacobian,
-    )
-    return Ball(over, jacobian if felt else None, np.sign(beyond).astype(np.int8))
-
-
-def summed_ball(parent: Array, child: Array, bounds: Bounds, watch: Signs | None = None) -> Ball:
-    """Judge balls by sums over all at once."""
     up = child[:, 2]
     x, y, z = -np.einsum("ikn,in->kn", parent, up)
     h = np.sqrt(x * x + z * z)

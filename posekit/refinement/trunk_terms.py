@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled import descent_kernels
-from posekit.compiled.compiling import compiled, is_installed
 from posekit.geometry import Array, cross, dot
 from posekit.geometry.batch_last import matrix_vector
 from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
@@ -110,7 +108,7 @@ def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) 
     if problem.anatomy.middle_pelvis:
         chi2 += (_spine_turn(state)[0] / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
-        stretch, _ = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape, slopes=False)
+        stretch, _ = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape)
         chi2 += np.einsum("kn,kn->n", stretch, stretch)
     return chi2, crossed
 
@@ -225,20 +223,8 @@ def shape_jacobian(state: PostureState) -> Array:
     return jacobian
 
 
-def shape_distances(weight: Array, own: Array, shape: Array, *, slopes: bool = True) -> tuple[Array, Array]:
-    """Return the residuals (9, N) of the trunk's distances and, unless not wanted, their derivative (9, 9, N)."""
-    if not is_installed():
-        return summed_distances(weight, own, shape)
-    J = np.empty((9 if slopes else 0, *shape.shape))
-    residual = np.empty_like(shape, order="C")
-    each = np.array(np.broadcast_to(weight.reshape(9, -1), shape.shape), order="C")
-    squared = ((TRUNK_APART @ own) ** 2).sum(axis=1)
-    compiled(descent_kernels).distances(each, squared, TRUNK_APART, np.array(shape, order="C"), residual, J)
-    return residual, J
-
-
-def summed_distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
-    """Find the same by sums over all postures at once, derivatives always."""
+def shape_distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
+    """Return the residuals (9, N) of the trunk's distances, and their derivative (9, 9, N)."""
     points, mine = np.einsum("jis,sn->jin", _PLACES, shape), _PLACES @ own
     residual, J = np.empty_like(shape), np.empty((9, *shape.shape))
     for row, (i, j) in enumerate(TRUNK_SEGMENTS):
