@@ -116,7 +116,7 @@ def off_plane(w: Array, at: int) -> Any:
     return True
 
 
-def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 - all limits, in the judge's order
+def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:
     """Write down the limits of one writing, whose readings are; say whether they are clear.
 
     Parameters
@@ -214,7 +214,7 @@ def writing(w: Array, at: int, loose: Any, to: int) -> None:
     w[WORST_AT + to], w[FIRST_AT + to] = most, NOT_CLEAR if edge else first
 
 
-def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call costs as much as some of its steps
+def anatomical(w: Array, at: int) -> Any:
     """Screen a limb: its rigid part (points of torso or hips), then two joints, or three of a whole one.
 
     Where the end is not known, nor are rotation and hinge, nor anything that depends on them.

@@ -133,7 +133,7 @@ def noisy(w: Array, at: int) -> Any:
     return found
 
 
-def screen(kind: int, w: Array, at: int) -> Any:  # noqa: PLR0912 - a branch a kind
+def screen(kind: int, w: Array, at: int) -> Any:
     """Screen one posture by one check, of a kind; see `posekit.compiled.frame_kernels.screen`."""
     if kind == OF_CAPSULES:
         return capsules(w, at)

@@ -145,7 +145,9 @@ def _linked(
     spaces = {home: dict(vars(sys.modules[home])) for home in homes}
     digest = hashlib.sha256()
     for names in spaces.values():
-        constants = sorted((name, value) for name, value in names.items() if isinstance(value, int | float))
+        constants = sorted(
+            (name, value) for name, value in names.items() if isinstance(value, int | float | tuple)
+        )
         digest.update(Path(str(names["__file__"])).read_bytes() + repr(constants).encode())
     made: dict[str, Any] = {}
     for name, (function, types) in wanted.items():
@@ -161,7 +163,8 @@ def _linked(
 def _of(module: ModuleType) -> dict[str, tuple[FunctionType, str]]:
     """Return the functions to compile, with the types they take: those of the modules in `KERNEL_PARTS` first."""
     wanted = {name: each for part in getattr(module, "KERNEL_PARTS", ()) for name, each in _of(part).items()}
-    return wanted | {name: (vars(module)[name], types) for name, types in module.COMPILED_TYPES.items()}
+    own = vars(module)
+    return wanted | {name: (own[name], types) for name, types in module.COMPILED_TYPES.items() if name in own}
 
 
 def _called(

@@ -102,7 +102,7 @@ def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) 
     return count
 
 
-def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would hand on twenty arrays
+def grow(
     begin: int,
     end: int,
     lifts: bool,

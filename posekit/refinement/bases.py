@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
+from posekit.refinement.descent import DescentResult, descend
 from posekit.refinement.equations import chi2_of
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.joint_step import (
@@ -22,7 +22,7 @@ from posekit.refinement.joint_step import (
     trunk_tables,
 )
 from posekit.refinement.limb_fitting import Bases, LimbsOnBases, SearchSettings
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import moved
 from posekit.tree.factors import Rows
 

@@ -26,12 +26,11 @@ from posekit.compiled.compiling import compiled, is_installed
 from posekit.errors import InputError
 from posekit.geometry import Array, dot
 from posekit.geometry.batch_last import backward, cholesky, forward, matrix_vector
-from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import assemble, linearise
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS
 from posekit.refinement.limb_terms import LimbTerms
 from posekit.refinement.looped_descent import looped_knowledge
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import PostureState, place
 from posekit.refinement.trunk_terms import turns_of
 

@@ -9,9 +9,15 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.least_squares import Damping
-from posekit.refinement.equations import BLOCK_POSTURES, DIAGONAL_FLOOR, LimitSigns, evaluate, linearise, solve
+from posekit.refinement.equations import (
+    DIAGONAL_FLOOR,
+    LimitSigns,
+    evaluate,
+    linearise,
+    solve,
+)
 from posekit.refinement.looped_descent import looped_descent, settings_of
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import PostureState, moved
 
 MAX_STEPS = 20
@@ -86,7 +92,9 @@ def descend(
     than `precision` of chi2, be it for a limit in its way, or no step decreases it. It is given up where chi2 is
     beyond `hopeless` and the next step does not promise to halve it.
     """
-    looped = looped_descent(problem, start, settings_of(REFINEMENT_DAMPING, DIAGONAL_FLOOR, steps, precision, hopeless))
+    looped = looped_descent(
+        problem, start, settings_of(REFINEMENT_DAMPING, DIAGONAL_FLOOR, steps, precision, hopeless)
+    )
     if looped is None:
         return stepped_descent(problem, start, steps=steps, precision=precision, hopeless=hopeless)
     state, chi2, counts, asked = looped
@@ -94,7 +102,9 @@ def descend(
     rows = np.flatnonzero(asked)
     if rows.size:
         part = problem.take(rows)
-        found.put(rows, stepped_descent(part, start.take(rows), steps=steps, precision=precision, hopeless=hopeless))
+        found.put(
+            rows, stepped_descent(part, start.take(rows), steps=steps, precision=precision, hopeless=hopeless)
+        )
     return found
 
 

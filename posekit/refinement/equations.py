@@ -19,7 +19,7 @@ from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
 from posekit.refinement.looped_descent import looped_chi2
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep, parents, trunk_offsets
 from posekit.refinement.trunk_terms import TrunkTerms, start_jacobian, to_unknowns, trunk_chi2, trunk_terms
 
@@ -123,9 +123,6 @@ def chi2_of(problem: RefinementProblem, state: PostureState) -> Array:
         chi2[some] = evaluate(problem.take(some), state.take(some))[0]
     return chi2
 
-
-BLOCK_POSTURES = 2048
-"""Postures worked on at once: enough to spread the overhead of each operation."""
 
 MAX_CHI2 = 1e150
 """Sums of squares beyond this come from joints behind the camera (`problem.BEHIND_CAMERA_RESIDUAL`): infinite."""

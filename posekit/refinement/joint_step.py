@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.geometry.batch_last import backward
-from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import DIAGONAL_FLOOR, assemble, eliminate, left_over, linearise
 from posekit.refinement.limb_terms import Chains, limb_terms
 from posekit.refinement.looped_descent import looped_limb_tables, looped_trunk_tables
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep
 from posekit.refinement.trunk_terms import start_jacobian, trunk_terms
 
@@ -145,9 +144,9 @@ def limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains
     looped = looped_limb_tables(problem, trunks, chains, DIAGONAL_FLOOR)
     if looped is None:
         return stepped_limb_tables(problem, trunks, chains)
-    *own, tangents, counts = looped
+    matrix, gradient, step, slope, tangents, counts = looped
     along = np.ascontiguousarray(tangents.reshape(4, -1, 2, 2, 3).transpose(0, 2, 3, 4, 1))
-    return LimbTables(*own, along, counts[..., 0], counts[..., 1])
+    return LimbTables(matrix, gradient, step, slope, along, counts[..., 0], counts[..., 1])
 
 
 def stepped_limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains) -> LimbTables:

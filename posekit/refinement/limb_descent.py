@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.geometry.batch_last import backward
-from posekit.refinement.descent import BLOCK_POSTURES, REFINEMENT_DAMPING
+from posekit.refinement.descent import REFINEMENT_DAMPING
 from posekit.refinement.equations import DIAGONAL_FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
 from posekit.refinement.looped_descent import looped_limbs, settings_of
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import moved_limbs
 
 

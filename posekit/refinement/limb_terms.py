@@ -20,7 +20,7 @@ from posekit.geometry import Array, dot
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.looped_descent import looped_limb_chi2
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.state import place_limbs
 from posekit.refinement.walls import Beyond, beyond_walls, wall_rows
 
@@ -199,14 +199,10 @@ def chi2_of_limbs(problem: RefinementProblem, chains: Chains) -> Array:
         rows, chi2 = np.arange(chains.start.shape[2]), np.empty((4, chains.start.shape[2]))
     else:
         rows = np.flatnonzero(np.isnan(chi2).any(axis=0))
-    for at in range(0, len(rows), BLOCK_LIMBS):
-        some = rows[at : at + BLOCK_LIMBS]
+    for at in range(0, len(rows), BLOCK_POSTURES):
+        some = rows[at : at + BLOCK_POSTURES]
         chi2[:, some] = limb_chi2(problem.take(some), chains.take(some))[0]
     return chi2
-
-
-BLOCK_LIMBS = 2048
-"""Columns of limbs worked on at once."""
 
 
 def _curve(chains: Chains, g_both: Array, g_end: Array, matrix: Array) -> NDArray[np.bool_]:

@@ -1,7 +1,7 @@
 """Searches as compiled loops: the numbers of a problem laid out for `posekit.compiled.posture_kernels`.
 
-They do what `posekit.refinement.descent` and `limb_descent` do with arrays, to rounding. Where Numba is not installed, or
-limits are judged by what no loop knows, there are none.
+They do what `posekit.refinement.descent` and `limb_descent` do with arrays, to rounding. Where Numba is not installed,
+or limits are judged by what no loop knows, there are none.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def looped_descent(
     start : PostureState
         Where the searches begin.
     settings : array (10,)
-        As `posekit.compiled.limb_block_kernels.INITIAL` and what follows it says.
+        As `posekit.compiled.block_kernels.FIRST_DAMPING` and what follows it says.
 
     Returns
     -------
@@ -58,7 +58,11 @@ def looped_descent(
     if walls is None:
         return None
     states, count = _rows(start), start.root.shape[1]
-    chi2, counts, asked = np.full(count, np.inf), np.zeros((count, 4), dtype=np.int64), np.zeros(count, dtype=np.bool_)
+    chi2, counts, asked = (
+        np.full(count, np.inf),
+        np.zeros((count, 4), dtype=np.int64),
+        np.zeros(count, dtype=np.bool_),
+    )
     compiled(posture_kernels).descend_postures(
         states, _data(problem), _figure(problem), TRUNK_APART, *walls, settings, chi2, counts, asked
     )
@@ -97,7 +101,9 @@ def looped_chi2(problem: RefinementProblem, state: PostureState) -> Array | None
     if walls is None:
         return None
     chi2 = np.empty(state.root.shape[1])
-    compiled(posture_kernels).value_postures(_rows(state), _data(problem), _figure(problem), TRUNK_APART, *walls, chi2)
+    compiled(posture_kernels).value_postures(
+        _rows(state), _data(problem), _figure(problem), TRUNK_APART, *walls, chi2
+    )
     return chi2
 
 
@@ -112,7 +118,9 @@ def looped_limb_chi2(problem: RefinementProblem, chains: Chains) -> Array | None
     return chi2.T
 
 
-def looped_trunk_tables(problem: RefinementProblem, state: PostureState, floor: float) -> tuple[Array, Array, Array] | None:
+def looped_trunk_tables(
+    problem: RefinementProblem, state: PostureState, floor: float
+) -> tuple[Array, Array, Array] | None:
     """Return matrices (N, C, C) and gradients (N, C) of trunks alone, and how heads follow (N, 3, 7), or None.
 
     None where there is no loop; without a head nothing follows (N, 0, 7).
@@ -144,7 +152,17 @@ def looped_limb_tables(
     tangents, counts = np.empty((4, count, 4, 3)), np.empty((4, count, 2), dtype=np.int64)
     states = _rows(trunks._replace(directions=chains.directions, limbs=chains.lengths))
     compiled(posture_kernels).tabulate_limbs(
-        states, _data(problem), _figure(problem), *walls, floor, matrix, gradient, step, slope, tangents, counts
+        states,
+        _data(problem),
+        _figure(problem),
+        *walls,
+        floor,
+        matrix,
+        gradient,
+        step,
+        slope,
+        tangents,
+        counts,
     )
     return None if (counts[..., 0] < 0).any() else (matrix, gradient, step, slope, tangents, counts)
 
@@ -174,7 +192,7 @@ def looped_knowledge(problem: RefinementProblem, state: PostureState) -> tuple[A
 
 
 def settings_of(damping: Damping, floor: float, steps: int, precision: float, hopeless: float) -> Array:
-    """Lay out what a search is told, as `posekit.compiled.limb_block_kernels.INITIAL` and what follows it says."""
+    """Lay out what a search is told, as `posekit.compiled.block_kernels.FIRST_DAMPING` and what follows it says."""
     own = (damping.initial, damping.smallest, damping.largest, damping.growth, damping.decay, damping.light)
     return np.array([*own, floor, steps, precision, hopeless], dtype=np.float64)
 

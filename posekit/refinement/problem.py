@@ -112,6 +112,9 @@ class RefinementProblem:
         return 4 if self.limb_weight is None else 6
 
 
+BLOCK_POSTURES = 2048
+"""Postures worked on at once: enough to spread the overhead of each operation."""
+
 PER_POSTURE = ("image", "weight", "head_image", "head_weight", "root", "root_weight", "free")
 
 

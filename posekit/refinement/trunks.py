@@ -26,11 +26,11 @@ from posekit.errors import InputError
 from posekit.geometry import Array, unit
 from posekit.geometry.batch_last import matrix_product
 from posekit.refinement.descent import descend
-from posekit.refinement.equations import BLOCK_POSTURES, chi2_of
+from posekit.refinement.equations import chi2_of
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.merging import groups_of
 from posekit.refinement.observed_frames import ObservedFrames
-from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureState, trunk_offsets, turned_by_spine

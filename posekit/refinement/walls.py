@@ -38,7 +38,7 @@ class Walls(Protocol):
 
     @property
     def loops(self) -> tuple[Array, Array] | None:
-        """What compiled loops take: by limb the figure's ends (4, 4, 2) and numbers (4, K); None where they do not do."""
+        """What compiled loops take: ends (4, 4, 2) and numbers (4, K) of limbs; None where there are none."""
         ...
 
     def beyond(

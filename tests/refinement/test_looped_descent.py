@@ -11,7 +11,15 @@ import pytest
 
 from posekit.body import Figure, load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
-from posekit.compiled import limb_block_kernels, posture_kernels
+from posekit.compiled import (
+    block_kernels,
+    limb_block_kernels,
+    limb_limit_kernels,
+    posture_kernels,
+    posture_numbers,
+    table_kernels,
+    trunk_block_kernels,
+)
 from posekit.least_squares import MIN_PROMISE
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.refinement import ObservedFrames, RootPrior
@@ -86,7 +94,9 @@ def problem_of(
         camera=camera,
         image=image,
         deviation=2.0,
-        root=RootPrior(mean=scene.joints_cam[:, 0], covariance=np.tile(np.diag([1e-4, 1e-4, 1e-2]), (N, 1, 1))),
+        root=RootPrior(
+            mean=scene.joints_cam[:, 0], covariance=np.tile(np.diag([1e-4, 1e-4, 1e-2]), (N, 1, 1))
+        ),
         walls=walls,
         length_deviation=given.get("length_deviation", 0.0),
         limit_deviation=given.get("limit_deviation", 2.0),
@@ -95,9 +105,7 @@ def problem_of(
     problem = observed.problem(np.arange(N), scene.joints_cam[:, 0])
     postures = scene.joints_cam + rng.normal(scale=0.03, size=scene.joints_cam.shape)
     state = state_of(problem.anatomy, postures, scene.head_cam)
-    return problem, state._replace(
-        directions=limb_directions(postures, np.tile(np.arange(N), (4, 1)), state)
-    )
+    return problem, state._replace(directions=limb_directions(postures, np.tile(np.arange(N), (4, 1)), state))
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["whole", "trunks"])
@@ -121,7 +129,8 @@ def test_searches_take_the_same_steps(
 
 def test_what_is_hopeless_and_what_has_no_steps_left_ends_alike(rng: np.random.Generator) -> None:
     problem, start = problem_of(WAYS["anatomical ranges"], rng, noise=30.0)
-    for told in ({"hopeless": 20.0}, {"steps": 2}, {"precision": 5.0}):
+    ends: tuple[dict[str, Any], ...] = ({"hopeless": 20.0}, {"steps": 2}, {"precision": 5.0})
+    for told in ends:
         found, expected = descend(problem, start, **told), stepped_descent(problem, start, **told)
         np.testing.assert_array_equal(found.steps, expected.steps)
         np.testing.assert_array_equal(found.settled, expected.settled)
@@ -131,7 +140,7 @@ def test_what_is_hopeless_and_what_has_no_steps_left_ends_alike(rng: np.random.G
 @pytest.mark.parametrize("given", WAYS.values(), ids=WAYS.keys())
 def test_limbs_by_themselves_end_alike(given: Mapping[str, Any], rng: np.random.Generator) -> None:
     problem, start = problem_of(given, rng)
-    told = {"steps": 6, "precision": 1e-2, "hopeless": 250.0}
+    told: dict[str, Any] = {"steps": 6, "precision": 1e-2, "hopeless": 250.0}
     used = rng.random((4, N)) < 0.8
     ended = []
     for fit in (fit_limbs, stepped_limbs):
@@ -200,13 +209,23 @@ def test_ranges_that_no_loop_knows_have_none(rng: np.random.Generator) -> None:
 
 
 def test_constants_of_loops_are_those_of_refinement() -> None:
-    limbs, postures = limb_block_kernels, posture_kernels
-    assert limbs.FAR_BEHIND == BEHIND_CAMERA_RESIDUAL and limbs.LEAST_PROMISE == MIN_PROMISE
-    assert limbs.LEAST_SECOND_COSINE == postures.LEAST_BALL_COSINE == MIN_COSINE
-    assert (limbs.WALL_STEP, limbs.WALL_SLOPE, limbs.WALL_REACH) == (STEP_RADIANS, MAX_SLOPE, REACH_RADIANS)
-    assert (limbs.MIDDLES, limbs.ENDS, postures.STARTS) == (LIMB_MIDDLES, LIMB_ENDS, LIMB_STARTS)
-    assert postures.SPINE_WEIGHT == 1 / SPINE_TURN_DEVIATION and postures.BEYOND_COUNTING == MAX_CHI2
-    assert postures.ANGLE_INFORMATION == pytest.approx(covariance_module.UNKNOWN_ANGLE_RADIANS**-2)
-    assert postures.PLACE_INFORMATION == pytest.approx(covariance_module.UNKNOWN_PLACE_METRES**-2)
-    assert postures.MOST_TURN_INFORMATION == covariance_module.MAX_TURN_INFORMATION
-    assert postures.LEAST_LENGTH == covariance_module.MIN_LENGTH
+    limits, trunks, tables = limb_limit_kernels, trunk_block_kernels, table_kernels
+    assert limb_block_kernels.FAR_BEHIND == BEHIND_CAMERA_RESIDUAL
+    assert block_kernels.LEAST_PROMISE == MIN_PROMISE
+    assert limits.LEAST_SECOND_COSINE == trunks.LEAST_BALL_COSINE == MIN_COSINE
+    assert (limits.WALL_STEP, limits.WALL_SLOPE, limits.WALL_REACH) == (
+        STEP_RADIANS,
+        MAX_SLOPE,
+        REACH_RADIANS,
+    )
+    assert (posture_numbers.LIMB_STARTS, posture_numbers.LIMB_MIDDLES, posture_numbers.LIMB_ENDS) == (
+        LIMB_STARTS,
+        LIMB_MIDDLES,
+        LIMB_ENDS,
+    )
+    assert trunks.SPINE_WEIGHT == 1 / SPINE_TURN_DEVIATION
+    assert posture_kernels.BEYOND_COUNTING == MAX_CHI2
+    assert tables.ANGLE_INFORMATION == pytest.approx(covariance_module.UNKNOWN_ANGLE_RADIANS**-2)
+    assert tables.PLACE_INFORMATION == pytest.approx(covariance_module.UNKNOWN_PLACE_METRES**-2)
+    assert tables.MOST_TURN_INFORMATION == covariance_module.MAX_TURN_INFORMATION
+    assert tables.LEAST_LENGTH == covariance_module.MIN_LENGTH
