@@ -162,12 +162,10 @@ class LimbEvidence:
         likely = upper[:, :, None] + self.prior - 0.5 * np.nan_to_num(off)
         least = likely.max(axis=(1, 2)) - NEGLIGIBLE_LOG
         if is_installed():
-            return self._looped(likely, least, (seen, blur, depth), lengths)
-        return self._summed(likely, least, (seen, blur, depth), lengths)
+            return self.looped(likely, least, (seen, blur, depth), lengths)
+        return self.summed(likely, least, (seen, blur, depth), lengths)
 
-    def _looped(
-        self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array
-    ) -> Array:
+    def looped(self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array) -> Array:
         """Add up over the lower segment's angles by a compiled loop, its end found (seen, blur and depth)."""
         out = np.full((*likely.shape[:2], len(lengths)), LEAST_LOG)
         spread = np.abs(_SINE) * _STEP / np.sqrt(12)
@@ -175,9 +173,7 @@ class LimbEvidence:
         compiled(evidence_kernels).weigh_lower(*map(np.ascontiguousarray, arrays), OUTLIER_DENSITY, out)
         return out
 
-    def _summed(
-        self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array
-    ) -> Array:
+    def summed(self, likely: Array, least: Array, found: tuple[Array, Array, Array], lengths: Array) -> Array:
         """Do the same with all pairs at once."""
         (seen, blur, depth), known = found, np.isfinite(self.lower)
         n, i, j = np.nonzero(likely > least[:, None, None])

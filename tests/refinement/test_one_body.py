@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from posekit.refinement.limb_evidence import DirectionDensity, LimbEvidence
+from posekit.refinement.limb_evidence import N_ANGLES, DirectionDensity, LimbEvidence
 
 FLAT = DirectionDensity(mean=np.zeros(6), whitening=1e-6 * np.eye(6), dof=4.0)
 """All directions are as likely."""
@@ -71,3 +72,26 @@ def test_what_is_not_seen_says_nothing() -> None:
     found = evidence(np.nan, 0.25).of_upper(LENGTHS)
     assert np.isfinite(found).all()
     assert np.ptp(found, axis=2).max() == 0
+
+
+@pytest.mark.parametrize("unseen", [False, True])
+def test_lengths_are_weighed_by_loops_as_by_sums(unseen: bool, rng: np.random.Generator) -> None:
+    count, lengths = 30, 0.27 * np.exp(np.linspace(-0.1, 0.1, 9))
+    found = LimbEvidence(
+        depth=rng.uniform(2, 6, count),
+        upper=rng.uniform(0.0, 0.1, count),
+        lower=np.where(rng.random(count) < 0.3 * unseen, np.nan, rng.uniform(0.0, 0.1, count)),
+        blur=rng.uniform(1e-3, 4e-3, (2, count)),
+        forward=rng.uniform(0.9, 1.0, count),
+        prior=rng.normal(size=(count, N_ANGLES, N_ANGLES)),
+    )
+    upper = found.of_upper(0.3 * np.ones(1))[..., 0]
+    likely = upper[:, :, None] + found.prior
+    least = likely.max(axis=(1, 2)) - 3.0
+    depth = np.repeat(found.depth[:, None], N_ANGLES, axis=1)
+    end = found.lower[:, None] * depth, found.blur[1][:, None] * depth, depth
+    looped = found.looped(likely, least, end, lengths)
+    summed = found.summed(likely, least, end, lengths)
+    assert (summed > -600).any() and (summed < -600).any()
+    # Sums are of numbers with six digits.
+    np.testing.assert_allclose(looped, summed, rtol=0, atol=1e-5)

@@ -7,9 +7,13 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
+from posekit.compiled.screen_kinds import OF_LIMB
+from posekit.compiled.verdicts import NO_VIOLATION
 from posekit.errors import FigureError
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
+from posekit.synthesis import random_views
 from posekit.tree import Check
+from posekit.tree.screening import screened
 from posekit.validators import Ranges, joint_range
 
 FIGURE = load_figure()
@@ -213,3 +217,22 @@ def test_arms_held_exactly_sideways_pass(flexion: float, rotation: float, elbow:
             f"{side}_elbow.flexion": np.radians(elbow),
         }
     assert not any(bad for bad, _, _ in judged(posture(angles)).values())
+
+
+def test_what_passes_the_screen_by_the_tolerance_alone_passes_with_directions() -> None:
+    """And where angles are exact they are no screen of the check itself, which allows some of them more."""
+    scene = random_views(load_figure(), 400, np.random.default_rng(5), ranges="urdf")
+    points = np.concatenate([scene.joints_cam, scene.head_cam], axis=1)
+    points = points + np.random.default_rng(6).normal(scale=0.05, size=points.shape)
+    more = 0
+    for check in joint_range(load_figure(), tolerance=3.0, directions=True):
+        own = points[:, list(check.points)]
+        passing = check.passing
+        assert passing is not None
+        clear = screened(passing, own)[0] == NO_VIOLATION
+        violated = np.asarray(check.judge(own).violated.any(axis=1))
+        assert not violated[clear].any()
+        assert clear.any() and violated.any()
+        more += int((~clear & ~violated).sum())
+        assert (check.rule is None) == (passing.kind == OF_LIMB)
+    assert more
