@@ -24,6 +24,10 @@ BLOCK_COLUMNS: Final = 512
 """Points that are judged together: few enough that their distances from all middles stay in the cache."""
 
 
+MOST_WIDER = 16
+"""Wider distributions that are kept: each way up that is asked for has its own."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudentMixture:
     """A mixture of K t distributions of d coordinates that differ in their middles only.
@@ -72,8 +76,17 @@ class StudentMixture:
         return replace(self, means=mean, share=None, scale=self.scale + (away.T * self.shares) @ away)
 
     def widened(self, variance: Array) -> StudentMixture:
-        """Return the same with more variance (d,) in each coordinate."""
-        return replace(self, scale=self.scale + np.diag(variance))
+        """Return the same with more variance (d,) in each coordinate; made once for each that is asked for."""
+        key = tuple(variance.tolist())
+        if key not in self._wider:
+            if len(self._wider) >= MOST_WIDER:
+                self._wider.clear()
+            self._wider[key] = replace(self, scale=self.scale + np.diag(variance))
+        return self._wider[key]
+
+    @cached_property
+    def _wider(self) -> dict[tuple[float, ...], StudentMixture]:
+        return {}
 
     def excess(self, x: Array, parts: Sequence[int]) -> Array:
         """Return how much higher the log-density is than it is on average over the distribution itself.
