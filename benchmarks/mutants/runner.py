@@ -32,7 +32,7 @@ FILE_SECONDS: Final = 20.0
 """How long near tests of other lines of its file may take besides, in that time."""
 ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
 """Rooms whose tests are near, beside the file's own."""
-PATIENCE_SECONDS: Final = 60.0
+PATIENCE_SECONDS: Final = 20.0
 """Of processor, beyond three times what the map says: a fault that does not end is found."""
 BUSY_MACHINE: Final = 10.0
 """How many times as long that may last by the clock, where other processes run."""

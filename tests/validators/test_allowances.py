@@ -280,6 +280,38 @@ def test_names_are_in_the_order_in_which_checks_are_applied() -> None:
         chosen_checks(["colision"])
 
 
+UNITS = {"rigid_parts": "m", "joint_range": "deg", "collision": "m"}
+OF_RULES = {1: "m", 2: "m", 3: "m", 4: "deg", 5: "deg"}
+
+
+@pytest.mark.parametrize("ranges", ["urdf", "table1", "table1-printed", "anatomical"])
+@pytest.mark.parametrize("mode", ["distances", "side", "placement"])
+def test_every_check_has_its_unit_and_judges_whoever_stands(ranges: str, mode: Any) -> None:
+    made = make_checks(
+        FIGURE, ALL_CHECKS, ranges=load_ranges(ranges), rigid_mode=mode, rigid_tolerance=0.01, limbs=True,
+        rules=tuple(OF_RULES), exact=True,
+    )  # fmt: skip
+    seen: set[str] = set()
+    for check in made:
+        if check.name == "walking":
+            assert check.unit == OF_RULES[int(check.where[0][4])] and check.scope is Scope.MOTION
+        else:
+            assert check.unit == UNITS[check.name] and check.scope is Scope.POSTURE
+        assert check.rigid == (check.name == "rigid_parts") and check.slow == (check.name == "collision")
+        assert (check.noise is Loosening.DIRECTIONS) == (check.name == "joint_range")
+        if check.name == "joint_range":
+            limb = check.where[0].partition("_")[0] in ("right", "left")
+            assert check.pulls == (ranges.startswith("table1") or (ranges == "anatomical" and limb))
+            assert check.scaled == (ranges == "table1" and limb)
+            assert check.of_configuration == (ranges == "urdf")
+        else:
+            assert check.of_configuration == (check.name != "walking") and not (check.pulls or check.scaled)
+        found = check.judge(FIGURE.neutral_points[None, list(check.points)])
+        assert found.value.shape == (1, len(check.places)) and not found.violated.any()
+        seen.add(check.name)
+    assert seen == {*UNITS, "walking"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Height(Check):
     """How high a wrist is, for tests."""

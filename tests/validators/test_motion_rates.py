@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,8 @@ def test_joint_velocities_are_shares_of_the_limits_that_there_are() -> None:
 def test_joint_velocities_are_not_asked_without_limits() -> None:
     verdict = judge_motion([JointVelocity()], robot(np.zeros((3, 3)), np.full(3, np.inf)))
     assert "no velocity limits" in verdict.not_asked["joint-velocity"]
+    unknown = replace(robot(np.zeros((3, 3)), np.ones(3)), velocity_limits=None)
+    assert "no configurations" in judge_motion([JointVelocity()], unknown).not_asked["joint-velocity"]
     people = MotionClip(joints=np.zeros((3, len(JOINTS), 3)), time=np.arange(3) / 50.0, rate=50.0)
     assert "no configurations" in judge_motion([JointVelocity()], people).not_asked["joint-velocity"]
 
