@@ -353,6 +353,15 @@ def test_still_is_slow_for_a_second(speed: float, count: int, still: bool) -> No
     assert np.isfinite(found).any() == still
 
 
+@pytest.mark.parametrize(("noise", "limit"), [(0.05, 0.15), (0.25, 0.1 + 0.25 / 3)])
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_still_is_slower_by_four_deviations_of_a_speed(noise: float, limit: float, share: float) -> None:
+    """Over so many frames before and after that noise is no faster than 10 cm/s."""
+    clip = standing(120, noise=noise * np.sqrt(2) / 30.0 / 4.0)
+    found = BalanceStill().judge(gliding(share * limit * np.arange(120) / 30.0, clip)).value
+    assert np.isfinite(found[5:-5]).all() == np.isfinite(found[5:-5]).any() == (share < 1)
+
+
 def test_who_sits_may_lean() -> None:
     """Hips that are lower than four fifths of the legs over the feet may sit on something."""
     for share, judged in ((0.82, True), (0.78, False)):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from posekit.body import load_figure
+from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import FEET_POINTS, JOINTS, N_TRUNK_JOINTS
 from posekit.tree import Findings
@@ -158,6 +160,25 @@ def test_a_check_at_few_frames_a_second_is_not_filtered_above_half_of_them() -> 
     check = MOTION_CHECKS["root-jerk"]()
     assert check.not_asked(going(rate=6.5)) == ""
     assert check.not_asked(going(rate=6.0)) == "it needs more than 6 frames a second"
+
+
+def test_right_and_left_are_told_apart_of_two_frames() -> None:
+    clip, check = going(), MOTION_CHECKS["swap"]()
+    for count, words in ((1, "it needs two frames"), (2, "")):
+        few = replace(clip, joints=clip.joints[:count], time=clip.time[:count], feet=clip.feet[:count])
+        assert check.not_asked(few) == words
+
+
+def test_a_threshold_that_is_impossible_is_refused_with_its_check(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('schema = "posekit.profile/1"\n[checks.walking-phases]\nrules = "1,3"\n')
+    with pytest.raises(
+        InputError, match=r"checks\.walking-phases: got rules: '1,3'; expected some of 1, 2, 4"
+    ):
+        load_profile(str(path))
+    path.write_text('schema = "posekit.profile/1"\n[checks.walking-phases]\nrules = "4"\n')
+    (check,) = load_profile(str(path)).checks
+    assert vars(check)["rules"] == "4"
 
 
 def test_verdicts_repeat_what_findings_say() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import coal
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
@@ -27,6 +30,7 @@ from posekit.validators.robot.feet import Corner
 from posekit.validators.robot.fitting import Fit, Fitter
 from posekit.validators.robot.flips import find_flips
 from posekit.validators.robot.joint_range import beyond_limits, judge_joint_range, outside_limits
+from posekit.validators.robot.load import load_subject
 from posekit.validators.robot.models import Models
 from posekit.validators.robot.reach import judge_reach, rigid_pairs
 from posekit.validators.robot.robot_validator import RobotValidator
@@ -244,7 +248,9 @@ def test_depth_of_meshes_is_refused_and_named() -> None:
     named = with_mesh.pair_names[of_first.index(True)]
     with pytest.raises(InputError, match=rf"contact-margin -0\.01 m: the pair {named} has a mesh"):
         SelfCollision(subject=with_mesh, contact_margin=-0.01)
-    assert not SelfCollision(subject=subject_of(), contact_margin=-0.01).has_meshes
+    without = SelfCollision(subject=subject_of(), contact_margin=-0.01)
+    assert not without.has_meshes
+    np.testing.assert_allclose(without.margins, -0.01 - 1e-9, rtol=0, atol=1e-15)
 
 
 # --- balance --------------------------------------------------------------------------------------------
@@ -555,6 +561,26 @@ def test_robots_are_asked_four_checks_in_one_order() -> None:
         InputError, match="'dance' is not a check of robots; expected some of reach, rigid-parts"
     ):
         check_robot_names(["reach", "dance"])
+
+
+@pytest.mark.parametrize(("options", "name"), [
+    ({"srdf": "a.srdf"}, "--srdf"), ({"package_dirs": ["meshes"]}, "--package-dir"),
+])  # fmt: skip
+def test_files_of_a_robot_are_no_options_of_what_needs_none(
+    options: dict[str, Any], name: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "figure.urdf"
+    load_figure().write(path)
+    for urdf, words in (
+        (arm(), "the object that was given needs none; expected a robot's URDF with it"),
+        (load_figure(), "the object that was given needs none"),
+        ("stick_figure", "the built-in stick figure needs none"),
+        (path, "a stick figure, whose SRDF is the file of its name beside it needs none"),
+    ):
+        assert load_subject(urdf) is not None
+        with pytest.raises(InputError) as caught:
+            load_subject(urdf, **options)
+        assert str(caught.value).startswith(f"{name}: ") and words in str(caught.value)
 
 
 @pytest.mark.parametrize(("rigid", "reach"), [(0.0, 0.001), (0.0009, 0.001), (0.002, 0.002), (None, 0.03)])
