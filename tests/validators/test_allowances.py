@@ -312,6 +312,22 @@ def test_every_check_has_its_unit_and_judges_whoever_stands(ranges: str, mode: A
     assert seen == {*UNITS, "walking"}
 
 
+@pytest.mark.parametrize(("name", "words"), [
+    ("posekit.body:load_figure", "makes no check; expected a class that inherits from posekit.validators.Check"),
+    ("json:JSONDecoder", "json:JSONDecoder makes no check"),
+    ("json:nothing", "cannot be imported (module 'json' has no attribute 'nothing')"),
+    ("no_such_module:Check", "cannot be imported (No module named 'no_such_module')"),
+    (":Check", "':Check' is not a check; expected some of rigid-parts, joint-range"),
+    ("json:", "'json:' is not a check"),
+    ("json", "'json' is not a check"),
+])  # fmt: skip
+def test_a_name_that_leads_to_no_check_is_refused(name: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        chosen_checks([name])
+    assert words in str(caught.value) and str(caught.value).startswith("--checks: ")
+    chosen_checks([f"{__name__}:Height"])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Height(Check):
     """How high a wrist is, for tests."""

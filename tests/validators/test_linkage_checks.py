@@ -130,6 +130,16 @@ def test_a_girdle_seen_full_length_counts_once() -> None:
 # --- nearer ends ------------------------------------------------------------------------------------------
 
 
+def test_every_check_of_a_linkage_says_its_name_and_unit() -> None:
+    girdle = closure(span(HUMAN))
+    assert {(check.name, check.unit) for check in girdle} == {("midpoint", "m")}
+    (one,) = hinge_nearer({"b-a": "b"})
+    assert (one.name, one.unit, one.where, one.points) == ("nearer", "m", ("b-a",), (1, 0))
+    found = one.judge(np.array([[[0.0, 0, 1.0], [0, 0, 3.0]], [[0.0, 0, 3.0], [0, 0, 1.0]]]))
+    np.testing.assert_allclose(found.value, [[2.0], [-2.0]])
+    assert found.violated.tolist() == [[False], [True]] and np.isinf(found.upper).all()
+
+
 @pytest.mark.parametrize(("depth", "passes"), [(0.001, True), (-0.001, False)])
 def test_the_end_that_was_said_to_be_nearer_is(depth: float, passes: bool) -> None:
     for choices in ({"a-b": "a"}, {"b-a": "a"}):
