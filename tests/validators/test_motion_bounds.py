@@ -214,6 +214,40 @@ def test_profiles_name_their_thresholds() -> None:
     ]
 
 
+FEET = ("right_foot", "left_foot")
+PAIRS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+LIMBS = tuple(
+    f"{side}_{start}-{side}_{end}"
+    for pairs in ((("shoulder", "elbow"), ("elbow", "wrist")), (("hip", "knee"), ("knee", "ankle")))
+    for side in ("right", "left")
+    for start, end in pairs
+)
+PLACES: dict[str, tuple[str, ...]] = {
+    "timing": ("missing", "order"),
+    **dict.fromkeys(("frozen", "repeated", "support"), ("body",)),
+    "swap": PAIRS,
+    "teleport": (*JOINTS, "body"),
+    **dict.fromkeys(("speed", "acceleration", "jerk", "jitter"), JOINTS),
+    **dict.fromkeys(("root-jerk", "root-height"), ("root",)),
+    "drift": LIMBS,
+    "joint-velocity": ("hip", "knee"),
+    **dict.fromkeys(("penetration", "floating"), ("lowest",)),
+    **dict.fromkeys(("sliding", "skating-gmd", "skating-wham", "skating-physdiff"), FEET),
+    "balance-still": ("centre_of_mass",),
+    "contact-share": ("feet",),
+    "support-distance": ("root", "pelvis"),
+}
+
+
+@pytest.mark.parametrize("name", MOTION_CHECKS)
+def test_every_check_names_its_places(name: str) -> None:
+    places = MOTION_CHECKS[name]().places(going())
+    if name == "walking-phases":
+        assert all(place.startswith(("rule1.", "rule2.", "rule4.")) for place in places)
+    else:
+        assert places == PLACES[name]
+
+
 def test_every_check_names_unit_and_meaning() -> None:
     units = {name: kind.unit for name, kind in MOTION_CHECKS.items()}
     assert units == {

@@ -222,6 +222,32 @@ def test_a_joint_that_is_aside_for_a_frame_jumps_by_so_much(metres: float, frame
     assert np.nan_to_num(found.body).max() < 1e-9
 
 
+def test_a_jump_is_how_far_a_frame_is_from_a_cubic_less_three_times_what_its_neighbours_are() -> None:
+    """By least squares: seven frames, four of a cubic and one of the jump, so that two are left to be off."""
+    rng = np.random.default_rng(7)
+    joints = along(np.sin(np.arange(30) / 5.0)) + rng.normal(0.0, 0.002, (30, 14, 3))
+    joints[15] += [0.3, 0.0, 0.0]
+    joints[15, JOINT["left_wrist"]] += [0.2, 0.0, 0.1]
+    joints[9, JOINT["neck"]] += [0.0, 0.2, 0.0]
+    found = jumps_of(joints, 1 / 30.0)
+    times = np.arange(-3.0, 4.0)
+    design = np.column_stack([np.vander(times, 4), times == 0])
+    for frame in (9, 15):
+        fit, *_ = np.linalg.lstsq(design, joints[frame - 3 : frame + 4].reshape(7, -1), rcond=None)
+        left = (joints[frame - 3 : frame + 4].reshape(7, -1) - design @ fit).reshape(7, 14, 3)
+        misfit = 3.0 * np.sqrt((left**2).sum(axis=(0, 2)) / 2.0)
+        offset = fit[-1].reshape(14, 3)
+        body = np.median(offset, axis=0)
+        alone = np.linalg.norm(offset, axis=1) - misfit
+        beside = np.linalg.norm(offset - body, axis=1) - misfit
+        jumps = np.linalg.norm(body) > np.median(misfit)
+        np.testing.assert_allclose(
+            found.joint[frame], np.minimum(alone, beside) if jumps else alone, atol=1e-9
+        )
+        if frame == 15:
+            assert found.body[frame] == pytest.approx(np.linalg.norm(body) - np.median(misfit), abs=1e-9)
+
+
 @given(metres=st.floats(0.1, 2.0), frame=st.integers(8, 21))
 def test_a_body_that_is_aside_for_a_frame_jumps_by_so_much(metres: float, frame: int) -> None:
     joints = along(np.arange(30) / 30.0)
