@@ -100,11 +100,10 @@ def test_intervals_that_touch_are_one_and_minima_that_are_one_are_said_once() ->
 
 
 class _TwoBranches:
-    """Branch 0 is within a tolerance of 0.1 beyond 2.05 m, branch 1 before 1.95 m."""
+    """Branch 0 is within a tolerance of 0.1 from 2.05 to 2.25 m, branch 1 from 1.75 to 1.95 m."""
 
     def all(self, rows: Array, neck: Array) -> Array:
-        misfit = np.stack([2.15 - neck, neck - 1.85], axis=-1)
-        return np.maximum(misfit, 0.0)
+        return np.abs(np.stack([neck - 2.15, neck - 1.85], axis=-1))
 
     def least(self, rows: Array, neck: Array) -> Array:
         return np.asarray(self.all(rows, neck).min(axis=-1))

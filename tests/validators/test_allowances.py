@@ -20,6 +20,7 @@ from posekit.settings import RigidTolerance, ValidateSettings
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, segment_name
 from posekit.tree import Check, Findings, Loosening, Place, Scope, given_check
 from posekit.validators.anatomical import Anatomy, AngleRange, Coupling, End
+from posekit.validators.anatomical_limb import limb_walls
 from posekit.validators.given_points import points_of, refuse_far, sequence_of
 from posekit.validators.measured import Allowance, recorded_noise
 from posekit.validators.options import CheckOptions
@@ -225,6 +226,25 @@ def test_ends_are_means_and_spreads_from_the_figures_zero() -> None:
     assert anatomy.couplings_of("hip.flexion") == anatomy.couplings_of("hip.flexion", "upper") == (coupling,)
     assert anatomy.couplings_of("hip.flexion", "lower") == anatomy.couplings_of("knee.flexion") == ()
     assert anatomy.sinus_of("hip") is None
+
+
+def test_walls_are_without_tolerance_and_as_hips_show_them_unless_told_otherwise() -> None:
+    anatomy = load_ranges("anatomical").anatomy
+    assert anatomy is not None and anatomy.sinus_of("hip") is not None
+    angles = np.array([[40.0, 10.0, 5.0, 30.0], [-5.0, 25.0, -20.0, 80.0]])
+    usual = limb_walls(anatomy, "hip", angles).limits(anatomy.spreads)
+    for changes, same in (
+        ({"tolerance": 0.0}, True),
+        ({"turn": (0.0, 0.0)}, True),
+        ({"tolerance": 2.0}, False),
+    ):
+        found = limb_walls(anatomy, "hip", angles, **changes).limits(anatomy.spreads)
+        assert all(np.array_equal(a, b) for a, b in zip(usual, found, strict=True)) == same
+    # A pelvis between the hips is flexed until the thigh is near the middle of its range.
+    turned = limb_walls(anatomy, "hip", angles, turn=(-8.0, 3.0))
+    middle = np.mean([anatomy.motions["hip.flexion"].end(side)[0] for side in ("lower", "upper")])
+    own = limb_walls(anatomy, "hip", angles).values[..., 0]
+    np.testing.assert_allclose(turned.values[..., 0], own - np.clip(own - middle, -8.0, 3.0))
 
 
 # --- options and names ----------------------------------------------------------------------------------
