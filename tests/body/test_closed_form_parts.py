@@ -20,7 +20,7 @@ from posekit.body.closed_form import HIP_FLEXIONS, ClosedForm, freed, with_head
 from posekit.body.closing import HIPS_LENGTHS, TORSO_LENGTHS, closed_lengths, closing_line
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.body.lengths import forward_squared
-from posekit.body.side import SIDE_DEVIATIONS, offset_deviation, side_is_certain
+from posekit.body.side import SIDE_DEVIATIONS, _slope, offset_deviation, side_is_certain
 from posekit.body.torso_bending import bending_gives
 from posekit.body.uncertainty import LengthUncertainty
 from posekit.errors import FigureError
@@ -292,6 +292,18 @@ def test_lengths_leave_a_side_the_deviation_that_small_changes_show() -> None:
     legs = known(right_hip_right_knee=0.1)
     assert offset_deviation(lengths, legs) == 0.0
     assert SIDE_DEVIATIONS == 3.0
+
+
+@pytest.mark.parametrize("name", ["neck-pelvis", "neck-right_shoulder", "right_shoulder-pelvis"])
+def test_at_the_edge_of_a_triangle_the_other_end_tells_the_slope(name: str) -> None:
+    """With a shoulder between neck and pelvis, one of the two small changes makes no triangle."""
+    lengths = {**FIGURE.lengths, "neck-right_shoulder": 0.2, "right_shoulder-pelvis": 0.3, "neck-pelvis": 0.5}
+    slope = _slope(lengths, name)
+    assert math.isfinite(slope)
+    sign = -1.0 if name == "neck-pelvis" else 1.0
+    end = forward_squared({**lengths, name: lengths[name] * (1 + sign * 1e-6)})
+    assert slope == pytest.approx(sign * (end - forward_squared(lengths)) / 1e-6, rel=1e-6)
+    assert offset_deviation(lengths, known(neck_pelvis=0.01)) == math.inf
 
 
 def test_only_the_part_that_does_not_close_is_changed() -> None:

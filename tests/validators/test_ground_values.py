@@ -99,6 +99,8 @@ def test_speeds_are_over_frames_before_and_after(rate: float, frames: int) -> No
     assert found[10] == pytest.approx(0.3 if rate < 20 else 0.0, abs=1e-9)
     few = gliding(way[: 2 * frames], standing(2 * frames, rate=rate))
     assert np.isnan(speeds(few, few.feet, frames)).all()
+    enough = gliding(way[: 2 * frames + 1], standing(2 * frames + 1, rate=rate))
+    assert np.isfinite(speeds(enough, enough.feet, frames)[frames]).all()
 
 
 @given(sole=st.floats(-3, 3), given_ground=st.floats(-3, 3))
@@ -276,6 +278,13 @@ def test_a_slide_lasts_for_a_while(rate: float, seconds: float, slides: bool) ->
     way = 0.3 * np.clip(np.arange(round(4 * rate)) / rate - 1.5, 0, seconds)
     found = Sliding().judge(gliding(way, standing(len(way), rate=rate))).value
     assert found.any() == slides
+
+
+@pytest.mark.parametrize(("rate", "lasting", "frames"), [
+    (30.0, 0.4, 12), (60.0, 0.4, 24), (29.0, 0.4, 12), (28.0, 0.4, 22), (20.0, 0.4, 16), (30.0, 0.01, 3),
+])  # fmt: skip
+def test_a_slide_is_of_so_many_frames(rate: float, lasting: float, frames: int) -> None:
+    assert Sliding(lasting=lasting)._frames(standing(4, rate=rate)) == frames
 
 
 @pytest.mark.parametrize(("rise", "slides"), [(0.045, True), (0.055, False)])

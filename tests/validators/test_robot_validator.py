@@ -1,5 +1,6 @@
 """What the validator of robots takes, and what it refuses."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +123,9 @@ def test_what_is_no_configuration_is_refused(subject: str, q: Any, text: str) ->
     if subject == "figure":
         text = text.replace("43", "29")
         q = np.asarray(q)[..., :29] if np.shape(q)[-1] == 43 else q
-    with pytest.raises(InputError, match=text):
+    with pytest.raises(InputError, match=text) as caught:
         Validator(HUMAN if subject == "human" else None, checks=LIMITS).check(q=q)
+    assert re.match(r"q\b(?!_)", str(caught.value))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS
 from posekit.validators.motion import MotionClip
-from posekit.validators.motion.order import displaced, stretches_of
+from posekit.validators.motion.order import _stretches, displaced, stretches_of
 from posekit.validators.motion.sides import (
     LEFT_JOINTS,
     RIGHT_JOINTS,
@@ -238,3 +238,16 @@ def test_stretches_hold_frames_that_are_in_place_by_chance() -> None:
     inside[12:20] = True
     np.testing.assert_array_equal(stretches_of(places), inside)
     assert not stretches_of(np.zeros(5, dtype=np.intp)).any()
+
+
+def test_stretches_have_two_turns_back_and_at_most_six_hundred_frames() -> None:
+    def stretches(*at: int, count: int = 2000) -> list[tuple[int, int]]:
+        turning = np.zeros(count, dtype=bool)
+        turning[list(at)] = True
+        return _stretches(turning)
+
+    assert stretches() == [] and stretches(5) == []
+    assert stretches(5, 6) == [(5, 6)] and stretches(5, 11) == [(5, 11)] and stretches(5, 12) == []
+    assert stretches(5, 6, 20, 23, 26, 40) == [(5, 6), (20, 26)]
+    assert stretches(*range(100, 1301, 5)) == [(100, 699), (700, 1299)]  # one turn back is left over
+    assert stretches(*range(100, 1306, 5)) == [(100, 699), (700, 1299), (1300, 1305)]
