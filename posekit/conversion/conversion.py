@@ -36,7 +36,7 @@ from posekit.views.source import Source
 OWN_TARGETS: Final = ("view", "postures")
 """Files of posekit that can be converted to."""
 
-MOTION_OPTIONS: Final = ("--format", "--skeleton", "--up", "--input-up", "--clip", "--unit")
+MOTION_OPTIONS: Final = ("--format", "--skeleton", "--up", "--input-up", "--clip", "--unit", "--fps")
 DETECTOR_OPTIONS: Final = ("--format", "--skeleton", "--person", "--swap-sides", "--size")
 CAMERA_AND_PERSON_OPTIONS: Final = (
     "--camera",
@@ -186,7 +186,7 @@ def convert(job: Conversion) -> list[str]:
         raise InputError(
             f"--over: {output.to} holds no pictures; expected .rrd; or draw them: posekit render --over"
         )
-    held = read_held(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
+    held = read_held(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up, rate=job.source.rate)
     if isinstance(held, Motion) and carries_points(output.to):
         carried = held if output.to in TABLE_FORMATS else one_clip(held)
         return write_points(output, carried, job.source.skeleton)

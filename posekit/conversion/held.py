@@ -45,7 +45,13 @@ def content_of(given: object) -> Content:
 
 
 def read_held(
-    given: Path | Held, what: Recognised | None, *, clip: str = "", unit: str = "", up: str = ""
+    given: Path | Held,
+    what: Recognised | None,
+    *,
+    clip: str = "",
+    unit: str = "",
+    up: str = "",
+    rate: float | None = None,
 ) -> Held | HeldPostures:
     """Read what a file holds; an object is taken as it is.
 
@@ -58,6 +64,8 @@ def read_held(
     clip, unit, up : str
         Of motion: one of its clips, the unit of its lengths and the axis that points up, where the file's are to be
         overruled.
+    rate : float, optional
+        Frames a second of motion whose file says none.
 
     Raises
     ------
@@ -74,7 +82,8 @@ def read_held(
     if what.holds is Content.OBJECTS:
         return files.read_object(given)
     if what.holds is Content.MOTION:
-        motion = read_motion(given, what.names[0] if what.names else None, unit=unit or None, up=up or None)
+        name = what.names[0] if what.names else None
+        motion = read_motion(given, name, unit=unit or None, up=up or None, rate=rate)
         return motion.of_clip(clip) if clip else motion
     if what.holds in (Content.POSTURES, Content.CONFIGURATIONS):
         return held_postures(given, what)

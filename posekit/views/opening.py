@@ -17,7 +17,7 @@ from posekit.safe_io import shown
 from posekit.views.camera import in_pixels, sighting
 from posekit.views.opened import Opened
 from posekit.views.person import person
-from posekit.views.person_view import person_view
+from posekit.views.person_view import ASSUMED_VIEW_RATE, person_view
 from posekit.views.source import Source
 
 MAX_PEOPLE_LISTED: Final = 10
@@ -77,6 +77,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             f"{plural(len(one), 'picture')}{_mean_confidence(one)}",
             sighted.says,
             of_lengths,
+            *_assumed_rate(found, source),
         )
         opened.append(Opened(person=number, view=view, says=says, pictures=_pictures(one, len(view))))
     if not opened:
@@ -85,6 +86,14 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             "smaller --min-confidence, or another file"
         )
     return opened
+
+
+def _assumed_rate(found: KeyPoints, source: Source) -> list[str]:
+    """Say which frame rate is assumed of a recording, where nobody says it."""
+    known = source.rate is not None or np.isfinite(found.time).all()
+    if known or not found.sequence or len(found.pictures) < 2:
+        return []
+    return [f"frame rate: not known, {ASSUMED_VIEW_RATE:g} a second is assumed (--fps)"]
 
 
 def _pictures(one: KeyPoints, frames: int) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.formats import own as files
 from posekit.formats.cameras import write_cameras
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.motion import Motion, write_motion
+from posekit.formats.motion import Motion, read_motion, write_motion
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
 from posekit.recovery.conductor import recover
@@ -469,6 +469,21 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
         assert done.err == ""
         for part in parts:
             assert part in done.out, (path, part, done.out)
+
+
+def test_a_rate_that_no_file_says_is_stated_or_told(there: Path, command: Run, tmp_path: Path) -> None:
+    rows = [f"{k},{j},{j % 5},{j / 10},{k / 9}" for k in range(3) for j in range(33)]
+    head = "sync_index,point_id,x_coord,y_coord,z_coord"
+    points = bad(tmp_path, "xyz_HOLISTIC.csv", "\n".join([head, *rows]))
+    out = tmp_path / "a.trc"
+    assert "posekit convert FILE OUT.trc --fps RATE" in refused(command, out, "convert", points, out)
+    assert command("convert", points, out, "--fps", "24", "--input-up", "+y").code == 0
+    np.testing.assert_allclose(read_motion(out).time, np.arange(3) / 24, atol=1e-6)
+    again = tmp_path / "b.trc"
+    assert "says 24 frames a second itself" in refused(command, again, "convert", out, again, "--fps", "30")
+    words = ("recover", there / "pictures", "-o", tmp_path / "r.npz", "--camera", there / "camera.toml")
+    assert "frame rate: not known, 30 a second is assumed (--fps)" in command(*words).out
+    assert "frame rate" not in command(*words, "--fps", "10").out
 
 
 def test_points_of_different_people_are_not_told_as_one_persons(command: Run, tmp_path: Path) -> None:

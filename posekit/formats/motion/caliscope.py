@@ -14,7 +14,7 @@ import numpy as np
 
 from posekit.formats.motion.csv_table import read_columns
 from posekit.formats.motion.motion import Motion
-from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, STATE_RATE, MotionFormat
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import refusal
 
@@ -41,7 +41,7 @@ def read_caliscope(path: str | Path, unit: str | None = None, *, as_recorded: bo
         Where a cell is no number, a point comes twice in a frame, none is of the body, or a frame rate is needed.
     """
     if not as_recorded:
-        raise refusal(path, "", "no frame rate", "one", "save it as CSV with time, or TRC")
+        raise refusal(path, "", "no frame rate", "one", STATE_RATE)
     columns = read_columns(path, lambda names: TABLE_COLUMNS)
     names = load_skeleton_map("mediapipe_33").points
     values = np.stack([np.asarray(columns[name], dtype=np.float64) for name in TABLE_COLUMNS], axis=1)

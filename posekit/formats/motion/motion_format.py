@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.formats.motion.motion import Motion
 
+STATE_RATE: Final = "state it: posekit convert FILE OUT.trc --fps RATE"
+"""What to do with a file that says no frame rate."""
+
 METRES_IN_UNIT: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """How many metres a unit is, by the names that can be stated."""
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from posekit.formats.motion.motion import Motion
-from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, STATE_RATE, MotionFormat
 from posekit.formats.motion.unnamed_points import named_points
 from posekit.safe_io import read_npy, refusal
 
@@ -43,8 +43,7 @@ def read_npy_motion(path: str | Path, unit: str | None = None, *, as_recorded: b
         remedy = "give one person's joints in space"
         raise refusal(path, "", f"shape {array.shape}", "(T, P, 3), T of one or more", remedy)
     if not as_recorded:
-        remedy = "save it as NPZ: joints, joint_names, clip_fps"
-        raise refusal(path, "", "no frame rate", "one", remedy)
+        raise refusal(path, "", "no frame rate", "one", STATE_RATE)
     named = named_points(points.astype(np.float64), str(path))
     return Motion(
         names=named.names,

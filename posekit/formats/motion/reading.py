@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from posekit.formats.format import Content
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
@@ -30,6 +32,7 @@ def read_motion(
     *,
     unit: str | None = None,
     up: str | None = None,
+    rate: float | None = None,
     as_recorded: bool = False,
 ) -> Motion:
     """Read named points over time.
@@ -44,6 +47,8 @@ def read_motion(
         ``m``, ``cm``, ``mm`` or ``in``: instead of what the file says or is taken to be in.
     up : str, optional
         The axis that points up, ``+y``: instead of what the file says. Points are not turned.
+    rate : float, optional
+        Frames a second of a file that says none.
     as_recorded : bool
         Whether it is taken as it is: times in whatever order or not known, and points of any size.
 
@@ -51,7 +56,8 @@ def read_motion(
     ------
     InputError
         Where it cannot be read, is in no format that is known, or in several (the candidates are named); where its
-        points span so little or so much that the unit must be another, unless it is stated.
+        points span so little or so much that the unit must be another, unless it is stated; where a rate is stated of a
+        file that says it itself.
     """
     if unit is not None and unit not in METRES_IN_UNIT:
         raise refusal("--unit", "", shown(unit), "a known unit", nearest(unit, METRES_IN_UNIT))
@@ -62,11 +68,24 @@ def read_motion(
         got = f"{chosen.name}: {chosen.title}"
         expected = f"points: {', '.join(one.name for one in motion_formats().values() if one.read)}"
         raise refusal(path, "format", got, expected, "choose a file of points")
-    read = chosen.read_recorded if as_recorded and chosen.read_recorded else chosen.read
+    recorded = as_recorded or rate is not None
+    read = chosen.read_recorded if recorded and chosen.read_recorded else chosen.read
     motion = read(Path(path), unit)
+    if rate is not None:
+        motion = _at_rate(motion, rate)
     if unit is None and not as_recorded:
         check_size(motion)
     return motion if up is None else replace(motion, up=up, told=(*motion.told, "up"))
+
+
+def _at_rate(motion: Motion, rate: float) -> Motion:
+    """State the rate of a motion that says none."""
+    if np.isfinite(motion.rate) or len(motion.clips) > 1:
+        got = f"{rate:g}, of a file that says {motion.rate:g} frames a second itself"
+        raise refusal(motion.source, "--fps", got, "a file without a rate", "leave it out")
+    return replace(
+        motion, rate=rate, rates=np.array([rate]), time=np.arange(len(motion)) / rate, as_recorded=False
+    )
 
 
 def write_motion(path: str | Path, motion: Motion, format: str | None = None) -> None:
