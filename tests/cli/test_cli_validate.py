@@ -232,7 +232,9 @@ def test_undecided_counts_as_not_valid(run) -> None:
     joints = np.repeat(STANDING, 2, axis=0)
     joints[1, 3] = np.nan
     np.savez("p.npz", joints=joints)
-    assert run("p.npz").code == 1
+    outcome = run("p.npz")
+    assert outcome.code == 1
+    assert "joints are missing in 1 posture: undecided, where nothing is found" in outcome.out
     assert run("p.npz", "--fail-over", "1").code == 0
 
 

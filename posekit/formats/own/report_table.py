@@ -72,6 +72,10 @@ def summary_table(
         if check not in quiet
     ]
     table = _table(head, rows, markdown) if rows else []
+    missing = int(np.count_nonzero(columns.silent & 1))
+    if missing:
+        table += [""] * markdown
+        table.append(f"joints are missing in {plural(missing, 'posture')}: undecided, where nothing is found")
     return lines + table + ([f"nothing found by {', '.join(map(check_words, quiet))}"] if quiet else [])
 
 
