@@ -230,7 +230,8 @@ def repair_file(read: ReadPostures, asked: AskedValidation, target: Path, source
     if isinstance(given, NamedConfigurations):
         path = target if target.suffix else target / f"{source.stem}{FOLDER_FORMAT}"
         done = _repaired_configurations(given, validator, path, asked)
-        said = (f"repaired: {path}: {done.told()}",)
+        again = f"judged again, {int(done.valid.sum())} of {len(done.valid)} frames are valid"
+        said = (f"repaired: {source.name}: {done.told()}", f"written: {path}; {again}")
         return RepairedFile(lines=said, records=[_record(source, path, "", done)])
     if validator.robot is not None:
         raise InputError(POSTURES_OF_A_ROBOT)

@@ -79,7 +79,7 @@ class UnrepairedFrame:
 
     def __str__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"frame {self.frame}: {self.check} {self.place} is {self.left:.3g}{unit} beyond its bound"
+        return f"frame {self.frame}: {self.check} {self.place} is {abs(self.left):.3g}{unit} beyond its bound"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -139,5 +139,7 @@ def test_configurations_are_repaired_as_configurations(repaired: Callable[..., s
     q = np.zeros((1, len(names)))
     q[0, names.index("qw")], q[0, names.index("panda_joint4")] = 1.0, 0.5
     write_configurations(given, q, names)
-    assert "panda_joint4 turned" in repaired(given, "--urdf", "panda", "--repair", out)
+    said = repaired(given, "--urdf", "panda", "--repair", out)
+    assert "repaired: given.json: 1 of 1 frame changed; panda_joint4 turned" in said
+    assert f"written: {out}; judged again, 1 of 1 frames are valid" in said
     assert panda.check(q=read_configurations(out).in_order_of(names)).valid.all()
