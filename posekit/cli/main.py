@@ -89,6 +89,14 @@ def application(first: str) -> typer.Typer:
     return app
 
 
+def _misused(error: Any, command: str) -> str:
+    """Say what is wrong with a command's words, and where to look."""
+    said: str = error.format_message().rstrip(".")
+    if said.startswith("Got unexpected extra") and command == "recover":
+        said += "; files of several pictures are given as their folder"
+    return said + (f"; see {error.ctx.command_path} --help" if error.ctx else "")
+
+
 def main() -> None:
     """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
@@ -109,8 +117,7 @@ def main() -> None:
     except PosekitError as error:
         code = _fail(str(error))
     except UsageError as error:
-        hint = f"; see {error.ctx.command_path} --help" if error.ctx else ""
-        code = _fail(error.format_message().rstrip(".") + hint)
+        code = _fail(_misused(error, arguments[0]))
     except ClickError as error:
         code = _fail(error.format_message())
     except (typer.Abort, KeyboardInterrupt):

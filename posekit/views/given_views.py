@@ -12,6 +12,7 @@ import numpy as np
 from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.format import Content
+from posekit.formats.held_postures import POSTURE_CONTENTS
 from posekit.formats.own import read_view
 from posekit.formats.recognising import recognise
 from posekit.skeleton import JOINT
@@ -61,9 +62,11 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
             source = replace(source, rate=read_motion(truth).rate)
         opened = open_views(path, source)
     else:
+        there = what.holds in POSTURE_CONTENTS
+        remedy = f"its postures are there: posekit view {path}" if there else "give another file"
         raise InputError(
-            f"{path}: {what.holds.value}; expected a view or key points, which a posture can be recovered from; give "
-            "another file"
+            f"{path}: {what.holds.value}; expected a view or key points, which a posture can be recovered from; "
+            f"{remedy}"
         )
     if truth is None:
         return opened
