@@ -33,6 +33,7 @@ from posekit.robots.find import find, robots_folder
 from posekit.robots.pairs import neutral_inside_limits
 from posekit.robots.second_reader import compare_readers
 from posekit.robots.srdf import check_srdf
+from posekit.robots.urdf_joints import MAX_FREEDOM
 
 LIMIT = '<limit lower="-1" upper="2" effort="10" velocity="10"/>'
 
@@ -254,7 +255,7 @@ class TestSecondReader:
 
     def test_a_turned_and_shifted_chain_as_long_as_may_be_costs_little(self) -> None:
         """yourdfpy's own graph took n^4: 68 s for 240 links."""
-        names = [f"l{k}" for k in range(240)]
+        names = [f"l{k}" for k in range(MAX_FREEDOM + 1)]
         text = robot_text(
             *(link(name, "") for name in names),
             *(joint(f"j{b}", a, b) for a, b in itertools.pairwise(names)),
@@ -264,6 +265,20 @@ class TestSecondReader:
         assert time.process_time() - start < 10
         other = Robot(urdf=text.replace('rpy="0.1 0.2 0.3"', 'rpy="0.1 0.2 0.30001"', 1)).model
         assert "two readers place link 'l1'" in refusal_of(compare_readers, text, other, "x")
+
+    def test_a_robot_of_as_many_joints_as_may_be_is_loaded_and_one_more_is_refused(
+        self, tmp_path: Path
+    ) -> None:
+        """What Pinocchio keeps grows as their cube: of 250 it took more than a child may have, which did not say so."""
+        for more in (0, 1):
+            names = [f"l{k}" for k in range(MAX_FREEDOM + 1 + more)]
+            path = tmp_path / f"{more}.urdf"
+            moving = (joint(f"j{b}", a, b) for a, b in itertools.pairwise(names))
+            path.write_text(robot_text(*(link(name, "") for name in names), *moving))
+            if not more:
+                assert load_robot(path).model.nv == MAX_FREEDOM + 6
+        said = refusal_of(load_robot, path)
+        assert f"joints with {MAX_FREEDOM + 1} degrees of freedom; expected at most {MAX_FREEDOM}" in said
 
     def test_what_it_cannot_read_is_passed_over_where_that_is_said(self) -> None:
         text = robot_text(link("a", '<capsule radius="1" length="1"/>'), attributes=' version="1.1"')
