@@ -49,8 +49,8 @@ def real_time(times: Sequence[float]) -> float:
 
 def check_speed(fps: float) -> None:
     """Refuse a number of pictures a second that no player shows."""
-    if not 0 < fps <= 100:
-        raise ViewerError(f"{fps:g} pictures a second; expected more than 0 and at most 100")
+    if not 0.01 <= fps <= 100:
+        raise ViewerError(f"{fps:g} pictures a second; expected 0.01 to 100")
 
 
 def _indexed(pixels: Pixels) -> Image.Image:

@@ -29,6 +29,7 @@ from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
 from posekit.viewer.video import video_library, write_mp4
 
+MAX_TURN_PICTURES: Final = 10_000
 MOVING_SUFFIXES: Final = (".gif", ".mp4")
 PICTURE_SUFFIXES: Final = (".png", ".html", *MOVING_SUFFIXES)
 AZIMUTH_WITH_CAMERA, DEFAULT_AZIMUTH = 55.0, 35.0
@@ -93,6 +94,8 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
     check_target(path)
     if suffix == ".mp4":
         video_library("writing .mp4")
+    if not 0 <= shot.turntable <= MAX_TURN_PICTURES:
+        raise ViewerError(f"a turn of {shot.turntable:,} pictures; expected at most {MAX_TURN_PICTURES:,}")
     if shot.turntable and suffix not in MOVING_SUFFIXES:
         raise ViewerError(f"{path}: a turntable moves; expected {' or '.join(MOVING_SUFFIXES)}")
     if suffix in MOVING_SUFFIXES:

@@ -32,9 +32,9 @@ def read_urdf(path: str | Path) -> str:
 def check_urdf(text: str, source: str) -> ElementTree.Element:
     """Parse a URDF and check all that a model is made of.
 
-    Links and joints are one tree of at most 1000 links, 250 levels and 200 degrees of freedom, with names that are there
-    once; joints are of known types, with limits in order and axes that have a direction; numbers are finite, sizes positive,
-    masses not negative; collision bodies are spelled so that Pinocchio reads them.
+    Links and joints are one tree of at most 1000 links, 250 levels and 200 degrees of freedom, with names that
+    are there once; joints are of known types, with limits in order and axes that have a direction; numbers are
+    finite, sizes positive, masses not negative; collision bodies are spelled so that Pinocchio reads them.
 
     Parameters
     ----------

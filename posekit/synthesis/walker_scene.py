@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from posekit.cameras import lee_chen
 from posekit.errors import InputError
+from posekit.formats.own.units import POSSIBLE_RATES
 from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.observe import observe
 from posekit.synthesis.synthetic_scene import SyntheticScene
@@ -82,8 +83,8 @@ def walker_scene(
     """
     if frames < 1:
         raise InputError(f"the walker has {frames} frames; ask for one or more")
-    if not 0 < dt < math.inf:
-        raise InputError(f"dt is {dt:g} s; expected positive and finite")
+    if not 1 / POSSIBLE_RATES[1] <= dt <= 1 / POSSIBLE_RATES[0]:
+        raise InputError(f"dt is {dt:g} s; expected seconds from frame to frame, as 0.2")
     if not math.isfinite(phase0):
         raise InputError(f"phase0 is {phase0:g}; expected finite, in cycles")
     position, aim = np.asarray(camera, dtype=np.float64), np.asarray(target, dtype=np.float64)

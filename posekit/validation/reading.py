@@ -24,13 +24,11 @@ from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.motion.ground_up import against_stated_up
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.formats.own import NamedConfigurations, ObjectResult, Result, read_object, read_result
+from posekit.formats.own.units import POSSIBLE_RATES
 from posekit.formats.recognising import recognise
 from posekit.formats.registry import formats
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal
-
-POSSIBLE_RATES: Final = (1e-3, 1e6)
-"""Frames a second that somebody may mean."""
 
 
 @dataclass(frozen=True, kw_only=True)

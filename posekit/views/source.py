@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from posekit.errors import InputError
+from posekit.formats.own.units import POSSIBLE_RATES
 from posekit.safe_io import perhaps
 
 OPTION_NAMES: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
@@ -91,7 +92,7 @@ class Source:
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
         inf = float("inf")
         bounds = (
-            ("--fps", self.rate, 0.0, inf, "a positive number of frames a second"),
+            ("--fps", self.rate, *POSSIBLE_RATES, "frames a second, as 30"),
             ("--fov", self.fov, 0.0, 180.0, "degrees, more than 0 and less than 180"),
             ("--focal35", self.focal35, 0.0, 10_000.0, "millimetres, more than 0 and less than 10,000"),
             ("--deviation", self.deviation, 0.0, inf, "a positive number of pixels"),

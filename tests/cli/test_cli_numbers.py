@@ -48,6 +48,26 @@ def test_no_option_takes_what_is_not_finite(
     assert [path.name for path in Path().iterdir()] == ["view.json"]
 
 
+BEYOND = [
+    (("synth", "walker", "-o", "a.json", "--dt", "1e308"), "dt is 1e+308 s"),
+    (("synth", "walker", "-o", "a.json", "--dt", "1e-300"), "dt is 1e-300 s"),
+    (("render", "view.json", "-o", "a.gif", "--fps", "1e-300"), "1e-300 pictures a second"),
+    (("render", "view.json", "-o", "a.gif", "--turntable", "9" * 20), "a turn of 99,999"),
+    (("recover", "view.json", "-o", "a.json", "--fps", "1e308"), "--fps"),
+    (("recover", "points.json", "-o", "a.json", "--fps", "1e308"), "--fps: 1e+308; expected frames a second"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "says"), BEYOND, ids=lambda given: str(given[-1])[:20])
+@pytest.mark.usefixtures("seen")
+def test_numbers_that_nobody_means_are_named(
+    arguments: tuple[str, ...], says: str, run: Callable[..., Any], assert_refused: Callable[..., None]
+) -> None:
+    Path("points.json").write_text('[{"keypoints": []}]')
+    assert_refused(run(*arguments), says)
+    assert {path.name for path in Path().iterdir()} == {"view.json", "points.json"}
+
+
 @pytest.mark.parametrize("kind", ["walker", "random"])
 @pytest.mark.parametrize("count", ["99999999999999999999", "-1", "0"])
 def test_no_more_frames_are_asked_than_there_is_memory_for(

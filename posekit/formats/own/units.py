@@ -17,6 +17,9 @@ UNIT_NAMES: Final = get_args(Unit)
 
 UNIT_METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one unit."""
+POSSIBLE_RATES: Final = (1e-3, 1e6)
+"""Frames a second that somebody may mean."""
+
 FARTHEST_COORDINATE: Final = 1e9
 """Metres, or pixels, beyond which nothing of a person or of a picture is."""
 
