@@ -11,7 +11,7 @@ from posekit.robots.urdf_numbers import numbers
 from posekit.safe_io import nearest, one_line, refusal, shown
 
 JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-FREEDOM: Final = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
+JOINT_FREEDOM: Final = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
 """Degrees of freedom by type of joint."""
 MAX_FREEDOM: Final = 200
 """What Pinocchio keeps beside a model grows as its cube: 0.3 GB here. The largest published robots have some 100."""
@@ -41,7 +41,7 @@ def check_joints(robot: ElementTree.Element, source: str) -> None:
         _check_limit(joint, kind, place, source)
         if kind in ("revolute", "continuous", "prismatic", "planar"):
             _check_axis(joint, kind, place, source)
-    freedom = sum(FREEDOM.get(joint.get("type", ""), 0) for joint in joints.values())
+    freedom = sum(JOINT_FREEDOM.get(joint.get("type", ""), 0) for joint in joints.values())
     if freedom > MAX_FREEDOM:
         got = f"joints with {freedom:,} degrees of freedom"
         raise refusal(source, "", got, f"at most {MAX_FREEDOM}", "fix those that are not needed")
