@@ -13,9 +13,10 @@ from typing import Annotated, Any, Final, TextIO
 import typer
 
 from posekit.cli.guarded_command import GuardedCommand
-from posekit.cli.options import examples
+from posekit.cli.options import examples, on_terminal
 from posekit.cli.signals import take_signals
 from posekit.cli.terminal import INTERRUPTED_CODE, Ended, say
+from posekit.compiled.compiling import when_compiling
 from posekit.errors import PosekitError
 
 BAD_INPUT = 2
@@ -97,6 +98,10 @@ def _misused(error: Any, command: str) -> str:
     return said + (f"; see {error.ctx.command_path} --help" if error.ctx else "")
 
 
+def _tell_of_compiling() -> None:
+    say("compiling loops for this machine, once: half a minute", err=True)
+
+
 def main() -> None:
     """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
@@ -106,6 +111,7 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    when_compiling(_tell_of_compiling if on_terminal() else None)
     try:
         take_signals()
         arguments = sys.argv[1:] or ["--help"]

@@ -42,6 +42,21 @@ class _State:
     chosen: Path_ = "auto"
     grown: int = 0
     threads: int | None = None
+    tell: Callable[[], None] | None = None
+
+
+def when_compiling(tell: Callable[[], None] | None) -> None:
+    """Call a function once, when loops are compiled that are not kept on disk: it takes up to half a minute."""
+    _State.tell = tell
+
+
+def _told(dispatcher: Any) -> Any:
+    """Tell, if nobody was told, that a function was compiled anew."""
+    tell = _State.tell
+    if tell is not None and dispatcher.stats.cache_misses:
+        _State.tell = None
+        tell()
+    return dispatcher
 
 
 def n_threads() -> int:
@@ -128,7 +143,7 @@ def _compiled(
 
     def compiling(copy: FunctionType, types: str) -> Any:
         if types:
-            return numba.njit(types, nogil=True, cache=on_disk, error_model="numpy")(copy)
+            return _told(numba.njit(types, nogil=True, cache=on_disk, error_model="numpy")(copy))
         return numba.njit(nogil=True, error_model="numpy", forceinline=parts is not None)(copy)
 
     return _linked(module, parts, compiling)

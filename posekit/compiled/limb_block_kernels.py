@@ -106,6 +106,23 @@ def see(d: Array, x: Any, y: Any, z: Any, point: Any, r: Array, A: Array) -> Non
         A[1, i] *= weight
 
 
+def limb_room() -> Any:
+    """Make room for one limb.
+
+    How its points' image moves (4, 3) and by how much it is off (4,); its angles (3, 4), what is judged of them (3, 4),
+    and what walls say (5, 4); derivatives of both (4, 7), (4, 6).
+    """
+    return (
+        np.empty((4, 3)),
+        np.empty(4),
+        np.empty((3, 4)),
+        np.empty((3, 4)),
+        np.empty((5, 4)),
+        np.empty((4, 7)),
+        np.empty((4, 6)),
+    )
+
+
 def limb_block(
     s: Array,
     d: Array,
@@ -115,7 +132,7 @@ def limb_block(
     ends: Array,
     w: Array,
     watch: NDArray[np.int8],
-    room: Array,
+    room: Any,
     matrix: Array,
     right: Array,
     own: Array,
@@ -130,8 +147,8 @@ def limb_block(
         Where it starts, metres.
     ends, w, watch
         Of its limits.
-    room : array (16, 7)
-        To be overwritten.
+    room : tuple of arrays
+        Of `limb_room`, to be overwritten.
     matrix, right, own, push, tangents : array (U, U), (U, 7), (6, 6), (6,), (4, 3)
         Filled: its own matrix; coupling with start and part, then the gradient; of start and part; tangents.
 
@@ -139,11 +156,11 @@ def limb_block(
     -------
     chi2, slack : float
     folds : int
-        NaN and -1 where a judge must be asked. Which limits are passed stands in the room's tenth row.
+        NaN and -1 where a judge must be asked. Which limits are passed stands in the room.
     """
     at, u = AT_LIMBS + 2 * limb, AT_DIRECTIONS + 6 * limb
     first, second = s[at], s[at + 1]
-    A, r, g, o, q, J = room[0:4, :3], room[4, :4], room[5:8, :4], room[8:11, :4], room[11:16, :4], room[16:20]
+    A, r, g, o, q, J, rows = room
     x, y, z = start[0] + first * s[u], start[1] + first * s[u + 1], start[2] + first * s[u + 2]
     see(d, x, y, z, LIMB_MIDDLES[limb], r[:2], A[:2])
     see(d, x + second * s[u + 3], y + second * s[u + 4], z + second * s[u + 5], LIMB_ENDS[limb], r[2:], A[2:])
@@ -157,7 +174,6 @@ def limb_block(
         push[a] = 0.0
         for b in range(6):
             own[a, b] = 0.0
-    rows = room[20:24, :6]
     for c in range(4):
         for v in range(6):
             rows[c, v] = 0.0
@@ -257,21 +273,15 @@ def limb_value(
     start: Array,
     ends: Array,
     w: Array,
-    room: Array,
+    room: Any,
     nothing: NDArray[np.int8],
     passed: NDArray[np.int8],
 ) -> Any:
     """Return one limb's chi2, and write down which limits (4,) it passes; NaN where a judge must be asked."""
     at, u = AT_LIMBS + 2 * limb, AT_DIRECTIONS + 6 * limb
     first, second = s[at], s[at + 1]
-    A, r, g, o, q, tangents = (
-        room[0:4, :3],
-        room[4, :4],
-        room[5:8, :4],
-        room[8:11, :4],
-        room[11:16, :4],
-        room[16:20, :3],
-    )
+    A, r, g, o, q, J, _ = room
+    tangents = J[:, :3]
     x, y, z = start[0] + first * s[u], start[1] + first * s[u + 1], start[2] + first * s[u + 2]
     see(d, x, y, z, LIMB_MIDDLES[limb], r[:2], A[:2])
     see(d, x + second * s[u + 3], y + second * s[u + 4], z + second * s[u + 5], LIMB_ENDS[limb], r[2:], A[2:])
@@ -337,7 +347,7 @@ def fit_limbs(
 
     States (M, 71) and chi2 (M, 4) are overwritten; where a judge must be asked, which is written down, they stay.
     """
-    room, matrix, right, own = np.empty((24, 7)), np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6))
+    room, matrix, right, own = limb_room(), np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6))
     push, tangents, step, damped = np.empty(6), np.empty((4, 3)), np.empty(6), np.empty(6)
     watch, passed, nothing = np.zeros(4, np.int8), np.zeros(4, np.int8), np.zeros(4, np.int8)
     now, trial = np.empty(states.shape[1]), np.empty(states.shape[1])
@@ -417,6 +427,7 @@ KERNEL_PARTS = (
 
 COMPILED_TYPES = {
     "see": "",
+    "limb_room": "",
     "limb_block": "",
     "limb_value": "",
     "move_limb": "",

@@ -194,7 +194,7 @@ def wall_limits(
     for k in range(BOX_ANGLES):
         q[0, k] = q[1, k] = -math.inf
         o[0, k] = o[1, k] = o[2, k] = 0.0
-    writing = beyond_limits(q[2, :3], q[3, :3], ends, w, -1, q[0], q[1])
+    writing = beyond_limits(q[2], q[3], ends, w, -1, q[0], q[1])
     if writing < 0:
         return writing
     for k in range(BOX_ANGLES):
@@ -241,9 +241,9 @@ def wall_slopes(
         for k in range(BOX_ANGLES):
             q[0, k] = q[1, k] = -math.inf
         if segment == 0:
-            told = beyond_limits(q[4, :3], q[3, :3], ends, w, writing, q[0], q[1])
+            told = beyond_limits(q[4], q[3], ends, w, writing, q[0], q[1])
         else:
-            told = beyond_limits(q[2, :3], q[4, :3], ends, w, writing, q[0], q[1])
+            told = beyond_limits(q[2], q[4], ends, w, writing, q[0], q[1])
         if told < 0:
             return False
         x = s[at + 1] * tangents[t, 2] - s[at + 2] * tangents[t, 1]

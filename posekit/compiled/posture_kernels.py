@@ -31,6 +31,7 @@ from posekit.compiled.block_kernels import (
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_block_kernels import (
     limb_block,
+    limb_room,
     limb_value,
     move_limb,
     see,
@@ -76,6 +77,7 @@ from posekit.compiled.trunk_block_kernels import (
     place_trunk,
     spine_turn,
     trunk_block,
+    trunk_room,
     turn_part,
 )
 from posekit.geometry import Array
@@ -93,8 +95,8 @@ def posture_value(
     W: Array,
     offsets: Array,
     start: Array,
-    limb_room: Array,
-    room: Array,
+    room_of_limb: Any,
+    room: Any,
     nothing: NDArray[np.int8],
     passed: NDArray[np.int8],
 ) -> Any:
@@ -103,7 +105,7 @@ def posture_value(
     for k in range(LIMIT_COUNT):
         passed[k] = 0
     chi2 = 0.0
-    r, A, o, J, x = room[0, :2], room[1:3, :3], room[3:5, :3], room[5:8, :3], room[8, :3]
+    r, A, o, J, x, _ = room
     for joint in range(TRUNK_POINTS):
         see(
             d,
@@ -148,7 +150,16 @@ def posture_value(
             for i in range(3):
                 start[i] = s[AT_ROOT + i] + offsets[LIMB_STARTS[limb], i]
             of_limb = limb_value(
-                s, d, f, limb, start, ends[limb], W[limb], limb_room, nothing, passed[4 * limb : 4 * limb + 4]
+                s,
+                d,
+                f,
+                limb,
+                start,
+                ends[limb],
+                W[limb],
+                room_of_limb,
+                nothing,
+                passed[4 * limb : 4 * limb + 4],
             )
             if math.isnan(of_limb):
                 return math.nan
@@ -175,7 +186,7 @@ def descend_postures(
     """
     whole, seen = f[TRUNK_ONLY] == 0.0, f[HEAD_COUNT] > 0.0
     width, reach = 18 if f[VARIED_SHAPE] > 0.0 else 9, 6 if f[VARIED_LIMBS] > 0.0 else 4
-    limb_room, room, offsets, start = np.empty((24, 7)), np.empty((10, 9)), np.empty((6, 3)), np.empty(3)
+    room_of_limb, room, offsets, start = limb_room(), trunk_room(), np.empty((6, 3)), np.empty(3)
     matrix, gradient, J = np.empty((width, width)), np.empty(width), np.empty((6, 3, width))
     P, g, moving, shift = np.empty((6, 3, 3)), np.empty((6, 3)), np.empty((3, width)), np.empty(6)
     L, right = np.empty((5, 6, 6)), np.empty((5, 6, 7))
@@ -201,7 +212,7 @@ def descend_postures(
         trial[:] = now
         watch[:] = 0
         damping, watching, taken = h[FIRST_DAMPING], False, 0
-        value = posture_value(now, d, f, apart, ends, W, offsets, start, limb_room, room, nothing, passed)
+        value = posture_value(now, d, f, apart, ends, W, offsets, start, room_of_limb, room, nothing, passed)
         if math.isnan(value):
             asked[n] = True
             continue
@@ -226,7 +237,7 @@ def descend_postures(
                         ends[limb],
                         W[limb],
                         watch[4 * limb : 4 * limb + 4],
-                        limb_room,
+                        room_of_limb,
                         L[limb],
                         right[limb],
                         own,
@@ -303,7 +314,9 @@ def descend_postures(
             if whole:
                 for limb in range(LIMB_COUNT):
                     move_limb(now, limb, step[limb], tangents[limb], reach, trial)
-            new = posture_value(trial, d, f, apart, ends, W, offsets, start, limb_room, room, nothing, passed)
+            new = posture_value(
+                trial, d, f, apart, ends, W, offsets, start, room_of_limb, room, nothing, passed
+            )
             if math.isnan(new):
                 asked[n] = True
                 break
@@ -334,13 +347,13 @@ def value_postures(
     chi2: Array,
 ) -> None:
     """Fill in chi2 (N,) of postures (N, 71); NaN where a judge must be asked."""
-    limb_room, room, offsets, start = np.empty((24, 7)), np.empty((10, 9)), np.empty((6, 3)), np.empty(3)
+    room_of_limb, room, offsets, start = limb_room(), trunk_room(), np.empty((6, 3)), np.empty(3)
     passed, nothing = np.zeros(LIMIT_COUNT, np.int8), np.zeros(4, np.int8)
     W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
     W[:, NUMBERS_AT:] = numbers
     for n in range(len(states)):
         chi2[n] = posture_value(
-            states[n], data[n], f, apart, ends, W, offsets, start, limb_room, room, nothing, passed
+            states[n], data[n], f, apart, ends, W, offsets, start, room_of_limb, room, nothing, passed
         )
 
 
@@ -348,13 +361,22 @@ def value_limbs(
     states: Array, data: Array, f: Array, starts: Array, ends: Array, numbers: Array, chi2: Array
 ) -> None:
     """Fill in chi2 (M, 4) of limbs from their starts (M, 4, 3); NaN where a judge must be asked."""
-    limb_room, passed, nothing = np.empty((24, 7)), np.zeros(4, np.int8), np.zeros(4, np.int8)
+    room_of_limb, passed, nothing = limb_room(), np.zeros(4, np.int8), np.zeros(4, np.int8)
     W = np.empty((4, NUMBERS_AT + numbers.shape[1]))
     W[:, NUMBERS_AT:] = numbers
     for m in range(len(states)):
         for limb in range(LIMB_COUNT):
             chi2[m, limb] = limb_value(
-                states[m], data[m], f, limb, starts[m, limb], ends[limb], W[limb], limb_room, nothing, passed
+                states[m],
+                data[m],
+                f,
+                limb,
+                starts[m, limb],
+                ends[limb],
+                W[limb],
+                room_of_limb,
+                nothing,
+                passed,
             )
 
 

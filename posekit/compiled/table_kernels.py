@@ -22,6 +22,7 @@ from posekit.compiled.block_kernels import (
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_block_kernels import (
     limb_block,
+    limb_room,
 )
 from posekit.compiled.limb_limit_kernels import BOX_ANGLES, FIRST_LEG
 from posekit.compiled.posture_numbers import (
@@ -50,6 +51,7 @@ from posekit.compiled.trunk_block_kernels import (
     joint_jacobian,
     place_trunk,
     trunk_block,
+    trunk_room,
 )
 from posekit.geometry import Array
 
@@ -69,7 +71,7 @@ def tabulate_trunks(
 ) -> None:
     """Fill in matrices (N, C, C) and gradients (N, C) of trunks alone, and how heads follow (N, 3, 7)."""
     width = matrix.shape[1]
-    room, offsets, J = np.empty((10, 9)), np.empty((6, 3)), np.empty((6, 3, width))
+    room, offsets, J = trunk_room(), np.empty((6, 3)), np.empty((6, 3, width))
     P, g, moving = np.empty((6, 3, 3)), np.empty((6, 3)), np.empty((3, width))
     L, right, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
     damped, column, nothing = np.empty(6), np.empty(3), np.zeros(LIMIT_COUNT, np.int8)
@@ -120,7 +122,7 @@ def tabulate_limbs(
     must be asked.
     """
     width, reach = matrix.shape[2], step.shape[2]
-    limb_room, offsets, J, start = np.empty((24, 7)), np.empty((6, 3)), np.empty((6, 3, width)), np.empty(3)
+    room_of_limb, offsets, J, start = limb_room(), np.empty((6, 3)), np.empty((6, 3, width)), np.empty(3)
     L, right, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
     damped, column, starts, carried = np.empty(6), np.empty(6), np.zeros((6, width)), np.empty((6, width))
     nothing = np.zeros(4, np.int8)
@@ -147,7 +149,7 @@ def tabulate_limbs(
                 ends[limb],
                 W[limb],
                 nothing,
-                limb_room,
+                room_of_limb,
                 L,
                 right,
                 own,
@@ -158,7 +160,7 @@ def tabulate_limbs(
             if folds < 0:
                 continue
             for k in range(BOX_ANGLES):
-                counts[limb, m, 1] += limb_room[10, k] != 0.0
+                counts[limb, m, 1] += room_of_limb[3][2, k] != 0.0
             damped_factor(L, reach, 0.0, floor, damped)
             solve_forward(L, reach, right, 7)
             leave(right, reach, own, push)
@@ -189,10 +191,10 @@ def tabulate_limbs(
                         slope[limb, m, k, c] -= column[k] * starts[a, c]
 
 
-def know_turns(s: Array, d: Array, limb: Any, x: Array, tangents: Array, room: Array, matrix: Array) -> None:
+def know_turns(s: Array, d: Array, limb: Any, x: Array, tangents: Array, A: Array, matrix: Array) -> None:
     """Add what is known of turns that the image does not show, as `posekit.refinement.covariance` says.
 
-    The limb's middle and end (2, 3), and how the image moves with them, as `limb_block` left it in its room.
+    The limb's middle and end (2, 3), and how the image moves with them, as `limb_block` left it in its room (4, 3).
     """
     for segment in range(2):
         at, k = AT_DIRECTIONS + 6 * limb + 3 * segment, 2 * segment
@@ -200,7 +202,7 @@ def know_turns(s: Array, d: Array, limb: Any, x: Array, tangents: Array, room: A
         for c in range(2):
             moved = 0.0
             for i in range(3):
-                moved += room[2 * segment + c, i] * s[at + i]
+                moved += A[2 * segment + c, i] * s[at + i]
             seen += moved * moved
         for i in range(3):
             ray = x[segment, i] if d[AT_CAMERA + CAMERA_PERSPECTIVE] > 0.0 else 1.0 if i == 2 else 0.0
@@ -235,7 +237,7 @@ def know_postures(
     couplings and gradients (U, 7, 4, N) and levers (2, 4, 3, U, N); and all joints (14, 3, N).
     """
     width, reach = matrix.shape[0], factor.shape[0]
-    limb_room, room, offsets, start = np.empty((24, 7)), np.empty((10, 9)), np.empty((6, 3)), np.empty(3)
+    room_of_limb, room, offsets, start = limb_room(), trunk_room(), np.empty((6, 3)), np.empty(3)
     M, gradient, J, x = np.empty((width, width)), np.empty(width), np.empty((6, 3, width)), np.empty((2, 3))
     P, g, moving = np.empty((6, 3, 3)), np.empty((6, 3)), np.empty((3, width))
     L, along, own, push = np.empty((6, 6)), np.empty((6, 7)), np.empty((6, 6)), np.empty(6)
@@ -263,7 +265,7 @@ def know_postures(
                 ends[limb],
                 W[limb],
                 nothing[:4],
-                limb_room,
+                room_of_limb,
                 L,
                 along,
                 own,
@@ -283,7 +285,7 @@ def know_postures(
                         levers[end, limb, i, 2 * segment + 1, n] = length * tangents[2 * segment + 1, i]
                         if reach > 4:
                             levers[end, limb, i, 4 + segment, n] = length * s[at + i]
-            know_turns(s, d, limb, x, tangents, limb_room, L)
+            know_turns(s, d, limb, x, tangents, room_of_limb[0], L)
             damped_factor(L, reach, 0.0, floor, damped)
             solve_forward(L, reach, along, 7)
             leave(along, reach, own, push)

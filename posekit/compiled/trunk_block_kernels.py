@@ -176,6 +176,11 @@ def joint_jacobian(s: Array, f: Array, offsets: Array, J: Array) -> None:
             J[4 + side, i, TO_SHAPE + 7 + side] = s[AT_HIPS + 3 * i + 1]
 
 
+def trunk_room() -> Any:
+    """Make room for a trunk: a point's residual and derivative, a ball's, a vector, and a row of a Jacobian."""
+    return np.empty(2), np.empty((2, 3)), np.empty((2, 3)), np.empty((3, 3)), np.empty(3), np.empty(9)
+
+
 def trunk_block(
     s: Array,
     d: Array,
@@ -183,7 +188,7 @@ def trunk_block(
     apart: Array,
     offsets: Array,
     watch: NDArray[np.int8],
-    room: Array,
+    room: Any,
     matrix: Array,
     gradient: Array,
     P: Array,
@@ -200,7 +205,7 @@ def trunk_block(
         for b in range(width):
             matrix[a, b] = 0.0
     chi2, slack = 0.0, 0.0
-    r, A, o, J, normal = room[0, :2], room[1:3, :3], room[3:5, :3], room[5:8, :3], room[8, :3]
+    r, A, o, J, normal, slope = room
     for joint in range(TRUNK_POINTS):
         x, y, z = (
             s[AT_ROOT] + offsets[joint, 0],
@@ -239,7 +244,6 @@ def trunk_block(
         add_turn(turn, normal, SPINE_WEIGHT * SPINE_WEIGHT, matrix, gradient)
         chi2 += (turn * SPINE_WEIGHT) ** 2
     if width > TO_SHAPE:
-        slope = room[9, :9]
         for row in range(9):
             stretch, square = distance(s, f, apart, row, normal)
             chi2 += stretch * stretch
@@ -262,7 +266,7 @@ def head_block(
     d: Array,
     f: Array,
     watch: NDArray[np.int8],
-    room: Array,
+    room: Any,
     own: Array,
     right: Array,
     trunk: Array,
@@ -274,7 +278,7 @@ def head_block(
     (6, 6), (6,).
     """
     chi2, slack = 0.0, 0.0
-    r, A, o, J, x, row = room[0, :2], room[1:3, :3], room[3:5, :3], room[5:8, :3], room[8, :3], room[9, :6]
+    r, A, o, J, x, row = room
     for a in range(6):
         push[a] = 0.0
         for b in range(6):
@@ -421,6 +425,7 @@ COMPILED_TYPES = {
     "spine_turn": "",
     "add_turn": "",
     "joint_jacobian": "",
+    "trunk_room": "",
     "trunk_block": "",
     "head_block": "",
     "curve": "",
