@@ -233,7 +233,8 @@ def _of_detections(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
     tables = []
     for one in open_views(job.path, replace(source, rate=1.0)):
         number = np.round(one.view.time).astype(np.int64)
-        rows = replace(ImageRows.of_view(one.view, number), time=time[number]).laid_out(pictures, time)
+        rows = replace(ImageRows.of_view(one.view, number), time=time[number])
+        rows = rows.laid_out(pictures, time) if found.sequence else rows
         tables.append(_laid_down(job, base, one.person, head_text(one.view), [rows]))
     return f"key points: {found.format}, {found.layout.name}", tables
 

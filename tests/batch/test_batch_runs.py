@@ -140,6 +140,17 @@ def test_a_new_input_joins_the_others(archive: Path, tmp_path: Path) -> None:
     assert set(frames(tmp_path / "out").values()) == {1}
 
 
+def test_people_of_photographs_are_in_their_own_alone(tmp_path: Path) -> None:
+    pictures = [{"id": k, "file_name": f"{k}.jpg", "width": 640, "height": 480 + k} for k in range(3)]
+    points = [number for j in range(17) for number in (20.0 * j, 10.0 * j + 7 * (j % 3), 2)]
+    people = [{"id": k, "image_id": k, "category_id": 1, "keypoints": points} for k in range(3)]
+    coco = {"images": pictures, "annotations": people, "categories": [{"id": 1, "name": "person"}]}
+    (tmp_path / "coco.json").write_text(json.dumps(coco))
+    recipe = Recipe(source=Source(person="all"))
+    run_batch([tmp_path / "coco.json"], tmp_path / "out", recipe)
+    assert sorted(frames(tmp_path / "out").elements()) == [("coco.json", k) for k in range(3)]
+
+
 def test_a_bad_input_is_named_and_the_rest_is_done(archive: Path, tmp_path: Path) -> None:
     bad = tmp_path / "in"
     bad.mkdir()
