@@ -115,8 +115,11 @@ def held_postures(
         remedy = "its limits were checked when it was recovered; convert its points to trc, c3d, csv, npz or parquet"
         raise refusal(path, "", found.title, "postures of a person", remedy)
     known = ", ".join(format_names(*POSTURE_CONTENTS))
-    flat = found.holds is Content.KEY_POINTS
-    remedy = f"recover them first: posekit recover {path} -o RESULT" if flat else "give another file"
+    remedies = {
+        Content.KEY_POINTS: f"recover them first: posekit recover {path} -o RESULT",
+        Content.BATCH: f"give its tables: {path}/shards",
+    }
+    remedy = remedies.get(found.holds, "give another file")
     raise refusal(path, "", found.title, f"postures, as they are in {known}", remedy)
 
 
