@@ -152,6 +152,14 @@ def followed(walked):
     return dataclasses.replace(walked, paths=paths)
 
 
+def test_the_picture_of_each_frame_is_named(opened, followed):
+    names = [f"{k:012d}.jpg" for k in range(len(followed.frames))]
+    tab = opened(dataclasses.replace(followed, settings={**followed.settings, "pictures": names}))
+    assert tab.inner_text("#seen-name") == names[0]
+    tab.locator("#frame").fill("2")
+    assert tab.inner_text("#seen-name") == names[2]
+
+
 def test_of_a_path_that_is_alone_no_probability_is_said(opened, followed):
     one = followed.paths
     rows = {name: getattr(one, name)[:1] for name in path_shapes(*one.survivor.shape)}

@@ -197,6 +197,7 @@ def _result_data(given: Result, view: View | None, title: str, frames: Sequence[
                 **judged[k],
                 **_uncalibrated(result.frames[index], shown[k], world),
                 **_image(result.frames[index], shown[k], view, index),
+                **({"picture": given.pictures[index]} if given.pictures else {}),
                 "examples": [reasons.get(reason, -1) for reason in rejected[k].reasons],
             }
             for k, index in enumerate(chosen)

@@ -345,6 +345,7 @@ const page = (() => {
     const here = frame(), drawing = byId("seen-image");
     byId("seen").hidden = !here.image?.some((point) => point);
     drawing.replaceChildren();
+    byId("seen-name").textContent = here.picture ?? "what the camera saw";
     if (!here.image?.some((point) => point)) return;
     const [left, top, size, width, height] = seenWindow(here.image);
     drawing.setAttribute("viewBox", `${left - 0.05 * size} ${top - 0.05 * size} ${width + 0.1 * size} ${height + 0.1 * size}`);
