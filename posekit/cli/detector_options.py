@@ -35,8 +35,8 @@ Deviation = Annotated[
     option(
         "--deviation",
         "PX",
-        "Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 5 "
-        "of a detector's and 2 of others.",
+        "Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 3 "
+        "of a detector's before a calibrated camera, and 1; necks are searched with 5 and 2.",
     ),
 ]
 Proportions = Annotated[

@@ -85,8 +85,9 @@ def recover(
         option(
             "--scale",
             "HOW",
-            "Uncalibrated views: min, VALUE (pixels a unit), stature:PX, or constraints: closure, coplanar, "
-            "perpendicular, collinear, with weights if wanted (closure:1,coplanar:0.5). Default: the view's, else min.",
+            "Uncalibrated views: likely, min, VALUE (pixels a unit), stature:PX, or constraints: closure, coplanar, "
+            "perpendicular, collinear, with weights if wanted (closure:1,coplanar:0.5). Default: the view's, else "
+            "likely of a photograph, min of exact points.",
         ),
     ] = "",
     proportions: Proportions = "figure",

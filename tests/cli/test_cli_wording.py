@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from posekit.display.plural import plural
+from posekit.recovery.key_point_offsets import PIXEL_DEVIATION
+from posekit.recovery.noise import KEY_POINT_DEVIATION
+from posekit.recovery.rooting import DEFAULT_DEVIATION_PIXELS
 from posekit.samples import write_samples
+from posekit.settings.rooting import DETECTED_DEVIATION
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +103,10 @@ def test_an_object_without_a_sure_posture_is_told_another_scale(
     arm = ("recover", samples / "gripper.json", "-o", tmp_path / "arm.json", "--linkage", "panda")
     assert "are undecided" in (said := run(*arm).out) and "try --scale closure" in said
     assert "undecided" not in run(*arm, "--scale", "closure").out
+
+
+def test_help_says_the_deviations_that_count(run: Callable[..., Any]) -> None:
+    said = " ".join(run("recover", "--help").out.split())
+    assert f"else {KEY_POINT_DEVIATION:g} of a detector's before a calibrated camera" in said
+    of_necks = f"necks are searched with {DETECTED_DEVIATION:g} and {DEFAULT_DEVIATION_PIXELS:g}."
+    assert f"and {PIXEL_DEVIATION:g}; {of_necks}" in said
