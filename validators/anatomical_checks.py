@@ -62,7 +62,7 @@ class AnatomicalLimb(Check):
         side = self.limb[0].split("_")[0]
         return Place.of_angles(*(f"{side}_{name}" for name in names))
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The rigid part the limb hangs on, then the limb's joints."""
         return self._parent + tuple(JOINT[joint] for joint in self.limb)

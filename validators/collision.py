@@ -74,7 +74,7 @@ class PairCollision(Check):
         """Whether one of the two is the head: how near an arm comes to it, a detector's points cannot tell."""
         return max(self.points) >= len(JOINTS)
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The points that place the two capsules."""
         return self.a.points + self.b.points

@@ -222,7 +222,7 @@ class LimbRange(Check):
     def _parent(self) -> tuple[int, ...]:
         return TORSO_POINTS if self._on_torso else self.figure.ik.hips_joints
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The rigid part the limb hangs on, then the limb's joints."""
         return self._parent + tuple(JOINT[joint] for joint in self.limb)

@@ -87,7 +87,7 @@ class Table1Limb(Check):
     noise = Loosening.DIRECTIONS
     pulls = True
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The torso, then the limb's joints."""
         return TORSO_POINTS + tuple(JOINT[f"{self.side}_{joint}"] for joint in self.limb)

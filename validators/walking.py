@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -139,7 +140,7 @@ class WalkingRule(Check):
     unit: str = "m"
     scope = Scope.MOTION
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The torso, the head, then the rule's own joints; last the hips, where these say where the trunk faces."""
         hips = () if self.thresholds.printed else _indices("right_hip", "left_hip")

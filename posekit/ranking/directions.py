@@ -22,6 +22,9 @@ LIMB_SEGMENTS: Final = tuple(
 )
 """The segments of the limbs: upper arm, forearm, thigh and shank, the right ones first."""
 
+SEGMENT_STARTS, SEGMENT_ENDS = np.array(LIMB_SEGMENTS).T
+"""Their first and their last joints."""
+
 DIRECTION_NAMES: Final = ("hips.left", "hips.down", *map(segment_name, LIMB_SEGMENTS), "up")
 """The eleven directions; `up` is the last, so that what is known without it comes first."""
 
@@ -50,17 +53,12 @@ def directions(joints: Array, up: Array | None = None) -> Array:
     axes = np.stack([cross(down, left_axis, axis=-2), left_axis, -down])
     hips_left, hips_down = _hips(joints)
     found = np.empty((UP_INDEX + (up is not None), 3, joints.shape[2]))
-    vectors = [
-        hips_left,
-        hips_down,
-        *(unit(joints[end] - joints[start], axis=-2) for start, end in LIMB_SEGMENTS),
-    ]
+    found[0], found[1] = hips_left, hips_down
+    found[2:UP_INDEX] = unit(joints[SEGMENT_ENDS] - joints[SEGMENT_STARTS], axis=-2)
     if up is not None:
-        vectors.append(up)
-    for k, vector in enumerate(vectors):
-        for axis in range(3):
-            found[k, axis] = dot(vector, axes[axis], axis=-2)
-    return found
+        found[UP_INDEX] = up
+    # As the torso has them: its axes are the rows of the rotation.
+    return dot(found[:, None], axes[None], axis=-2)
 
 
 def mirrored(found: Array) -> Array:

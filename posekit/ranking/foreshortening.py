@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from posekit.geometry import Array, dot
-from posekit.ranking.directions import LIMB_SEGMENTS
+from posekit.ranking.directions import SEGMENT_ENDS, SEGMENT_STARTS
 
 LEAST_COSINE: Final = 0.2
 """c: noise of a few pixels, or lengths known to some hundredths, hide a slope of ten degrees."""
@@ -34,11 +34,10 @@ def log_room(joints: Array) -> Array:
     """
     parallel = (joints[:, 2] <= 0).any(axis=0)
     z = np.array([0.0, 0.0, 1.0])[:, None]
-    total = np.zeros(joints.shape[2])
-    for start, end in LIMB_SEGMENTS:
-        along, ray = joints[end] - joints[start], np.where(parallel, z, joints[end])
-        across = dot(along, along, axis=-2) * dot(ray, ray, axis=-2)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            cosine_square = dot(along, ray, axis=-2) ** 2 / across
-        total += np.nan_to_num(-0.5 * np.log(cosine_square + LEAST_COSINE**2) - USUAL_LOG_ROOM)
-    return total
+    start, end = joints[SEGMENT_STARTS], joints[SEGMENT_ENDS]
+    along, ray = end - start, np.where(parallel, z, end)
+    across = dot(along, along, axis=-2) * dot(ray, ray, axis=-2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine_square = dot(along, ray, axis=-2) ** 2 / across
+    each = -0.5 * np.log(cosine_square + LEAST_COSINE**2) - USUAL_LOG_ROOM
+    return np.asarray(np.nan_to_num(each).sum(axis=0))

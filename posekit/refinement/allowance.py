@@ -81,7 +81,7 @@ class NoisyRange(Check):
         """Its unit."""
         return self.inner.unit
 
-    @property
+    @cached_property
     def points(self) -> tuple[int, ...]:
         """The points that it reads."""
         return self.inner.points
