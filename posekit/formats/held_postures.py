@@ -216,7 +216,10 @@ def _at_once(postures: Postures, path: Path, *, told: bool) -> HeldPostures:
 
 
 def _of_table(table: SurvivorTable) -> HeldPostures:
-    return _held(Postures(joints=table.joints), table.frame.astype(np.intp), table.time)
+    said = "a table of survivors says no tolerances; judge the result that it is of, which holds its own"
+    return replace(
+        _held(Postures(joints=table.joints), table.frame.astype(np.intp), table.time), said=(said,)
+    )
 
 
 def _of_truth(path: Path, view: View) -> HeldPostures:

@@ -471,6 +471,16 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
             assert part in done.out, (path, part, done.out)
 
 
+def test_a_table_of_survivors_says_that_it_holds_no_tolerances(
+    there: Path, command: Run, tmp_path: Path
+) -> None:
+    assert command("convert", there / "result.npz", tmp_path / "all.csv", "--posture", "all").code == 0
+    assert (
+        "says no tolerances; judge the result that it is of" in command("validate", tmp_path / "all.csv").out
+    )
+    assert "tolerances;" not in command("validate", there / "result.npz").out
+
+
 def test_a_rate_that_no_file_says_is_stated_or_told(there: Path, command: Run, tmp_path: Path) -> None:
     rows = [f"{k},{j},{j % 5},{j / 10},{k / 9}" for k in range(3) for j in range(33)]
     head = "sync_index,point_id,x_coord,y_coord,z_coord"
