@@ -13,6 +13,10 @@ class InputError(PosekitError):
     """A file or an argument is not what its schema says."""
 
 
+class TooLargeError(InputError):
+    """What is to be written could not be read again."""
+
+
 class FigureError(PosekitError):
     """The lengths or the URDF of a figure describe no body."""
 

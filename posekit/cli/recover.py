@@ -34,7 +34,7 @@ from posekit.cli.options import (
 from posekit.cli.recover_object import recover_object, refuse_options_of_persons
 from posekit.cli.terminal import say
 from posekit.display.plural import plural
-from posekit.errors import InputError
+from posekit.errors import InputError, TooLargeError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,6 +178,7 @@ def recover(
             refuse_unrecovered(recovery, view)
             refuse_unexplained(recovery, view, explain=explain)
             recovered.append((one, recovery, scaled))
+    written = []
     for one, recovery, scaled in recovered:
         path, figure_path = output, write_urdf
         if len(people) > 1:
@@ -186,11 +187,10 @@ def recover(
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         further = _further_lines(recovery, scaled, following, None if truth is None else one.view)
-        _write(result, path, figure_path, one, recovery, further)
+        written.append(_write(result, path, figure_path, one, recovery, further))
     first, found, _ = recovered[0]
     if any(len(frame) for frame in found.frames):
-        written = output if len(people) == 1 else of_person(output, first, alone=False)
-        tell_further(written, None if first.says else view)
+        tell_further(written[0], None if first.says else view)
 
 
 def _write(
@@ -200,9 +200,8 @@ def _write(
     one: Opened,
     recovery: Recovery,
     further: Sequence[str],
-) -> None:
+) -> Path:
     """Write what was recovered of a person, and say it; what is refused on the way to its words leaves no file."""
-    from posekit.formats import own as files
     from posekit.recovery.advice import advice_lines
     from posekit.recovery.summary import summary_lines
 
@@ -210,13 +209,29 @@ def _write(
     warnings = warnings_of(recovery)
     if figure_path is not None:
         recovery.figure.write(figure_path)
-    files.write_result(path, _with_pictures(result, one))
+    path, more = _written(path, _with_pictures(result, one))
     for line in lines:
         say(line)
-    for line in warnings:
+    for line in [*more, *warnings]:
         say(f"posekit: warning: {line}", err=True)
     for line in [*further, f"written: {path}"]:
         say(line)
+    return path
+
+
+def _written(path: Path, result: Result) -> tuple[Path, list[str]]:
+    """Write a result, as NPZ beside it where JSON could not be read again; return where, and what is to be said."""
+    from posekit.formats import own as files
+
+    try:
+        files.write_result(path, result)
+    except TooLargeError as error:
+        instead = path.with_name(path.name.removesuffix(".gz")).with_suffix(".npz")
+        if instead.exists():
+            raise
+        files.write_result(instead, result)
+        return instead, [f"{error}; it is in {instead}"]
+    return path, []
 
 
 def _with_pictures(result: Result, one: Opened) -> Result:

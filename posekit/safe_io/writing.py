@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
-from posekit.errors import InputError
+from posekit.errors import TooLargeError
 from posekit.safe_io.json_file import MAX_BYTES
 from posekit.safe_io.refusal import cut, refusal
 from posekit.safe_io.regular_file import is_packed
@@ -146,15 +146,16 @@ def safe_stem(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)[:MAX_STEM]
 
 
-def too_large_to_read(path: str | Path) -> InputError:
+def too_large_to_read(path: str | Path) -> TooLargeError:
     """Word why a JSON file that could not be read again is not written."""
-    return refusal(
+    refused = refusal(
         path,
         "",
         f"more than {MAX_BYTES / 1e6:.0f} MB of JSON",
         "a file that can be read again",
         "name it .npz where the command writes that, or split the input",
     )
+    return TooLargeError(str(refused))
 
 
 def json_pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[str]:

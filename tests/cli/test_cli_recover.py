@@ -44,6 +44,25 @@ def test_no_more_branches_are_listed_than_can_be_read_again(
     assert_refused(outcome, f"--explain: {listed:,} branches were pruned; expected at most {listed - 1:,}")
 
 
+def test_json_that_could_not_be_read_again_becomes_npz(
+    run, assert_refused, walk: dict[str, Any], write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = write(walk)
+    assert run("recover", view, "-o", "out.npz").code == 0
+    expected = read_result("out.npz")
+    Path("out.npz").unlink()
+    monkeypatch.setattr("posekit.safe_io.writing.MAX_BYTES", 1000)
+    outcome = run("recover", view, "-o", "out.json")
+    assert outcome.code == 0
+    assert "out.json: got more than 0 MB of JSON" in outcome.err and "it is in out.npz" in outcome.err
+    assert "posekit view out.npz" in outcome.out
+    assert not Path("out.json").exists()
+    for one, other in zip(read_result("out.npz").frames, expected.frames, strict=True):
+        np.testing.assert_array_equal(one.joints, other.joints)
+    # What is there stays.
+    assert_refused(run("recover", view, "-o", "out.json"), "out.json: got more than 0 MB of JSON")
+
+
 @pytest.mark.parametrize("suffix", ["json", "npz"])
 def test_recover_writes_what_it_prints(run, walk: dict[str, Any], suffix: str, write) -> None:
     view, target = write(walk), f"out.{suffix}"
