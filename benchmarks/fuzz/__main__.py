@@ -14,12 +14,20 @@ from collections import Counter
 from pathlib import Path
 
 import posekit
-from benchmarks.fuzz.cases import Case, file_case, kill_case, option_case, write_seeds
+from benchmarks.fuzz.cases import (
+    OPTION_COMMANDS,
+    Case,
+    file_case,
+    kill_case,
+    option_case,
+    write_seeds,
+)
 from benchmarks.fuzz.damage import damaged
 from benchmarks.fuzz.structure import rearranged
-from benchmarks.fuzz.trial import Outcome, in_fork, tried
+from benchmarks.fuzz.trial import Outcome, in_fork, placed, tried
 from posekit.formats.markdown import table_lines
 
+WHOLE_SECONDS = 600
 OPTION_SHARE, KILL_SHARE = 0.25, 0.05
 """The shares of cases that are odd options, and whole commands that are killed; the others are damaged files."""
 
@@ -69,7 +77,15 @@ def main() -> int:
         seeds_folder, folder = Path(made) / "seeds", Path(made) / "case"
         seeds_folder.mkdir()
         said = Path(made) / "said"
-        seeds = write_seeds(seeds_folder, lambda arguments: in_fork(arguments, said, 120.0) or 0)
+
+        def run(arguments: list[str]) -> int:
+            """Run a whole command: loops are compiled in none of the cases."""
+            return in_fork(arguments, said, WHOLE_SECONDS, processor=WHOLE_SECONDS) or 0
+
+        seeds = write_seeds(seeds_folder, run)
+        folder.mkdir()
+        for command in OPTION_COMMANDS:
+            run(placed(command.split(), folder, folder / "out", seeds_folder))
         ends, number = time.monotonic() + 60 * given.minutes, 0
         while time.monotonic() < ends:
             rng = random.Random(f"{given.seed}.{number}")

@@ -171,6 +171,9 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
     run(["validate", str(folder / "walk.npz"), "-o", str(folder / "report.json")])
     (folder / "schema.json").write_text(schema_text("view"), encoding="utf-8")
     seeds["report"] = [folder / "report.json", folder / "schema.json"]
+    lacking = [path.name for files in seeds.values() for path in files if not path.exists()]
+    if lacking:
+        raise RuntimeError(f"seeds could not be written: {', '.join(lacking)}")
     return seeds
 
 

@@ -61,7 +61,11 @@ def run_command(arguments: list[str]) -> int:
 
 
 def in_fork(
-    arguments: list[str], said: Path, patience: float = PATIENCE_SECONDS, kill: tuple[int, float] = (0, 0.0)
+    arguments: list[str],
+    said: Path,
+    patience: float = PATIENCE_SECONDS,
+    kill: tuple[int, float] = (0, 0.0),
+    processor: int = PROCESSOR_SECONDS,
 ) -> int | None:
     """Run a command in a fork, its words in `said`, and return its exit code, -N of signal N; None for a hang.
 
@@ -84,7 +88,7 @@ def in_fork(
                 int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
             )
             resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
-            resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS))
+            resource.setrlimit(resource.RLIMIT_CPU, (processor, processor))
             code = run_command(arguments)
         except BaseException:
             os.write(2, traceback.format_exc().encode(errors="replace"))
@@ -118,8 +122,7 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
     folder.mkdir()
     if case.name:
         (folder / case.name).write_bytes(case.data)
-    places = {"IN": str(folder / case.name), "OUT": str(folder / "out"), "SEEDS": str(seeds)}
-    arguments = [_placed(argument, places) for argument in case.arguments]
+    arguments = placed(case.arguments, folder / case.name, folder / "out", seeds)
     before = {path.name for path in folder.iterdir()}
     here = Path.cwd()
     os.chdir(folder)
@@ -161,8 +164,13 @@ def _killed(case: Case, code: int | None, folder: Path) -> Outcome:
     return Outcome("killed, all whole") if found.clean else found
 
 
+def placed(arguments: list[str], damaged: Path, out: Path, seeds: Path) -> list[str]:
+    """Put places in where arguments begin with IN, OUT or SEEDS."""
+    places = {"IN": str(damaged), "OUT": str(out), "SEEDS": str(seeds)}
+    return [_placed(argument, places) for argument in arguments]
+
+
 def _placed(argument: str, places: dict[str, str]) -> str:
-    """Put the place in of a word that an argument begins with."""
     for word, place in places.items():
         if argument == word or argument.startswith((f"{word}/", f"{word}.")):
             return place + argument[len(word) :]
