@@ -71,6 +71,7 @@ def in_fork(
 
     `kill` is a signal that it gets, and after how many seconds; 0 for none.
     """
+    said.write_bytes(b"")  # a killed fork may not come to it
     # A signal that comes before the command begins says nothing of the command.
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING_SIGNALS)
     child = os.fork()
