@@ -119,7 +119,7 @@ def _whole_tree_rows(work: LeeChenWork) -> Iterator[PaperRow]:
     image = camera.project(points[None, :14])[0]
     leaves, _ = enumerate_leaves(camera, points[0], image, parents=PARENTS, lengths=lengths)
     yield _row(
-        "§3.1: paths of the tree",
+        "§3.1, Fig. 4: paths of the tree",
         "2^i nodes at level i",
         f"{len(leaves)} leaves at level 13",
         len(leaves) == 2**13,

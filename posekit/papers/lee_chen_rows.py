@@ -62,7 +62,7 @@ def _tree_rows() -> Iterator[PaperRow]:
         "§3.1, number of interpretations", "2^13 = 8196", f"2^13 = {2**13}", False, "arithmetic", "misprint"
     )
     yield _row(
-        "§2.2: two positions of a joint",
+        "§2.2, eqs. (6)-(7), Fig. 3: two positions of a joint",
         "where its ray meets the sphere of its segment",
         f"{worst:.0e} m off at most",
         worst < SAME_POSTURE_METRES,
@@ -183,11 +183,19 @@ def _body_rows() -> Iterator[PaperRow]:
         worst < 1e-6,
         f"distances of joints of {N_POSTURES} random postures of the rigid-body model",
     )
+    neck, pelvis, half = (
+        printed.TABLE_A1["neck", "right_shoulder"],
+        printed.TABLE_A1["right_shoulder", "pelvis"],
+        printed.TABLE_A1["right_shoulder", "left_shoulder"] / 2,
+    )
+    spine = printed.TABLE_A1["neck", "pelvis"]
+    below = (neck**2 - pelvis**2 + spine**2) / (2 * spine)
+    before = np.sqrt(neck**2 - half**2 - below**2)
     yield PaperRow(
         paper=PAPER_TITLE,
         place="Table A.1, the torso",
         printed="a rigid torso",
-        here="not flat: the shoulders' middle is 3.742 cm before the line from neck to pelvis",
+        here=f"not flat: the shoulders' middle is {before:.3f} cm before the line from neck to pelvis",
         verdict="open",
         check="trilateration of the printed lengths",
         why="lengths cannot tell before from behind: before is taken",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -20,7 +20,7 @@ VERDICT_MEANINGS: Final[dict[Verdict, str]] = {
 PAGE_STYLE: Final = (
     "body{font:15px/1.4 sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse}"
     "td,th{border:1px solid #ccc;padding:.3em .5em;text-align:left;vertical-align:top}"
-    ".differs{background:#fde5d4}.open{background:#eef1f6}"
+    ".differs{background:#fde5d4}.open{background:#eef1f6}img{max-width:100%}"
 )
 
 
@@ -75,7 +75,9 @@ def compared(
     )
 
 
-def write_rows(folder: Path, rows: Sequence[PaperRow], beside: Iterable[str]) -> list[str]:
+def write_rows(
+    folder: Path, rows: Sequence[PaperRow], beside: Iterable[str], pictures: Mapping[str, str] | None = None
+) -> list[str]:
     """Write ``papers.md``, ``papers.html`` and ``papers.json``.
 
     Parameters
@@ -86,6 +88,8 @@ def write_rows(folder: Path, rows: Sequence[PaperRow], beside: Iterable[str]) ->
         In the papers' order.
     beside : iterable of str
         Names of files of the folder that tell more.
+    pictures : mapping, optional
+        Names of pictures, and which figures they are like; those that are in the folder are shown.
 
     Returns
     -------
@@ -121,6 +125,13 @@ def write_rows(folder: Path, rows: Sequence[PaperRow], beside: Iterable[str]) ->
         page += [f"<h2>{html.escape(paper)}</h2><table><tr>{_cells('th', head)}</tr>"]
         page += [f'<tr class="{each[3]}">{_cells("td", each)}</tr>' for each in cells]
         page += ["</table>"]
+    for name, caption in (pictures or {}).items():
+        if (folder / name).is_file():
+            lines += [f"![{caption}]({name})", ""]
+            said = html.escape(caption)
+            page += [
+                f'<figure><img src="{html.escape(name)}" alt="{said}"><figcaption>{said}</figcaption></figure>'
+            ]
     beside = list(beside)
     lines += [f"More: {', '.join(f'[{name}]({name})' for name in beside)}.", ""]
     links = (f'<a href="{html.escape(name)}">{html.escape(name)}</a>' for name in beside)

@@ -8,14 +8,18 @@ import pytest
 
 from posekit.papers import lee_chen_checks as lee_chen_checks_module
 from posekit.papers import lee_chen_printed as printed
+from posekit.papers import lee_chen_words as lee_chen_words_module
 from posekit.papers import taylor_rows as taylor_rows_module
+from posekit.papers.all_papers import PICTURES_SHOWN
 from posekit.papers.lee_chen_checks import lee_chen_checks
 from posekit.papers.lee_chen_rows import lee_chen_rows
 from posekit.papers.lee_chen_table2 import exact_image
 from posekit.papers.lee_chen_tables34 import WalkGrid
+from posekit.papers.lee_chen_words import lee_chen_words
 from posekit.papers.lee_chen_work import LeeChenWork
 from posekit.papers.rows import PaperRow, agreement, write_rows
 from posekit.papers.taylor_rows import find_taylor, taylor_rows
+from posekit.validators import load_ranges
 
 
 @pytest.fixture(scope="module")
@@ -24,21 +28,14 @@ def work() -> LeeChenWork:
 
 
 HELD = (
-    "Table 1,",
-    "Table 2(",
-    "§2.1, eq",
-    "§2.2",
-    "§3.1, §4.1.B",
-    "§3.2.C",
-    "§3.3, Rule",
-    "Fig. 4",
-    "§2, §4",
+    *("Table 1,", "Table 2(", "§2.1, eq", "§2.2", "§3.3, Rule", "§3.2.C"),
+    *("Fig. 1:", "Fig. 2:", "Fig. 3:", "Fig. 4:", "§3.2.A(i):", "§3.2.A(iii", "§3.2.A(iv", "§3.2.B"),
 )
 """What comes out as printed, to rounding."""
 
 
 def both(work: LeeChenWork) -> list[PaperRow]:
-    return [*lee_chen_checks(work), *lee_chen_rows(work)]
+    return [*lee_chen_words(work), *lee_chen_checks(work), *lee_chen_rows(work)]
 
 
 @pytest.fixture(scope="module")
@@ -67,10 +64,7 @@ def test_what_is_known_to_be_misprinted_differs_and_table_1_and_2_agree(rows: li
     ):
         assert verdict[place] == "differs"
     for place, said in verdict.items():
-        if (
-            place.startswith(("Table 1,", "Table 2(", "§2.1, eq", "§2.2", "§3.3, Rule", "§3.2.C"))
-            or place == "Table A.1"
-        ):
+        if place.startswith(HELD) or place == "Table A.1":
             assert said == "agrees", place
 
 
@@ -127,6 +121,54 @@ def test_taylors_proportions_are_measured(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setitem(taylor_rows_module.PRINTED_LENGTHS, "thigh", (19.5, ends))
     wrong = [row.place for row in taylor_rows_module._proportion_rows() if row.verdict == "differs"]
     assert wrong == ["Table 1, thigh"]
+
+
+EVERYTHING_PRINTED = {
+    "Lee & Chen 1985": (
+        *(f"Fig. {k}" for k in (1, 2, 3, 4, 5, 6, 8)),
+        *(f"eqs. ({pair})" for pair in ("2)-(3", "4)-(5", "6)-(7")),
+        "eq. (1)",
+        *(f"§3.2.A({number})" for number in ("i", "ii", "iii", "iv")),
+        *(f"Rule {k}" for k in range(1, 6)),
+        *("Table 1", "Table 2", "Table 3", "Table 4", "Table A.1", "Table A.2(a)", "Table A.2(b)"),
+        *("§2.1", "§2.2", "§3.1", "§3.2.B", "§3.2.C", "§3.3", "§4.1.B", "§4.2"),
+    ),
+    "Taylor 2000": (
+        "eqs. (1)-(2)",
+        "eq. (3)",
+        *(f"Fig. {k}" for k in (2, 3, 4, 7, 8)),
+        "Figs. 1, 5 and 6",
+        "Table 1",
+        "§3.2",
+    ),
+}
+"""What the papers number; Figs. 7 and A.1 of Lee & Chen are drawn alone."""
+
+
+def test_whatever_the_papers_number_has_a_row_or_a_picture(rows: list[PaperRow]) -> None:
+    for paper, numbered in EVERYTHING_PRINTED.items():
+        places = " | ".join(
+            row.place.replace("Figs. 6 to 8", "Fig. 6 to Fig. 8") for row in rows if row.paper == paper
+        )
+        assert [one for one in numbered if one not in places] == []
+    captions = " | ".join(PICTURES_SHOWN.values())
+    for figure in ("Fig. 6", "Fig. 7", "Fig. 8", "Fig. A.1"):
+        assert f"Lee & Chen, {figure}:" in captions
+
+
+def test_formulas_of_angles_are_the_prints_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other angles, which do not jump, differ from what is written out."""
+    monkeypatch.setattr(lee_chen_words_module, "load_ranges", lambda _: load_ranges("table1"))
+    rows = {row.place: row.verdict for row in lee_chen_words_module._formula_rows()}
+    assert set(rows.values()) == {"differs"}
+
+
+def test_pictures_that_are_there_are_shown(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"")
+    write_rows(tmp_path, [], [], {"a.png": "Fig. 1 & 2", "b.png": "Fig. 3"})
+    page = (tmp_path / "papers.html").read_text(encoding="utf-8")
+    assert '<img src="a.png" alt="Fig. 1 &amp; 2">' in page
+    assert "b.png" not in page
 
 
 def test_texts_stay_texts_and_every_row_is_in_every_file(tmp_path: Path) -> None:
