@@ -27,7 +27,7 @@ FORMULA_DEGREES = 1e-5
 CLASS_SIZES = (3, 4, 4, 2)
 """Joints of the classes (a) to (d) of §2.2."""
 
-DECISIONS = {
+PRINTED_DECISIONS = {
     "seq1": "Rule 3 by the right shoulder and the left hip, Rule 5 by the left ankle; two right wrists are left",
     "seq2": "one of six has a twisted torso, Rule 4 rejects four by an arm or a leg",
 }
@@ -242,7 +242,7 @@ def _level_rows(work: LeeChenWork) -> Iterator[PaperRow]:
 
 def _decision_rows(work: LeeChenWork) -> Iterator[PaperRow]:
     """Ask Rules 3 to 5, one by one, of what Rules 1 and 2 left of frame 1 at the closest setting."""
-    for name, says in DECISIONS.items():
+    for name, says in PRINTED_DECISIONS.items():
         recovery = recover_sequence(name, work.setting)[1]
         joints, head = recovery.frames[0].joints, recovery.fit.head[0]
         rejected = []
