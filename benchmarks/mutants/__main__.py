@@ -64,7 +64,9 @@ def main() -> None:
         "--seconds", type=float, default=TESTED_SECONDS, help="of tests that a fault is given"
     )
     parser.add_argument("--part", default="0/1", help="I/N: this process takes every N-th, from the I-th")
-    parser.add_argument("--again", action="store_true", help="try those that survived once more")
+    parser.add_argument(
+        "--again", action="store_true", help="try those that survived and are not explained once more"
+    )
     given = parser.parse_args()
     maps, results = given.output / "maps", given.output / "outcomes.jsonl"
     files = [file for found in files_of_rooms().values() for file in found]
@@ -77,14 +79,15 @@ def main() -> None:
     def fails(name: str) -> bool:
         return in_fork(None, [name], PATIENCE_SECONDS + 3 * seconds.get(name, 0.0)) != ""
 
+    explained = json.loads((Path(__file__).parent / "explained.json").read_text(encoding="utf-8"))
     before: list[dict[str, str]] = []
     if results.exists():
         before = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
-    last = {each["name"]: each["outcome"] for each in before}
+    last = {each["name"]: "explained" if name_of(each) in explained else each["outcome"] for each in before}
     part, parts = map(int, given.part.split("/"))
     for number, mutant in enumerate(islice(drawn(files, given.seed), given.count)):
         known = last.get(mutant.name)
-        if number % parts != part or known in ("killed", "endless") or (known and not given.again):
+        if number % parts != part or (known and not (given.again and known == "survived")):
             continue
         tests = chosen_tests(mutant, lines.get(mutant.file, {}), seconds, given.seconds)
         trial = tried(mutant, tests, seconds, fails)
@@ -93,7 +96,6 @@ def main() -> None:
     outcomes = {
         each["name"]: each for each in map(json.loads, results.read_text(encoding="utf-8").splitlines())
     }
-    explained = json.loads((Path(__file__).parent / "explained.json").read_text(encoding="utf-8"))
     print(*table(list(outcomes.values()), explained), sep="\n")
 
 

@@ -8,6 +8,7 @@ import pytest
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head import HeadPoints, blocks, solve_pose
+from posekit.cameras.head.misfit import beyond_chance
 from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.cameras.head.starts import affine_start, direct_start, reversed_start
 from posekit.geometry import rotation_from_vector
@@ -102,3 +103,12 @@ def test_a_step_moves_all_unknowns() -> None:
     np.testing.assert_allclose(found.slope, 0.0104)
     fixed = start.moved(step[:, :6], free._replace(K=np.tile(np.eye(3), (2, 1, 1))))
     np.testing.assert_allclose(fixed.slope, [0.103, -0.103])
+
+
+def test_of_many_chances_those_are_more_than_accidents_that_are_small_together() -> None:
+    """The k smallest of F, where the k-th is at most k / F of five in a thousand (Benjamini & Hochberg 1995)."""
+    assert beyond_chance(np.array([0.005])).tolist() == [True]
+    assert beyond_chance(np.array([0.0051])).tolist() == [False]
+    assert beyond_chance(np.array([0.9, 0.0037, 0.001, 0.003])).tolist() == [False, True, True, True]
+    assert beyond_chance(np.array([0.9, 0.0038, 0.0013, 0.0026])).tolist() == [False] * 4
+    assert beyond_chance(np.array([])).tolist() == []

@@ -298,6 +298,15 @@ def test_what_is_no_camera_is_refused(changes: dict[str, Any], words: str) -> No
         OpenCVModel(**{"K": np.array(K), **changes})
 
 
+def test_a_camera_keeps_arrays_of_its_own() -> None:
+    given_: dict[str, Any] = {"K": np.array(K), "distortion": np.zeros(5), "R": np.eye(3), "t": np.zeros(3)}
+    camera = OpenCVModel(**given_)
+    for name, array in given_.items():
+        own = getattr(camera, name)
+        assert own is not array and not own.flags.writeable and own.dtype == np.float64
+        np.testing.assert_array_equal(own, array)
+
+
 @pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
 def test_focal_lengths_scales_and_aspects_are_positive(value: float) -> None:
     for make, words in (

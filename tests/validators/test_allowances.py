@@ -17,6 +17,7 @@ from posekit.body.torso_bending import bending_gives
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.settings import RigidTolerance, ValidateSettings
+from posekit.settings.judging import checked_rules
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, segment_name
 from posekit.tree import Check, Findings, Loosening, Place, Scope, given_check
 from posekit.validators.anatomical import Anatomy, AngleRange, Coupling, End
@@ -275,6 +276,8 @@ def test_options_that_let_every_posture_pass_are_refused(changes: dict[str, Any]
         CheckOptions(**changes)
     assert words in str(caught.value)
     CheckOptions(rigid_tolerance=0.0, angle_tolerance=0.0, contact_margin=-0.5)
+    assert CheckOptions(rules=[1, 5, 2]).rules == checked_rules([1, 5, 2])  # type: ignore[arg-type]
+    assert isinstance(CheckOptions(rules=[1, 5, 2]).rules, tuple)  # type: ignore[arg-type]
 
 
 def test_a_check_takes_options_as_parameters_and_no_others() -> None:

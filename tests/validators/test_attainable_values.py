@@ -110,6 +110,37 @@ def test_of_several_joints_nothing_within_the_limits_is_outside(
         np.testing.assert_allclose(high, volumes.max(axis=0), atol=1e-3)
 
 
+def test_beyond_the_grid_is_left_what_second_derivatives_allow() -> None:
+    """Half of a bound of these times half the spacing squared: of distances, squared, 2 E² + 2 E², of volumes 9 E³."""
+    joints, half = (1, 2), 2.6 / 511 / 2
+    first, second = np.linspace(-0.7, 1.9, 512), np.linspace(-1.2, 0.4, 801)
+    grid = np.stack(np.meshgrid(first, [-1.0, 0.0, 1.0], indexing="ij"), axis=-1).reshape(-1, 2)
+    at = places(attainable().configurations(joints, grid))
+
+    def of_last(values: np.ndarray) -> np.ndarray:
+        """Follow the last joint as a circle through three of its angles: (512 * 801, T)."""
+        waves, everywhere = (
+            np.stack([np.ones_like(q), np.cos(q), np.sin(q)], axis=-1)
+            for q in (np.array([-1.0, 0.0, 1.0]), second)
+        )
+        circles = np.linalg.solve(waves, values.reshape(512, 3, -1))
+        return np.asarray(everywhere @ circles).reshape(512 * 801, -1)
+
+    pairs, quads = groups(2, joints)[:3], groups(4, joints)[:40:8]
+    E = attainable().extent(pairs)
+    squared = of_last(np.linalg.norm(at[:, pairs[:, 0]] - at[:, pairs[:, 1]], axis=-1) ** 2)
+    low, high = attainable().distances(joints, pairs)
+    gap = 0.5 * 4 * E * E * half**2
+    np.testing.assert_allclose(low**2, squared.min(axis=0) - gap, atol=1e-6)
+    np.testing.assert_allclose(high**2, squared.max(axis=0) + gap, atol=1e-6)
+    E = attainable().extent(quads)
+    volumes = of_last(six_volumes(at, quads))
+    low, high = attainable().volumes(joints, quads)
+    gap = 0.5 * 9 * E**3 * half**2
+    np.testing.assert_allclose(low, volumes.min(axis=0) - gap, atol=1e-6)
+    np.testing.assert_allclose(high, volumes.max(axis=0) + gap, atol=1e-6)
+
+
 def test_no_two_points_are_farther_apart_than_their_extent() -> None:
     """The way along the bodies, joints at their farthest: from the first link to the cart by hand."""
     at = places(spread((1, 2, 3), 15))

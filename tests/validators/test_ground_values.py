@@ -448,6 +448,19 @@ def test_support_distance_is_how_far_hips_are_beyond_ankles_and_toes(lean: float
         np.testing.assert_allclose(found[:, k], max(at - front, back - at, 0.0), atol=1e-6)
 
 
+def test_of_what_is_not_known_no_share_is_taken() -> None:
+    clip = standing(150, ground=0.0)
+    joints, feet = clip.joints.copy(), clip.feet.copy()
+    joints[:, ANKLES] = feet[:] = np.nan
+    assert np.isnan(SupportDistance().judge(replace(clip, joints=joints, feet=feet)).value).all()
+    joints[:60], feet[:60] = clip.joints[:60], clip.feet[:60]
+    found = SupportDistance().judge(replace(clip, joints=joints, feet=feet)).value
+    np.testing.assert_allclose(
+        found[:120], 0.0, atol=0.05
+    )  # the part from 3.5 s on has no frame that is known
+    assert np.isnan(found[120:]).all()
+
+
 def test_feet_without_toes_touch_by_their_ankles() -> None:
     clip = standing(60, ground=0.0)
     bare = replace(clip, feet=np.empty(0))

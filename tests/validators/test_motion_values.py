@@ -28,7 +28,7 @@ from posekit.validators.motion.lifted import lifted_by, steps_of
 from posekit.validators.motion.root_jerk import low_pass, parts
 from posekit.validators.motion.speed import JointSpeed
 from posekit.validators.motion.timeline import centred, filtered, norm, timeline_of
-from posekit.validators.motion.trembling import trembling_of, usual_trembling
+from posekit.validators.motion.trembling import _evidence, trembling_of, usual_trembling
 
 UP = np.array([0.0, 0.0, 1.0])
 BODY = load_figure().neutral_points[: len(JOINTS)]
@@ -205,6 +205,14 @@ def test_a_filter_is_the_digital_butterworth_filter_run_both_ways() -> None:
     b, a = signal.butter(4, 3.0, fs=30.0)
     expected = signal.filtfilt(b, a, way, axis=0, padlen=60)
     np.testing.assert_allclose(low_pass(way, 1 / 30.0, 3.0)[60:-60], expected[60:-60], atol=0.05)
+
+
+@pytest.mark.parametrize("count", [4, 30, 61, 119, 121, 240])
+def test_a_filter_knows_no_direction_of_time(count: int) -> None:
+    """It mirrors two seconds at both ends, or as many frames as there are beside the last one."""
+    way = np.cumsum(np.random.default_rng(count).normal(size=(count, 2)), axis=0)
+    forward, backward = low_pass(way, 1 / 30.0, 3.0), low_pass(way[::-1], 1 / 30.0, 3.0)[::-1]
+    np.testing.assert_allclose(forward, backward, atol=1e-9)
 
 
 # --- jumps and displacements ----------------------------------------------------------------------------
@@ -411,6 +419,27 @@ def test_a_joint_trembles_alone_where_all_lengths_at_it_do() -> None:
     assert found[JOINT["right_ankle"]] < 1e-9
     noisy = np.nanmean(trembling_of(joints, 0.001), axis=0)
     assert noisy[JOINT["left_ankle"]] == pytest.approx(found[JOINT["left_ankle"]] - 0.002, abs=1e-4)
+
+
+@pytest.mark.parametrize(("numbers", "median"), [(3, 1.5382), (1, 0.6745)])
+@pytest.mark.parametrize(("calm", "said"), [(0.2, 0.2), (0.01, 0.1), (0.9, 0.6)])
+def test_evidence_is_a_ratio_of_likelihoods_of_normal_noise(
+    numbers: int, median: float, calm: float, said: float
+) -> None:
+    """Outside there is a tenth of the trembling inside at least, and six tenths at most; six is all one frame says."""
+    norm_ = pytest.importorskip("scipy.stats").norm
+    rough = np.full((120, 1), calm * 0.02)
+    rough[50:70] = 0.02
+    rough[60] = 0.014
+    found = _evidence(rough, 50, 69, numbers)
+    inside, outside = 0.02 / median, said * 0.02 / median
+    for frame in (20, 55, 60):
+        parts = np.zeros(numbers)
+        parts[0] = rough[frame, 0]
+        ratio = (norm_.logpdf(parts, scale=inside) - norm_.logpdf(parts, scale=outside)).sum()
+        assert found[frame] == pytest.approx(np.clip(ratio, -6.0, 6.0))
+    still = _evidence(0.05 * rough, 50, 69, numbers)
+    assert (still == 0).all()  # less than 2 mm is no trembling
 
 
 # --- what falls, what is lifted, what bears -------------------------------------------------------------

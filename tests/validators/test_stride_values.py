@@ -16,6 +16,7 @@ from posekit.validators.motion.order import _stretches, displaced, stretches_of
 from posekit.validators.motion.sides import (
     LEFT_JOINTS,
     RIGHT_JOINTS,
+    _sure,
     exchanged_pairs,
     known_before,
     put_right,
@@ -200,6 +201,10 @@ def test_after_a_gap_nothing_says_that_a_pair_turned_over() -> None:
     assert known_before(across).tolist() == [True, False, False, True]
     across[2, 3] = 1.0
     assert known_before(across).all()
+
+
+def test_evidence_is_one_at_most_and_none_of_what_is_not_known() -> None:
+    assert _sure(np.array([-5.0, -0.5, np.nan, 0.25, 5.0])).tolist() == [-1.0, -0.5, 0.0, 0.25, 1.0]
 
 
 # --- order ----------------------------------------------------------------------------------------------
