@@ -211,6 +211,17 @@ def test_leaves_say_where_they_are() -> None:
     assert (leaves.length_residual() < 1e-8).all()
 
 
+def test_a_segment_may_not_be_too_short_unless_told_otherwise() -> None:
+    joints, image, lengths = scene(2)
+    ray = np.concatenate([(image[:, 1] - [320.0, 240.0]) / 1000.0, np.ones((2, 1))], axis=1)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    along = np.einsum("fi,fi->f", joints[:, 0], ray)
+    lengths[1, :, 0] = np.linalg.norm(joints[:, 0] - along[:, None] * ray, axis=1) - [1e-4, -1e-4]
+    tree = InterpretationTree(joints=JOINTS[:2], parents=PARENTS[:2], lengths=lengths[:2])
+    assert set(tree.grow(CAMERA, joints[:, 0], image[:, :2], ()).frame.tolist()) == {1}
+    assert set(tree.grow(CAMERA, joints[:, 0], image[:, :2], (), tolerance=2e-4).frame.tolist()) == {0, 1}
+
+
 def test_what_is_lost_and_what_is_left_are_enumerate_leaves() -> None:
     most = 4.05
     full, pruned = (
