@@ -20,6 +20,7 @@ from posekit.settings import RigidTolerance, ValidateSettings
 from posekit.settings.judging import checked_rules
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, segment_name
 from posekit.tree import Check, Findings, Loosening, Place, Scope, given_check
+from posekit.validators import Validator
 from posekit.validators.anatomical import Anatomy, AngleRange, Coupling, End
 from posekit.validators.anatomical_limb import limb_walls
 from posekit.validators.given_points import points_of, refuse_far, sequence_of
@@ -246,6 +247,11 @@ def test_walls_are_without_tolerance_and_as_hips_show_them_unless_told_otherwise
     middle = np.mean([anatomy.motions["hip.flexion"].end(side)[0] for side in ("lower", "upper")])
     own = limb_walls(anatomy, "hip", angles).values[..., 0]
     np.testing.assert_allclose(turned.values[..., 0], own - np.clip(own - middle, -8.0, 3.0))
+
+
+def test_a_validator_says_by_whose_body_and_what_it_judges() -> None:
+    told = Validator(checks=("collision", "rigid-parts")).describe()
+    assert told == {"figure": FIGURE.hash, "checks": ["rigid-parts", "collision"]}
 
 
 # --- options and names ----------------------------------------------------------------------------------

@@ -287,6 +287,17 @@ def test_a_slide_is_of_so_many_frames(rate: float, lasting: float, frames: int) 
     assert Sliding(lasting=lasting)._frames(standing(4, rate=rate)) == frames
 
 
+@pytest.mark.parametrize(("speed", "noise", "slides"), [
+    (0.19, 0.06, False), (0.21, 0.06, True), (0.98, 0.06, True), (1.02, 0.06, False), (1.02, 0.0, True),
+])  # fmt: skip
+def test_under_noise_a_slide_is_faster_than_what_feet_differ_by(
+    speed: float, noise: float, slides: bool
+) -> None:
+    """By three tenths of it, noise of three deviations of a way; and slower than a swing, whose roll noise hides."""
+    clip = standing(60, noise=noise / 30.0 / (3 * np.sqrt(2)))
+    assert Sliding().judge(gliding(speed * np.arange(60) / 30.0, clip)).value.any() == slides
+
+
 @pytest.mark.parametrize(("rise", "slides"), [(0.045, True), (0.055, False)])
 def test_a_foot_that_goes_up_or_down_does_not_slide(rise: float, slides: bool) -> None:
     for sign in (1.0, -1.0):

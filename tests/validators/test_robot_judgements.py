@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import coal
@@ -32,7 +33,7 @@ from posekit.validators.robot.joint_range import beyond_limits, judge_joint_rang
 from posekit.validators.robot.load import load_subject
 from posekit.validators.robot.models import Models
 from posekit.validators.robot.reach import judge_reach, rigid_pairs
-from posekit.validators.robot.robot_validator import RobotValidator
+from posekit.validators.robot.robot_validator import RobotValidator, _of_fits
 from posekit.validators.robot.settings import check_robot_names, reach_tolerance, robot_settings
 from posekit.validators.robot.subject import Subject
 
@@ -340,6 +341,51 @@ def test_limits_keep_a_fit_off_by_what_they_take() -> None:
     unseen[0, 2] = np.nan
     seen = fitter.seen(unseen)
     assert seen.tolist() == [[True, True, False]] and fitter.seen(points_of(q)).all()
+
+
+class _Asked:
+    """Keeps which configurations it was told to say nothing of."""
+
+    undecided: list[bool]
+
+    def judge(self, q: Array, undecided: Array) -> str:
+        self.undecided = undecided.tolist()
+        return f"{len(q)} judged"
+
+
+@pytest.mark.parametrize("checks", [("collision",), ("balance",), ("collision", "balance")])
+def test_nothing_is_said_of_fits_that_are_far_off_or_of_incomplete_postures(checks: tuple[str, ...]) -> None:
+    settings = robot_settings(ValidateSettings(checks=checks, rigid_tolerance=0.01))
+    judged: Any = SimpleNamespace(settings=settings, collision=_Asked(), balance=_Asked())
+    residual = np.array([[0.0, 0.009], [0.0, 0.011], [np.nan, 0.0], [np.nan, np.nan]])
+    q = at(*[(0, 0, 0)] * 4)
+    fit = Fit(q=q, residual=residual, free_q=q, free_residual=residual, kept_off=np.zeros(4))
+    complete = np.array([True, True, False, False])
+    found: list[Any] = [*_of_fits(judged, fit, seen=np.ones((4, 3), dtype=bool), complete=complete)]
+    assert found == ["4 judged"] * len(checks)
+    for name in checks:
+        assert getattr(judged, name).undecided == [False, True, True, True]
+
+
+@pytest.mark.parametrize(("kept_off", "degrees", "verdict"), [
+    (0.0, 0.2, "invalid"),
+    (0.0009, 90.0, "undecided"),  # what a search may miss by is no proof
+    (0.0011, 0.4, "undecided"),
+    (0.0011, 0.6, "invalid"),  # half a degree, and one more for each centimetre of misfit
+    (0.0011, 1.4, "undecided at a centimetre"),
+    (0.0011, 1.6, "invalid at a centimetre"),
+])  # fmt: skip
+def test_limits_are_broken_where_they_clearly_keep_a_fit_off(
+    kept_off: float, degrees: float, verdict: str
+) -> None:
+    settings = robot_settings(ValidateSettings(checks=("joint-range",), angle_tolerance=0.1))
+    judged: Any = SimpleNamespace(settings=settings, subject=subject_of())
+    q = at((0.0, 2.0 + np.radians(0.1 + degrees), 1.0))
+    residual = np.full((1, 3), 0.01 if "centimetre" in verdict else 0.0)
+    fit = Fit(q=q, residual=residual, free_q=q, free_residual=residual, kept_off=np.array([kept_off]))
+    (found,) = _of_fits(judged, fit, seen=np.ones((1, 3), dtype=bool), complete=np.array([True]))
+    assert found.violated.any() == verdict.startswith("invalid")
+    assert np.isnan(found.margin).all() == verdict.startswith("undecided")
 
 
 def test_which_configuration_stands_for_a_posture() -> None:
