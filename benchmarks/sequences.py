@@ -103,7 +103,7 @@ def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict
         "random": float(np.mean([errors[k].mean() for k in full])),
         "first": float(np.mean([errors[k][int(np.argmin(frames[k].cost))] for k in full])),
         "path": float(error(joints, truth).mean()),
-        "survivors of path": float(np.nanmean(error(survivors_of(frames, path), truth))),
+        "survivors of path": float(np.nanmean(error(survivors_of(frames, path.survivor[0]), truth))),
         "live": float(error(live, truth).mean()),
         "limbs": float(limbs_right(joints, truth, 0.0).mean()),
         "limbs of best": float(np.mean(best)),
@@ -114,12 +114,12 @@ def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict
     }
 
 
-def survivors_of(frames: list[SurvivorFrame], path: Paths) -> np.ndarray:
+def survivors_of(frames: list[SurvivorFrame], path: np.ndarray) -> np.ndarray:
     """Return the joints (T, 14, 3) of the survivors along a path; NaN where it is bridged."""
     return np.stack(
         [
             frame.joints[chosen] if chosen >= 0 else np.full((len(JOINTS), 3), np.nan)
-            for frame, chosen in zip(frames, path.survivor[0].tolist(), strict=True)
+            for frame, chosen in zip(frames, path.tolist(), strict=True)
         ]
     )
 
@@ -222,12 +222,15 @@ def sure(capture: Capture | None, seed: int) -> None:
     stated, true = [], []
     for number, (_, clip, _, scene) in enumerate(scenes(capture, 4)):
         found = noisy(scene.with_noise(2.0, np.random.default_rng(seed + number)), 2.0, real=bool(clip))
+        frames = costed(found, priors, clip, PRIOR_KINDS[2])
         for apart in (0.25, 0.5):
-            paths = best_paths(costed(found, priors, clip, PRIOR_KINDS[2]), k=2, apart=apart)
+            paths = best_paths(frames, k=2, apart=apart)
             if len(paths) < 2:
                 continue
-            differ = np.linalg.norm(paths.joints[0] - paths.joints[1], axis=-1).max(axis=1) > apart
-            away = [error(joints[differ], scene.joints_cam[differ]).mean() for joints in paths.joints]
+            # Where their survivors differ: what is expected along both is smooth, and differs less.
+            one, other = (survivors_of(frames, path) for path in paths.survivor)
+            differ = np.linalg.norm(one - other, axis=-1).max(axis=1) > apart
+            away = [error(joints[differ], scene.joints_cam[differ]).mean() for joints in (one, other)]
             stated.append(1 / (1 + math.exp(paths.cost[0] - paths.cost[1])))
             true.append(away[0] < away[1])
     edges = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
