@@ -22,8 +22,6 @@ from posekit.formats.motion import read_motion
 from posekit.formats.motion.urdf_folder import LINK_OF
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
-from posekit.recovery.judged import rigid_of
-from posekit.recovery.ranked import ranked
 from posekit.recovery.result import result_of
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
 from posekit.synthesis import Walker, walker_scene
@@ -37,10 +35,12 @@ class Recovered(NamedTuple):
     folder: Path
     joints: Array
     """Of the first survivor of every frame (F, 14, 3), camera frame."""
-    ranked: Array
+    answered: Array
+    """Of the answer's posture."""
+    probable: Array
     """Of the one that ranks first."""
     world: Array
-    """The ranked ones in the camera's world, y up."""
+    """The answers in the camera's world, y up."""
     counts: list[int]
     time: Array
 
@@ -57,9 +57,11 @@ def recovered(walking: View, tmp_path_factory: pytest.TempPathFactory) -> Recove
     files.write_result(folder / "result.json", result)
     files.write_view(folder / "view.json", walking)
     result = files.read_result(folder / "result.npz")
-    rigid = rigid_of(result.settings, len(result.frames))
-    ranking = ranked(result.frames, recovery.figure.lengths, rigid)
-    first = np.stack([frame.joints[ranking.of(k).order[0]] for k, frame in enumerate(result.frames)])
+    first = np.stack(
+        [frame.joints[answer.rows[0]] for frame, answer in zip(result.frames, recovery.answers, strict=True)]
+    )
+    order = [probability.argmax() for probability in recovery.probability]
+    probable = np.stack([frame.joints[k] for frame, k in zip(result.frames, order, strict=True)])
     model = walking.camera
     assert isinstance(model, OpenCVModel)
     assert model.R is not None
@@ -67,7 +69,8 @@ def recovered(walking: View, tmp_path_factory: pytest.TempPathFactory) -> Recove
     return Recovered(
         folder=folder,
         joints=np.stack([frame.joints[0] for frame in result.frames]),
-        ranked=first,
+        answered=first,
+        probable=probable,
         world=(first - model.t) @ model.R,
         counts=[len(frame.joints) for frame in result.frames],
         time=walking.time,
@@ -140,7 +143,7 @@ def test_a_result_stands_in_the_world_of_the_camera_that_it_holds(
     # An axis that is stated is that of the camera's frame.
     done = command("convert", tmp_path / "held.json", tmp_path / "level.trc", "--input-up", "-y")
     np.testing.assert_allclose(
-        read_trc(tmp_path / "level.trc")[0], held_level(recovered.ranked), rtol=0, atol=TO_WORLD
+        read_trc(tmp_path / "level.trc")[0], held_level(recovered.answered), rtol=0, atol=TO_WORLD
     )
 
 
@@ -172,8 +175,8 @@ def test_points_stand_in_the_camera_frame_or_its_world(
     assert done.code == 0, done.err
     assert "in the camera's frame, as if it were held level" in done.out
     points, _ = reader(out)
-    level = {"trc": held_level(recovered.ranked), "c3d": depth_ahead(recovered.ranked)}
-    np.testing.assert_allclose(points, level.get(name, recovered.ranked), rtol=0, atol=TO_WORLD)
+    level = {"trc": held_level(recovered.answered), "c3d": depth_ahead(recovered.answered)}
+    np.testing.assert_allclose(points, level.get(name, recovered.answered), rtol=0, atol=TO_WORLD)
 
 
 @pytest.mark.parametrize("up", ["+y", "+z", "-x"])
@@ -268,7 +271,7 @@ def test_bvh_and_glb_stand_upright(
     seen: bool, recovered: Recovered, command: Callable[..., Any], tmp_path: Path
 ) -> None:
     options = ["--view", recovered.folder / "view.json"] if seen else []
-    expected = recovered.world if seen else held_level(recovered.ranked)
+    expected = recovered.world if seen else held_level(recovered.answered)
     for name in ("bvh", "glb"):
         done = command("convert", recovered.folder / "result.npz", tmp_path / f"out.{name}", *options)
         assert done.code == 0, done.err
@@ -346,7 +349,7 @@ def test_all_survivors_in_a_table(
     expected = [result.frames[k].joints[row] for k, row in zip(frame, survivor, strict=True)]
     np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
     assert np.bincount(frame).tolist() == recovered.counts
-    np.testing.assert_allclose(points[rank == 1], recovered.ranked, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(points[rank == 1], recovered.probable, rtol=0, atol=1e-12)
     assert all(rank[frame == k].tolist() == list(range(1, n + 1)) for k, n in enumerate(recovered.counts))
     described = command("inspect", out)
     assert described.code == 0, described.err
@@ -424,7 +427,7 @@ def test_somebody_who_lies_needs_to_be_told_what_is_up(
     )
     assert "in the camera's frame, +x up" in tilted.out
     np.testing.assert_allclose(
-        read_table(tmp_path / "tilted.csv")[0][..., 1], recovered.ranked[..., 0], rtol=0, atol=TO_WORLD
+        read_table(tmp_path / "tilted.csv")[0][..., 1], recovered.answered[..., 0], rtol=0, atol=TO_WORLD
     )
 
 

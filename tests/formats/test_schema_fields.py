@@ -310,8 +310,8 @@ def test_a_camera_keeps_arrays_of_its_own() -> None:
 @pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
 def test_focal_lengths_scales_and_aspects_are_positive(value: float) -> None:
     for make, words in (
-        (lambda: LeeChenModel(f=value), "f must be positive and finite; got"),
-        (lambda: ScaledOrthographicModel(scale=value), "scale must be positive and finite; got"),
+        (lambda: LeeChenModel(f=value), r"f must be from 1e-09 to 1e\+09; got"),
+        (lambda: ScaledOrthographicModel(scale=value), r"scale must be from 1e-09 to 1e\+09; got"),
         (lambda: ScaledOrthographicModel(scale=None, aspect=value), "aspect must be positive and finite"),
     ):
         with pytest.raises(CameraError, match=words):
