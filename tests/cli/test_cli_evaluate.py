@@ -26,6 +26,11 @@ FRAMES = 12
 QUICK = ("--noise", "0,2", "--yaw-step", "90", "--heights", "1.5m", "--frames-per-clip", "3")
 
 
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture
 def run(run: Callable[..., Any]) -> Callable[..., Any]:
     """Return a way to run the command in this process, in a folder of its own."""
