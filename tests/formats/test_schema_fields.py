@@ -312,7 +312,10 @@ def test_focal_lengths_scales_and_aspects_are_positive(value: float) -> None:
     for make, words in (
         (lambda: LeeChenModel(f=value), r"f must be from 1e-09 to 1e\+09; got"),
         (lambda: ScaledOrthographicModel(scale=value), r"scale must be from 1e-09 to 1e\+09; got"),
-        (lambda: ScaledOrthographicModel(scale=None, aspect=value), r"aspect must be from 1e-09 to 1e\+09; got"),
+        (
+            lambda: ScaledOrthographicModel(scale=None, aspect=value),
+            r"aspect must be from 1e-09 to 1e\+09; got",
+        ),
     ):
         with pytest.raises(CameraError, match=words):
             make()

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.result import Result
+from posekit.safe_io.refusal import refusal
+from posekit.safe_io.regular_file import plain_suffix
 from posekit.safe_io.writing import check_target
+
+TABLE_SUFFIXES: Final = (".parquet", ".csv")
+"""Of tables of survivors, which are made of results."""
 
 
 def read_result(path: str | Path) -> Result:
@@ -41,6 +47,9 @@ def read_result(path: str | Path) -> Result:
 
 def check_result_path(path: str | Path) -> None:
     """Refuse a result's name before the work that it is for is done."""
+    if plain_suffix(path) in TABLE_SUFFIXES:
+        says = "write .npz, and then: posekit convert RESULT.npz TABLE --posture all"
+        raise refusal(path, "", f'the suffix "{plain_suffix(path)}"', "a result: .json or .npz", says)
     suffix(path, ".json", ".npz")
     check_target(path)
 
