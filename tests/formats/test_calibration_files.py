@@ -249,6 +249,17 @@ def test_pose2sim(tmp_path: Path) -> None:
     np.testing.assert_allclose(left.R, cv2.Rodrigues(np.array([1.688, 1.048, -0.419]))[0], atol=1e-12)
 
 
+def test_caliscope_has_a_matrix(tmp_path: Path) -> None:
+    R = rotation_from_vector(np.array([1.688, 1.048, -0.419]))
+    text = POSE2SIM.replace("[ 1.688, 1.048, -0.419]", json.dumps(R.round(12).tolist()))
+    camera = read_cameras(save(tmp_path, "config.toml", text))["left"]
+    assert camera.R is not None
+    np.testing.assert_allclose(camera.R, R, rtol=0, atol=1e-9)
+    mirrored = POSE2SIM.replace("[ 1.688, 1.048, -0.419]", json.dumps((-R).tolist()))
+    with pytest.raises(InputError, match=r"cam_01.rotation: .*mirrors"):
+        read_cameras(save(tmp_path, "mirrored.toml", mirrored))
+
+
 def test_anipose_says_no_up_and_has_the_boards_unit(tmp_path: Path) -> None:
     text = POSE2SIM.replace("fisheye = false\n", "").replace("[ 0.32, 0.95, 2.89]", "[ 320.0, 950.0, 2890.0]")
     path = save(tmp_path, "calibration.toml", text)

@@ -1,10 +1,10 @@
-"""Pose2Sim's and Anipose's calibration: TOML, a table a camera.
+"""Pose2Sim's, Anipose's and Caliscope's calibration: TOML, a table a camera.
 
-``[cam_0]`` has ``name``, ``size`` (width, height), ``matrix``, ``distortions``, ``rotation`` (Rodrigues vector, world
-to camera) and ``translation``; ``[metadata]`` follows (aniposelib, `Camera.get_dict` and `CameraGroup.dump`; Pose2Sim's
-documentation, "Calibration"). Pose2Sim gives every camera ``fisheye``, its translations are in metres and its world's z
-points up; Anipose writes ``fisheye`` for fisheye cameras alone, and its unit is that of the calibration board,
-mostly millimetres.
+``[cam_0]`` has ``name``, ``size`` (width, height), ``matrix``, ``distortions``, ``rotation`` (Rodrigues vector, of
+Caliscope a matrix, world to camera) and ``translation``; ``[metadata]`` follows (aniposelib, `Camera.get_dict` and
+`CameraGroup.dump`; Pose2Sim's documentation, "Calibration"). Pose2Sim gives every camera ``fisheye``, its
+translations are in metres and its world's z points up; Anipose writes ``fisheye`` for fisheye cameras alone, and its
+unit is that of the calibration board, mostly millimetres.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras.calibrated import SAYS_CALIBRATED, UP_AXES, CalibratedCamera
-from posekit.cameras.rotation import rotation_from_given_vector
+from posekit.cameras.rotation import rotation_from_given_vector, rotation_from_rounded
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.formats.cameras.fields import fitted, made, numbers, translation
@@ -105,7 +105,10 @@ def _three(value: Any, path: Path, field: str) -> np.ndarray:
 
 
 def _rotation(value: Any, path: Path, field: str) -> np.ndarray:
+    values = numbers(value, path, field)
     try:
+        if values.shape == (3, 3):  # as Caliscope has it
+            return rotation_from_rounded(values)
         return rotation_from_given_vector(_three(value, path, field))
     except CameraError as error:
         raise InputError(f"{path}: {field}: {error}; correct the file") from None
