@@ -78,25 +78,9 @@ def in_fork(
     if child == 0:
         code = CRASHED
         try:
-            os.setsid()
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-            os.dup2(out, 1)
-            os.dup2(out, 2)
-            sys.stdout, sys.stderr = (os.fdopen(stream, "w", errors="backslashreplace") for stream in (1, 2))
-            used = (
-                int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-            )
-            resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
-            resource.setrlimit(resource.RLIMIT_CPU, (processor, processor))
-            code = run_command(arguments)
-        except BaseException:
-            os.write(2, traceback.format_exc().encode(errors="replace"))
+            code = _run_alone(arguments, said, processor)
         finally:
-            for stream in (sys.stdout, sys.stderr):
-                stream.flush()
-            os._exit(code)
+            os._exit(code)  # whatever came: nothing of the parent's is taken away on a way out
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING_SIGNALS)
     started = time.monotonic()
     ends, killer = started + patience, kill[0]
@@ -115,6 +99,30 @@ def in_fork(
             continue
     os.waitpid(child, 0)
     return None
+
+
+def _run_alone(arguments: list[str], said: Path, processor: int) -> int:
+    """Run a command in this fork, within its limits, and return its exit code."""
+    code = CRASHED
+    try:
+        os.setsid()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        sys.stdout, sys.stderr = (os.fdopen(stream, "w", errors="backslashreplace") for stream in (1, 2))
+        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, used + MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (processor, processor))
+        code = run_command(arguments)
+    except BaseException:
+        os.write(2, traceback.format_exc().encode(errors="replace"))
+    finally:
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDING_SIGNALS)  # the command has ended
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    return code
 
 
 def tried(case: Case, seeds: Path, folder: Path) -> Outcome:

@@ -434,6 +434,9 @@ def test_damaged_colmap_pictures(text: str, says: str, tmp_path: Path) -> None:
 # Damaged files
 
 
+K_ROW = "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
@@ -449,6 +452,14 @@ def test_damaged_colmap_pictures(text: str, says: str, tmp_path: Path) -> None:
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nfisheye: maybe", "0 or 1"),
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ndistortion_model: omnidir", "undistort"),
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nk: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nK: 3", "twice"),
+        ("a.yml", f"{K_ROW}image_width: 640\nimage_heigth: 480\n", "image_heigth: got a field.*image_height"),
+        ("a.yml", f"{K_ROW}image_widht: 640\nimage_heigth: 480\n", "image_widht: got a field.*image_width"),
+        ("a.yml", f"{K_ROW}image_width: 640\n", "640 and nothing; expected width and height"),
+        ("a.yml", f"{K_ROW}image_width: 640\nimage_height: -480\n", "640 and -480; expected width and height"),
+        ("a.yml", f"{K_ROW}image_width: 640\nimage_height: 480.5\n", "480.5; expected width and height"),
+        ("a.yml", f"{K_ROW}distortion_model: plumb_bob\ndistortion_coeficients: [1, 0, 0, 0]\n", "not read"),
+        ("a.toml", POSE2SIM.replace("size =", "sise ="), "sise: got a field that is not read; expected size"),
+        ("a.toml", POSE2SIM.replace("distortions", "distortion"), "not read; expected distortions"),
         ("a.yml", "a: &x 1\nb: *x\n", "an anchor or an alias"),
         ("a.yml", "- 1\n- 2\n", "no 3x3 matrix"),
         ("a.yml", "just words", "named fields"),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -45,11 +46,26 @@ FISHEYE_NAMES: Final = ("fisheye_model", "fisheye", "use_fisheye_model")
 MODEL_NAMES: Final = ("distortion_model", "camera_model", "model")
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
+FIELD_KINDS: Final = (
+    DISTORTION_NAMES,
+    ROTATION_NAMES,
+    TRANSLATION_NAMES,
+    SIZE_NAMES,
+    WIDTH_NAMES,
+    HEIGHT_NAMES,
+    FISHEYE_NAMES,
+    MODEL_NAMES,
+)
+MISSPELT_RATIO: Final = 0.9
+"""How alike a field is to a name that it is not (difflib): two letters exchanged, or one more or less."""
+MISSPELT_LETTERS: Final = 6
+"""The shortest name that is looked for."""
 CAMERA_NAMES: Final = ("camera_name", "name", "id")
 METRES_IN_CAMERA_UNIT: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FARTHEST_CAMERA_METRES: Final = 100.0
 """Metres from the world's origin beyond which a camera is more likely in another unit."""
 MAX_CAMERAS: Final = 100_000
+LONGEST_FIELD: Final = 80
 MAX_SIDE: Final = 10**6
 """Rows or columns that a matrix may declare."""
 
@@ -134,6 +150,7 @@ def camera_of(
 ) -> CalibratedCamera:
     """Make one camera of its fields; those of several cameras have its `suffix`."""
     place = f"{cut(name)}."
+    refuse_misspelt(fields, FIELD_KINDS, f"{source}: {one_line(cut(name))}")
     K = numbers(_value(fields, MATRIX_NAMES, suffix), source, f"{place}K").reshape(3, 3)
     given = _value(fields, DISTORTION_NAMES, suffix)
     distortion = np.empty(0) if given is None else numbers(given, source, f"{place}distortion").ravel()
@@ -145,10 +162,39 @@ def camera_of(
         K=K,
         distortion=fitted(distortion, fisheye),
         fisheye=fisheye,
-        size=_size(fields, suffix),
+        size=_size(fields, suffix, source, place),
         R=R,
         t=t,
     )
+
+
+def refuse_misspelt(
+    fields: Mapping[str, Any],
+    kinds: Sequence[Sequence[str]],
+    source: str,
+    *,
+    ratio: float = MISSPELT_RATIO,
+    letters: int = MISSPELT_LETTERS,
+) -> None:
+    """Refuse a field that is all but one of the names of some kind, where there is none of that kind.
+
+    Raises
+    ------
+    InputError
+        With the field: left out in silence, the camera would be another.
+    """
+    ends = [*_suffixes(fields), ""]
+    known = {spelling for kind in kinds for name in kind for spelling in (name, name.replace("_", ""))}
+    keys = [key for key in (str(key).casefold() for key in fields) if key not in known]
+    for kind in kinds:
+        if any(_value(fields, tuple(kind), end) is not None for end in ends):
+            continue
+        long = [name for name in kind if len(name) >= letters]
+        for key in keys:
+            if near := difflib.get_close_matches(key[:LONGEST_FIELD], long, n=1, cutoff=ratio):
+                raise refusal(
+                    source, cut(key), "a field that is not read", near[0], "correct its name, or remove it"
+                )
 
 
 def made(source: str | Path, name: str, **parameters: Any) -> CalibratedCamera:
@@ -302,8 +348,8 @@ def _pose(
     return R, translation(t, source, f"{place}t", unit)
 
 
-def _size(fields: Mapping[str, Any], suffix: str) -> tuple[int, int] | None:
-    """Return width and height; None where the file says neither, or what it says is no size."""
+def _size(fields: Mapping[str, Any], suffix: str, source: str | Path, place: str) -> tuple[int, int] | None:
+    """Return width and height; None where the file says neither, or zero, as ROS does of a size that is not known."""
     for end in (suffix, ""):
         pair = [_value(fields, aliases, end) for aliases in (WIDTH_NAMES, HEIGHT_NAMES)]
         given = _value(fields, SIZE_NAMES, end)
@@ -311,9 +357,14 @@ def _size(fields: Mapping[str, Any], suffix: str) -> tuple[int, int] | None:
             given = given.get("data") if isinstance(given, Mapping) else given
             values = np.ravel(np.asarray(given, dtype=object))
             pair = values.tolist() if len(values) == 2 else pair
-        sides = [side for one in pair if (side := _side(one)) is not None]
-        if len(sides) == 2:
-            return sides[0], sides[1]
+        width, height = (_side(one) for one in pair)
+        if width and height:
+            return width, height
+        if any(one is not None for one in pair) and not width == height == 0:
+            got = " and ".join("nothing" if one is None else shown(one) for one in pair)
+            raise refusal(
+                source, f"{place}size", got, "width and height in pixels", "correct it, or leave it out"
+            )
     return None
 
 
@@ -322,7 +373,7 @@ def _side(value: Any) -> int | None:
     if array.size != 1 or array.dtype.kind not in "iuf":
         return None
     number = float(array.ravel()[0])
-    return int(number) if np.isfinite(number) and number > 0 and number.is_integer() else None
+    return int(number) if np.isfinite(number) and number >= 0 and number.is_integer() else None
 
 
 def _add(found: dict[str, CalibratedCamera], camera: CalibratedCamera, source: str | Path) -> None:

@@ -20,12 +20,13 @@ from posekit.cameras.calibrated import SAYS_CALIBRATED, UP_AXES, CalibratedCamer
 from posekit.cameras.rotation import rotation_from_given_vector, rotation_from_rounded
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.camera_format import CameraFormat
-from posekit.formats.cameras.fields import fitted, made, numbers, translation
+from posekit.formats.cameras.fields import fitted, made, numbers, refuse_misspelt, translation
 from posekit.geometry import vector_from_rotation
 from posekit.safe_io import cut, one_line, read_toml, refusal, shown, write_text
 
 MAX_BYTES: Final = 10_000_000
 ANIPOSE_UNIT: Final = "mm"
+TABLE_FIELDS: Final = ("size", "matrix", "distortions", "rotation", "translation", "fisheye")
 NO_CAMERAS: Final = ("metadata", "capture_volume", "charuco", "checkerboard")
 """Tables that Pose2Sim and Caliscope write beside the cameras."""
 
@@ -64,6 +65,9 @@ def _camera(
     table: dict[str, Any], path: Path, key: str, unit: str | float | None, up: str
 ) -> CalibratedCamera:
     place = cut(key)
+    refuse_misspelt(
+        table, [(one,) for one in TABLE_FIELDS], f"{path}: {one_line(place)}", ratio=0.75, letters=4
+    )
     name = table.get("name", key)
     if not isinstance(name, str | int) or isinstance(name, bool) or not str(name):
         raise refusal(path, f"{place}.name", shown(name), "a name", "correct it")
