@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError
+from posekit.formats.own.units import check_step
 from posekit.geometry import Array
 from posekit.robots.stretching import shoulders_are_behind
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
@@ -181,8 +180,7 @@ def _spread(
     if frames is not None and frames < 1:
         raise InputError(f"{frames} frames were asked for; ask for one or more")
     if dt is not None:
-        if not 0 < dt < math.inf:
-            raise InputError(f"dt is {dt:g} s; expected positive and finite")
+        check_step(dt)
         stride = max(1, round(dt * float(capture.fps[clip])))
         order = capture.order[known]
         return np.asarray(known[(order - order[0]) % stride == 0][:frames])

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from posekit.cameras import lee_chen
 from posekit.errors import InputError
-from posekit.formats.own.units import POSSIBLE_RATES
+from posekit.formats.own.units import check_step
 from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.observe import observe
 from posekit.synthesis.synthetic_scene import SyntheticScene
@@ -83,8 +83,7 @@ def walker_scene(
     """
     if frames < 1:
         raise InputError(f"the walker has {frames} frames; ask for one or more")
-    if not 1 / POSSIBLE_RATES[1] <= dt <= 1 / POSSIBLE_RATES[0]:
-        raise InputError(f"dt is {dt:g} s; expected seconds from frame to frame, as 0.2")
+    check_step(dt)
     if not math.isfinite(phase0):
         raise InputError(f"phase0 is {phase0:g}; expected finite, in cycles")
     position, aim = np.asarray(camera, dtype=np.float64), np.asarray(target, dtype=np.float64)

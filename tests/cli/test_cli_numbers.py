@@ -51,6 +51,7 @@ def test_no_option_takes_what_is_not_finite(
 BEYOND = [
     (("synth", "walker", "-o", "a.json", "--dt", "1e308"), "dt is 1e+308 s"),
     (("synth", "walker", "-o", "a.json", "--dt", "1e-300"), "dt is 1e-300 s"),
+    (("synth", "mocap", "walk.npz", "-o", "a.json", "--dt", "1e308"), "dt is 1e+308 s"),
     (("render", "view.json", "-o", "a.gif", "--fps", "1e-300"), "1e-300 pictures a second"),
     (("render", "view.json", "-o", "a.gif", "--turntable", "9" * 20), "a turn of 99,999"),
     (("recover", "view.json", "-o", "a.json", "--fps", "1e308"), "--fps"),
@@ -64,8 +65,9 @@ def test_numbers_that_nobody_means_are_named(
     arguments: tuple[str, ...], says: str, run: Callable[..., Any], assert_refused: Callable[..., None]
 ) -> None:
     Path("points.json").write_text('[{"keypoints": []}]')
+    assert run("convert", "view.json", "walk.npz").code == 0
     assert_refused(run(*arguments), says)
-    assert {path.name for path in Path().iterdir()} == {"view.json", "points.json"}
+    assert {path.name for path in Path().iterdir()} == {"view.json", "points.json", "walk.npz"}
 
 
 @pytest.mark.parametrize("kind", ["walker", "random"])

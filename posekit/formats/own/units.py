@@ -10,6 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from posekit.errors import InputError
 from posekit.safe_io.refusal import refusal, shown
 
 Unit = Literal["m", "cm", "mm"]
@@ -86,3 +87,16 @@ def parse_length(text: str, *, name: str = "") -> float:
     if number < 0:
         raise refusal(name, "", shown(text), "a length of zero or more", "remove the sign")
     return float(Decimal(match[1]).scaleb(_EXPONENTS[match[2]]))
+
+
+def check_step(dt: float) -> None:
+    """Refuse seconds from frame to frame that nobody means.
+
+    Raises
+    ------
+    InputError
+        Where they are not between those of `POSSIBLE_RATES`.
+    """
+    low, high = POSSIBLE_RATES
+    if not 1 / high <= dt <= 1 / low:
+        raise InputError(f"dt is {dt:g} s; expected seconds from frame to frame, as 0.2")
