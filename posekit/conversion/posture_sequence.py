@@ -251,9 +251,9 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         else []
     )
     if posture in LIKELIEST_WORDS and max(map(len, probability)) > 1:
-        says.append(
-            f"the likeliest posture of each frame, {percent(float(np.median(sure)))} sure (median); all: --posture all"
-        )
+        single = f"the likeliest posture of each frame, {percent(float(np.median(sure)))} sure (median)"
+        jumps = result.paths is None and len(result.frames) > 1
+        says.append(f"{single}; all: --posture all{'; without jumps: recover --follow 1' if jumps else ''}")
     points, up = _placed(
         points, result.camera if view is None else view.camera, stated, says, told=view is not None
     )

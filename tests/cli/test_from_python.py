@@ -69,6 +69,7 @@ def test_what_is_converted_is_the_answer(file: str, recovery: posekit.Recovery) 
         np.testing.assert_allclose(written["joints"], [one.posture for one in answers], rtol=0, atol=1e-6)
     sure = float(np.median([one.sure for one in answers]))
     assert said[0].startswith(f"the likeliest posture of each frame, {percent(sure)} sure")
+    assert said[0].endswith("; without jumps: recover --follow 1")
 
 
 def test_a_page_is_the_commands(file: str, command) -> None:
