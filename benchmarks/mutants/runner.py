@@ -70,7 +70,10 @@ def chosen_tests(
     rooms = {room for part in mutant.file.split("/")[1:] for room in (part, *ALSO_NEAR.get(part, ()))}
     near = {name for name in seconds if name.split("/")[1] in rooms}
     of_file = {name for name in lines.get(0, set()) if name in seconds}
-    of_line = (of_file | near) if mutant.on_loading else lines.get(mutant.line, of_file) & of_file
+    own = lines.get(mutant.line, of_file) & of_file
+    # A line that no test runs was run by whatever was imported first: any of them may read what it made.
+    loading = mutant.on_loading or not own
+    of_line = of_file | near if loading else own
     chosen: list[str] = []
     total = 0.0
     for names, limit in (
@@ -82,7 +85,9 @@ def chosen_tests(
         for name in names:
             held.setdefault(name.split("::")[0], []).append(seconds[name])
         mean = {name: sum(held[file]) / len(held[file]) for name in names for file in [name.split("::")[0]]}
-        for name in sorted(names, key=lambda n: (n not in of_file, n not in near, mean[n], seconds[n], n)):
+        for name in sorted(
+            names, key=lambda n: (not loading and n not in of_file, n not in near, mean[n], seconds[n], n)
+        ):
             if total + seconds[name] <= limit or not chosen:
                 chosen.append(name)
                 total += seconds[name]

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from posekit.body import load_figure
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, SEGMENTS
-from posekit.validators.motion import MotionClip
+from posekit.validators.motion import MotionClip, trembling
 from posekit.validators.motion.drift import Drift
 from posekit.validators.motion.duplicates import duplicates
-from posekit.validators.motion.trembling import _evidence, trembling_of, usual_trembling
+from posekit.validators.motion.trembling import _evidence, trembling_frames, trembling_of, usual_trembling
 
 UP = np.array([0.0, 0.0, 1.0])
 BODY = load_figure().neutral_points[: len(JOINTS)]
@@ -157,3 +157,23 @@ def test_evidence_is_a_ratio_of_likelihoods_of_normal_noise(
         assert found[frame] == pytest.approx(np.clip(ratio, -6.0, 6.0))
     still = _evidence(0.05 * rough, 50, 69, numbers)
     assert (still == 0).all()  # less than 2 mm is no trembling
+
+
+def test_places_are_judged_as_three_numbers_and_lengths_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int]] = []
+
+    def evidence(rough: Array, first: int, last: int, numbers: int) -> Array:
+        asked.append((rough.shape[1], numbers))
+        return _evidence(rough, first, last, numbers)
+
+    monkeypatch.setattr(trembling, "_evidence", evidence)
+    joints = along(0.01 * np.arange(200))
+    knee = JOINT["left_knee"]
+    joints[80:120, knee] += np.random.default_rng(8).normal(0.0, 0.02, (40, 3))
+    hot = np.zeros((200, 14), dtype=bool)
+    hot[78:123, knee] = True
+    found = trembling_frames(joints, hot)
+    assert asked == [(1, 3), (len([1 for segment in SEGMENTS if knee in segment]), 1)]
+    assert set(np.flatnonzero(found.any(axis=0)).tolist()) == {knee}
+    at = np.flatnonzero(found[:, knee])
+    assert abs(at[0] - 80) <= 1 and abs(at[-1] - 119) <= 1 and (np.diff(at) == 1).all()
