@@ -73,21 +73,20 @@ def chosen_tests(
     own = lines.get(mutant.line, of_file) & of_file
     # A line that no test runs was run by whatever was imported first: any of them may read what it made.
     loading = mutant.on_loading or not own
-    of_line = of_file | near if loading else own
+    beside = tested + FILE_SECONDS * tested / TESTED_SECONDS
+    if loading:
+        rounds = (near & of_file, tested / 2), (near - of_file, tested), (of_file - near, beside)
+    else:
+        rounds = (own & near, tested), (own - near, tested), ((near & of_file) - own, beside)
     chosen: list[str] = []
     total = 0.0
-    for names, limit in (
-        (of_line, tested),
-        ((near & of_file) - of_line, tested + FILE_SECONDS * tested / TESTED_SECONDS),
-    ):
+    for names, limit in rounds:
         # Of one file together, which costs its import: those of the file whose tests are the fastest come first.
         held: dict[str, list[float]] = {}
         for name in names:
             held.setdefault(name.split("::")[0], []).append(seconds[name])
         mean = {name: sum(held[file]) / len(held[file]) for name in names for file in [name.split("::")[0]]}
-        for name in sorted(
-            names, key=lambda n: (not loading and n not in of_file, n not in near, mean[n], seconds[n], n)
-        ):
+        for name in sorted(names, key=lambda n: (mean[n], seconds[n], n)):
             if total + seconds[name] <= limit or not chosen:
                 chosen.append(name)
                 total += seconds[name]

@@ -326,6 +326,7 @@ def test_every_check_has_its_unit_and_judges_whoever_stands(ranges: str, mode: A
             assert check.unit == OF_RULES[int(check.where[0][4])] and check.scope is Scope.MOTION
         else:
             assert check.unit == UNITS[check.name] and check.scope is Scope.POSTURE
+        assert getattr(check, "exact", True) and getattr(check, "contact_margin", 0.0) == 0.0
         assert check.rigid == (check.name == "rigid_parts") and check.slow == (check.name == "collision")
         assert (check.noise is Loosening.DIRECTIONS) == (check.name == "joint_range")
         if check.name == "joint_range":

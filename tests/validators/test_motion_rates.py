@@ -75,6 +75,7 @@ def test_joint_velocities_are_not_asked_without_limits() -> None:
     assert "no velocity limits" in verdict.not_asked["joint-velocity"]
     unknown = replace(robot(np.zeros((3, 3)), np.ones(3)), velocity_limits=None)
     assert "no configurations" in judge_motion([JointVelocity()], unknown).not_asked["joint-velocity"]
+    assert JointVelocity().places(unknown) == ()
     people = MotionClip(joints=np.zeros((3, len(JOINTS), 3)), time=np.arange(3) / 50.0, rate=50.0)
     assert "no configurations" in judge_motion([JointVelocity()], people).not_asked["joint-velocity"]
 

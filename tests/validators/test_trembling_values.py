@@ -117,6 +117,17 @@ def test_trembling_is_the_deviation_of_a_coordinate(deviation: float) -> None:
     assert usual_trembling(joints) == pytest.approx(deviation, rel=0.02)
 
 
+@pytest.mark.parametrize("turn", [1.6, 2.0, 2.6])
+def test_of_what_turns_fast_the_curvature_is_taken_off(turn: float) -> None:
+    """On a circle of radius r a sixth difference is (2 sin ω/2)⁶ r long, a second one over three frames 2 - 2 cos 3ω."""
+    way = 0.1 * np.stack([np.cos(turn * np.arange(60)), np.sin(turn * np.arange(60)), np.zeros(60)], axis=1)
+    rough = 0.1 * (2 * np.sin(turn / 2)) ** 6 / np.sqrt(924) / 1.5382
+    curved = 0.3 * 0.1 * (2 - 2 * np.cos(3 * turn)) / 9.0
+    found = trembling_of(BODY + way[:, None])
+    np.testing.assert_allclose(found[12:-14], max(rough - curved, 0.0), rtol=1e-6)
+    assert rough > curved > 0
+
+
 def test_what_is_smooth_does_not_tremble_and_few_frames_say_nothing() -> None:
     time = np.arange(60) / 30.0
     assert np.nanmax(trembling_of(along(time**5 - time))) < 1e-9
