@@ -230,14 +230,16 @@ def test_poses_of_exact_points_are_the_truth_with_the_deviation_of_its_jacobian(
     assert found.freedom.tolist() == [2] * 6 and found.found[:, 0].all()
     ray = neck / np.linalg.norm(neck, axis=1, keepdims=True)
     # Numerically: the pose as a function of the image, a pixel at a time.
-    variance = np.zeros(6)
+    directions = [ray, *(np.tile(axis, (6, 1)) for axis in np.eye(3))]
+    variance = np.zeros((4, 6))
     for point in range(4):
         for axis in range(2):
             moved = image.copy()
             moved[:, point, axis] += 1e-2
             other = poses(CAMERA, TORSO, moved, np.full((6, 4), 2.0), np.zeros(4)).origin[:, 0]
-            variance += (np.einsum("fi,fi->f", other - neck, ray) / 1e-2 * 2.0) ** 2
-    np.testing.assert_allclose(found.deviation(ray)[:, 0], np.sqrt(variance), rtol=0.05)
+            variance += [(np.einsum("fi,fi->f", other - neck, way) / 1e-2 * 2.0) ** 2 for way in directions]
+    for way, expected in zip(directions, variance, strict=True):
+        np.testing.assert_allclose(found.deviation(way)[:, 0], np.sqrt(expected), rtol=0.05)
     # An offset of the body's points counts as so many pixels at their depth.
     offset = poses(CAMERA, TORSO, image, np.zeros((6, 4)), np.full(4, 0.01))
     pixels = 0.01 * 1000.0 / neck[:, 2]

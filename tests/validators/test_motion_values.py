@@ -290,6 +290,13 @@ def test_at_more_frames_a_second_the_same_is_displaced(rate: float) -> None:
         np.testing.assert_allclose(found[81 : 81 + count], 1.0 - 5.0 * (count / rate) ** 2, atol=1e-9)
 
 
+@pytest.mark.parametrize("count", [6, 8, 10])
+def test_what_takes_longer_than_a_sixth_of_a_second_is_never_displaced_as_a_whole(count: int) -> None:
+    way = np.clip((np.arange(90) - 40) / count, 0.0, 1.0)
+    found = displaced_by(along(way), 1.0 / 30.0)
+    assert np.nanmax(found, initial=0.0) < 1.0 - 5.0 * (count / 30.0) ** 2 - 0.05
+
+
 def test_without_a_rate_only_what_is_displaced_at_once_is_found() -> None:
     way = 0.3 * (np.arange(40) > 20)
     found = displaced_by(along(way), np.nan)

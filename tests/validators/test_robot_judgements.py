@@ -480,6 +480,7 @@ def test_contacts_are_sought_among_the_pairs_that_there_are() -> None:
         subject, subject.geometry, at((0, 0, 0)), np.array([0]), margins=margins, nearest=True
     )
     assert found.violated.tolist() == [False] and found.distance[0] > 0
+    assert len(find_contacts(subject, subject.geometry, at((0, 0, 0)), np.array([0]), margins=margins)) == 0
     none = find_contacts(
         subject, subject.geometry, at((0, 0, 0)), np.array([], dtype=np.intp), margins=margins
     )

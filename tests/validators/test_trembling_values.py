@@ -97,6 +97,16 @@ def test_a_length_that_is_off_for_a_frame_or_two_does_not_drift(frames: int) -> 
     assert np.abs(Drift().judge(clip_of(joints)).value).max() < 1e-9
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_at_its_ends_a_clip_has_the_lengths_of_its_last_frames(turned: bool) -> None:
+    joints = along(np.arange(40) / 30.0)
+    joints[:2, JOINT["left_ankle"]] += 0.1 * (BODY[JOINT["left_ankle"]] - BODY[JOINT["left_knee"]])
+    clip = clip_of(joints[::-1] if turned else joints)
+    found = Drift().judge(clip).value[:, Drift().places(clip).index("left_knee-left_ankle")]
+    expected = np.where(np.arange(40) < 2, 0.1, 0.0)
+    np.testing.assert_allclose(found, expected[::-1] if turned else expected, atol=1e-9)
+
+
 @pytest.mark.parametrize(("noise", "times"), [(0.001, 4.0), (0.004, 4.0)])
 def test_noise_of_measuring_may_move_a_length_by_four_deviations(noise: float, times: float) -> None:
     clip = clip_of(along(np.arange(60) / 30.0), noise=noise)
@@ -119,7 +129,7 @@ def test_trembling_is_the_deviation_of_a_coordinate(deviation: float) -> None:
 
 @pytest.mark.parametrize("turn", [1.6, 2.0, 2.6])
 def test_of_what_turns_fast_the_curvature_is_taken_off(turn: float) -> None:
-    """On a circle of radius r a sixth difference is (2 sin ω/2)⁶ r long, a second one over three frames 2 - 2 cos 3ω."""
+    """On a circle of radius r a sixth difference is (2 sin ω/2)⁶ r long, a second over three frames 2 - 2 cos 3ω."""
     way = 0.1 * np.stack([np.cos(turn * np.arange(60)), np.sin(turn * np.arange(60)), np.zeros(60)], axis=1)
     rough = 0.1 * (2 * np.sin(turn / 2)) ** 6 / np.sqrt(924) / 1.5382
     curved = 0.3 * 0.1 * (2 - 2 * np.cos(3 * turn)) / 9.0
