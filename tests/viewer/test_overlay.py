@@ -123,7 +123,7 @@ def test_bodies_are_drawn_over_those_of_the_photograph(
     for k, shown in enumerate(person.frames):
         photograph = read_image(folder / f"{k:06}.png")
         empty = np.asarray(Image.new("RGB", SIZE, photograph.getpixel((0, 0))))
-        sky = (np.asarray(photograph) == empty).all(axis=2)[: SIZE[1] * 2 // 3 - 2]
+        sky = (np.asarray(photograph) == empty).all(axis=2)[: int(K[1, 2]) - 2]
         painted = paint(photograph, [DrawnPerson(shown=shown, figure=person.figure, points=False)])
         changed = (np.asarray(painted) != np.asarray(photograph)).any(axis=2)[: len(sky)]
         body = ~sky
@@ -426,3 +426,22 @@ def test_a_result_says_which_pictures_a_detector_read(
     assert render(monkeypatch, tmp_path / "r.npz", "--over", shuffled, "-o", tmp_path / "over") == 0
     assert "by file names" in capsys.readouterr().out
     assert sorted(file.name for file in (tmp_path / "over").iterdir()) == [f"00000{k}.png" for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "horizon"), [(0.0, 134.5), (10.0, 68.4), (-10.0, 200.6), (80.0, -np.inf)]
+)
+def test_a_photographs_horizon_is_where_the_camera_sees_it(
+    degrees: float, horizon: float, walk: View, tmp_path: Path
+) -> None:
+    """A camera that looks down by an angle has it above the middle, by the focal length times its tangent."""
+    tilt = np.radians(degrees)
+    R = np.array([[1, 0, 0], [0, -np.sin(tilt), -np.cos(tilt)], [0, np.cos(tilt), -np.sin(tilt)]])
+    view = seen_by(walk, None)
+    camera = OpenCVModel(K=K, size=SIZE, R=R, t=np.zeros(3), up="+z")
+    nobody = replace(view, camera=camera)
+    write_photographs(tmp_path / "pictures", nobody)
+    column = np.asarray(Image.open(tmp_path / "pictures/000000.png"))[:, 0].astype(int)
+    rows = np.arange(SIZE[1])
+    sky = column[:, 2] > column[:, 0]
+    np.testing.assert_array_equal(sky, rows < horizon)

@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw
 
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, View
+from posekit.geometry import Array
 from posekit.safe_io.writing import check_target, make_folder, replacing
 from posekit.viewer.overlay.figure_painter import DrawnPerson, outlines
 from posekit.viewer.scene.drawn_subject import subject_of
@@ -90,7 +91,7 @@ def write_photographs(path: Path, view: View) -> int:
 def photographs(view: View, size: tuple[int, int]) -> Iterator[Image.Image]:
     """Paint the frames of a view, one after another; a frame without truth shows nobody."""
     subject = subject_of(view)
-    empty = _empty(size)
+    empty = _empty(size, view, subject.R_cam_world)
     for shown in subject.frames:
         picture = empty.copy()
         if len(shown) and shown.sight is not None:
@@ -103,8 +104,12 @@ def photographs(view: View, size: tuple[int, int]) -> Iterator[Image.Image]:
         yield picture
 
 
-def _empty(size: tuple[int, int]) -> Image.Image:
-    """Return a room in which nobody is."""
-    picture = Image.new("RGB", size, SKY_RGB)
-    ImageDraw.Draw(picture).rectangle((0, size[1] * 2 // 3, *size), fill=FLOOR_RGB)
-    return picture
+def _empty(size: tuple[int, int], view: View, R_cam_world: Array | None) -> Image.Image:
+    """Return a plain in which nobody is, its horizon where the camera sees it; one that is not placed is level."""
+    assert isinstance(view.camera, OpenCVModel)
+    up = np.array([0.0, -1.0, 0.0]) if R_cam_world is None else R_cam_world[:, 2]
+    # The ray through a pixel, K^-1 (u, v, 1), points above the horizon where its part along up is positive.
+    across, down, rest = np.linalg.solve(np.asarray(view.camera.K).T, up)
+    u, v = np.arange(size[0]), np.arange(size[1])
+    above = across * u + (down * v)[:, None] + rest > 0
+    return Image.fromarray(np.where(above[..., None], SKY_RGB, FLOOR_RGB).astype(np.uint8))
