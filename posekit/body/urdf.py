@@ -37,10 +37,18 @@ def read_text(path: Path) -> str:
 
 
 def write_texts(path: Path, urdf: str, srdf: str) -> None:
-    """Write a URDF, and its SRDF beside it: each whole or not at all."""
-    for target, text in ((path.with_suffix(".srdf"), srdf), (path, urdf)):
+    """Write a URDF, and its SRDF beside it: each whole or not at all, and no new SRDF alone."""
+    beside = path.with_suffix(".srdf")
+    new = not beside.exists()
+    with as_figure_error():
+        write_text(beside, [srdf])
+    try:
         with as_figure_error():
-            write_text(target, [text])
+            write_text(path, [urdf])
+    except FigureError:
+        if new:
+            beside.unlink(missing_ok=True)
+        raise
 
 
 def parse(text: str, source: str) -> ElementTree.Element:

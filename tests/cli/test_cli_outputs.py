@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from posekit.errors import InputError
+from posekit.safe_io import write_text
 from posekit.skeleton import DOFS
 
 LONG = "x" * 300
@@ -92,6 +94,29 @@ def test_a_disk_that_takes_nothing_is_one_line(
     assert outcome.code == 2
     assert "Read-only file system" in outcome.err
     assert outcome.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_figure_that_cannot_be_written_leaves_no_new_srdf(
+    there: bool,
+    run: Callable[..., Any],
+    walk: dict[str, Any],
+    assert_refused: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Path("view.json").write_text(json.dumps(walk))
+    if there:
+        Path("f.srdf").write_text("mine")
+    written = write_text
+
+    def full(path: Path, pieces: Any) -> None:
+        if path.suffix == ".urdf":
+            raise InputError(f"{path}: got No space left on device")
+        written(path, pieces)
+
+    monkeypatch.setattr("posekit.body.urdf.write_text", full)
+    assert_refused(run("recover", "view.json", "-o", "a.json", "--write-urdf", "f.urdf"), "No space left")
+    assert {path.name for path in Path().iterdir()} == {"view.json", *(["f.srdf"] if there else [])}
 
 
 SIGNALS_COME = {
