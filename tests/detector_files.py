@@ -54,12 +54,12 @@ def view_keypoints(view: View, format: str, skeleton: str = "") -> KeyPoints:
         time=view.time,
         frame=np.arange(len(view)),
         person=np.zeros(len(view), dtype=np.intp),
-        points=scatter(layout, _landmarks(np.concatenate([view.image, view.head_image], axis=1))),
-        confidence=scatter(layout, _landmarks(view.confidence[..., None]))[..., 0],
+        points=scatter(layout, landmarks_of(np.concatenate([view.image, view.head_image], axis=1))),
+        confidence=scatter(layout, landmarks_of(view.confidence[..., None]))[..., 0],
     )
 
 
-def _landmarks(values: np.ndarray) -> np.ndarray:
+def landmarks_of(values: np.ndarray) -> np.ndarray:
     """Add the girdles' middles to joints and head points (F, 19, n)."""
     found = np.full((len(values), len(LANDMARK_ORDER), values.shape[-1]), np.nan)
     found[:, : len(JOINTS) + len(HEAD)] = values

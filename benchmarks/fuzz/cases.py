@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import typer.main
 
+from benchmarks.fuzz.others import write_cameras_of_others, write_choices, write_points_of_others
 from posekit.cli.main import application
 from posekit.formats.keypoints import key_point_formats
 from posekit.formats.own import read_view, schema_text
@@ -32,7 +33,8 @@ COMMANDS: Final = {
     "motion": POSTURE_COMMANDS,
     "result": RESULT_COMMANDS,
     "view": ("recover IN -o OUT.json", "inspect IN", "recover IN -o OUT.npz --deviation 1"),
-    "key points": ("inspect IN", "recover IN -o OUT.json --fov 60 --stature 175cm --size 1280x720"),
+    "key points": ("inspect IN", "recover IN -o OUT.json --fov 60 --stature 175cm --size 1920x1080"),
+    "points": ("inspect IN", "validate IN -o OUT.json --rate 30", "convert IN OUT.npz --fps 30"),
     "camera": ("recover SEEDS/keypoints -o OUT.json --stature 175cm --camera IN",),
     "ranges": ("validate SEEDS/walk.npz -o OUT.json --ranges IN",),
     "profile": ("validate SEEDS/walk.npz -o OUT.json --profile IN",),
@@ -41,6 +43,18 @@ COMMANDS: Final = {
     "robot": ("validate SEEDS/robot.npz -o OUT.json --urdf IN", "inspect IN"),
     "robot motion": ("validate IN -o OUT.json --urdf g1", "inspect IN"),
     "report": ("inspect IN",),
+    "object": (
+        "inspect IN",
+        "convert IN OUT.trc",
+        "render IN -o OUT.html",
+        "validate IN -o OUT.json --urdf panda",
+    ),
+    "survivors": ("inspect IN", "validate IN -o OUT.json"),
+    "nearer": ("recover SEEDS/photo.json -o OUT.json --nearer IN", "inspect IN"),
+    "lengths": (
+        "recover SEEDS/keypoints -o OUT.json --camera SEEDS/calibration.toml --lengths IN --stature 175cm",
+        "inspect IN",
+    ),
 }
 """Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files."""
 OPTION_COMMANDS: Final = (
@@ -157,7 +171,20 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
         seeds["key points"] += [path] if path.is_file() else sorted(path.glob("*.*"))[:1]
     shutil.copy(next(iter((folder / "keypoints").iterdir())), folder / "openpose_keypoints.json")
     seeds["key points"].append(folder / "openpose_keypoints.json")
-    seeds["camera"] = [folder / "calibration.toml"]
+    write_keypoints(folder / "mediapipe.csv", view_keypoints(view, "mediapipe"), "mediapipe")
+    seeds["key points"].append(folder / "mediapipe.csv")
+    seeds["camera"] = write_cameras_of_others(folder)
+    seeds["points"] = write_points_of_others(folder)
+    seeds |= write_choices(folder)
+    run(["recover", str(folder / "walk.json"), "-o", str(folder / "result.json.gz")])
+    seeds["result"].append(folder / "result.json.gz")
+    gripper = ["recover", str(folder / "gripper.json"), "-o", str(folder / "object.json")]
+    run([*gripper, "--linkage", "panda", "--scale", "closure"])
+    seeds["object"] = [folder / "object.json"]
+    for ending in ("csv", "parquet"):
+        path = folder / f"survivors.{ending}"
+        run(["convert", str(folder / "result.npz"), str(path), "--posture", "all"])
+        seeds["survivors"].append(path)
     built_in = Path(find("stick_figure").urdf).parent
     for kind, pattern in (
         ("ranges", "ranges"),
