@@ -184,6 +184,9 @@ def test_bad_guesses_are_refused() -> None:
         camera_from_fov((640, 480), 60.0, "width")  # type: ignore[arg-type]
     with pytest.raises(CameraError, match="whole numbers"):
         camera_from_fov((640, 0), 60.0)
+    with pytest.raises(CameraError, match="whole numbers above 0"):
+        camera_from_fov((10**6 + 1, 480), 60.0)
+    assert camera_from_fov((10**6, 480), 60.0).size == (10**6, 480)
     for mm in (0.0, math.nan, -3.0):
         with pytest.raises(CameraError, match="mm"):
             camera_from_focal35((640, 480), mm)
