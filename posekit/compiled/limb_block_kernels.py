@@ -110,7 +110,7 @@ def limb_room() -> Any:
     """Make room for one limb.
 
     How its points' image moves (4, 3) and by how much it is off (4,); its angles (3, 4), what is judged of them (3, 4),
-    and what walls say (5, 4); derivatives of both (4, 7), (4, 6).
+    and what walls say (5, 4); derivatives of what is judged (4, 7) and of the image (4, 6); and tangents (4, 3).
     """
     return (
         np.empty((4, 3)),
@@ -120,6 +120,7 @@ def limb_room() -> Any:
         np.empty((5, 4)),
         np.empty((4, 7)),
         np.empty((4, 6)),
+        np.empty((4, 3)),
     )
 
 
@@ -160,7 +161,7 @@ def limb_block(
     """
     at, u = AT_LIMBS + 2 * limb, AT_DIRECTIONS + 6 * limb
     first, second = s[at], s[at + 1]
-    A, r, g, o, q, J, rows = room
+    A, r, g, o, q, J, rows, _ = room
     x, y, z = start[0] + first * s[u], start[1] + first * s[u + 1], start[2] + first * s[u + 2]
     see(d, x, y, z, LIMB_MIDDLES[limb], r[:2], A[:2])
     see(d, x + second * s[u + 3], y + second * s[u + 4], z + second * s[u + 5], LIMB_ENDS[limb], r[2:], A[2:])
@@ -280,8 +281,7 @@ def limb_value(
     """Return one limb's chi2, and write down which limits (4,) it passes; NaN where a judge must be asked."""
     at, u = AT_LIMBS + 2 * limb, AT_DIRECTIONS + 6 * limb
     first, second = s[at], s[at + 1]
-    A, r, g, o, q, J, _ = room
-    tangents = J[:, :3]
+    A, r, g, o, q, _, _, tangents = room
     x, y, z = start[0] + first * s[u], start[1] + first * s[u + 1], start[2] + first * s[u + 2]
     see(d, x, y, z, LIMB_MIDDLES[limb], r[:2], A[:2])
     see(d, x + second * s[u + 3], y + second * s[u + 4], z + second * s[u + 5], LIMB_ENDS[limb], r[2:], A[2:])
@@ -402,7 +402,7 @@ def fit_limbs(
                     break
                 move_limb(now, limb, step, tangents, width, trial)
                 new = limb_value(trial, d, f, limb, start, ends[limb], W[limb], room, nothing, passed)
-                if math.isnan(new) and not math.isnan(value):
+                if math.isnan(new):
                     asked[m, limb] = True
                     break
                 better, ran = new <= value, False

@@ -221,7 +221,7 @@ def descend_postures(
             active += passed[k] != 0
         for turn in range(int(h[MOST_STEPS]) + 1):
             place_trunk(now, offsets)
-            joint_jacobian(now, f, offsets, J)
+            joint_jacobian(now, offsets, J)
             slack = trunk_block(now, d, f, apart, offsets, watch, room, matrix, gradient, P, g)[1]
             folds, unclear = 0, False
             if whole:

@@ -2,17 +2,8 @@
 
 from __future__ import annotations
 
-AT_ROOT, AT_TORSO, AT_HIPS, AT_HEAD, AT_DIRECTIONS, AT_SHAPE, AT_LIMBS, STATE_WIDTH = (
-    0,
-    3,
-    12,
-    21,
-    30,
-    54,
-    63,
-    71,
-)
-"""A posture: root, three rotations row by row, directions of limbs' segments, the trunk's shape, lengths of limbs."""
+AT_ROOT, AT_TORSO, AT_HIPS, AT_HEAD, AT_DIRECTIONS, AT_SHAPE, AT_LIMBS = 0, 3, 12, 21, 30, 54, 63
+"""A posture (71,): root; torso, hips and head, row by row; directions of segments; trunk's shape; limbs' lengths."""
 
 AT_CAMERA, ROOT_PRIOR, ROOT_WEIGHT, AT_FREE, AT_POINTS = 0, 12, 15, 24, 28
 """What was seen of it: the camera; where the neck is known to be, and its whitening; limbs without limits; points.

@@ -78,7 +78,7 @@ def tabulate_trunks(
     for n in range(len(states)):
         s, d = states[n], data[n]
         place_trunk(s, offsets)
-        joint_jacobian(s, f, offsets, J)
+        joint_jacobian(s, offsets, J)
         trunk_block(s, d, f, apart, offsets, nothing, room, matrix[n], gradient[n], P, g)
         gather_trunk(J, P, g, matrix[n], gradient[n], moving)
         curve(offsets, g, matrix[n])
@@ -131,7 +131,7 @@ def tabulate_limbs(
     for m in range(len(states)):
         s, d = states[m], data[m]
         place_trunk(s, offsets)
-        joint_jacobian(s, f, offsets, J)
+        joint_jacobian(s, offsets, J)
         for limb in range(LIMB_COUNT):
             joint = LIMB_STARTS[limb]
             turn = TURN_TORSO if limb < FIRST_LEG or f[LEGS_ON_TORSO] > 0.0 else TURN_HIPS
@@ -248,7 +248,7 @@ def know_postures(
     for n in range(len(states)):
         s, d = states[n], data[n]
         place_trunk(s, offsets)
-        joint_jacobian(s, f, offsets, J)
+        joint_jacobian(s, offsets, J)
         trunk_block(s, d, f, apart, offsets, nothing, room, M, gradient, P, g)
         for joint in range(TRUNK_POINTS):
             for i in range(3):

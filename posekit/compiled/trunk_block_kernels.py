@@ -146,7 +146,7 @@ def add_turn(residual: Any, J: Array, squared: Any, matrix: Array, gradient: Arr
             matrix[TURN_HIPS + i, TURN_TORSO + j] -= normal
 
 
-def joint_jacobian(s: Array, f: Array, offsets: Array, J: Array) -> None:
+def joint_jacobian(s: Array, offsets: Array, J: Array) -> None:
     """Write down how the trunk's unknowns move its joints (6, 3, C)."""
     width = J.shape[2]
     for joint in range(TRUNK_POINTS):
