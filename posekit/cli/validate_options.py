@@ -70,6 +70,10 @@ class BodyOptions:
     @property
     def changes(self) -> dict[str, Any]:
         """The settings that are given; None where one is not."""
+        if self.joint_map:
+            from posekit.robots.joint_map import load_joint_map
+
+            load_joint_map(self.joint_map)  # one that is none is refused before any file
         return {
             "lengths": self.lengths or None,
             "joint_map": self.joint_map or None,

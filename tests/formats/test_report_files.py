@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from posekit.errors import InputError
 from posekit.formats.own import (
@@ -98,6 +99,17 @@ def test_no_posture_and_no_place_are_reports(tmp_path):
     check = JudgedCheck(check="c", unit="m", where=(), findings=nowhere)
     report = make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[check])
     assert report.postures[0].findings == ()
+
+
+def test_a_report_of_nothing_is_a_table_without_rows(tmp_path):
+    nothing = make_report(settings={}, verdicts=[], fk_distance=np.zeros(0), judged=[])
+    tables = []
+    for name, report in (("nothing.parquet", nothing), ("whole.parquet", a_report())):
+        write_report(tmp_path / name, report)
+        tables.append(parquet.read_table(tmp_path / name))
+    assert [len(table) for table in tables] == [0, 3]
+    assert tables[0].schema.names == tables[1].schema.names
+    assert [str(one) for one in tables[0].schema.types] == [str(one) for one in tables[1].schema.types]
 
 
 def test_thousands_of_postures_are_reported_in_seconds(tmp_path, rng):

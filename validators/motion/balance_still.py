@@ -84,7 +84,7 @@ class BalanceStill(MotionCheck):
         """Say in which frames (T,) the body stands, and is still for long enough."""
         # Over so many frames that noise is slow beside what is still.
         noise = NOISE_FACTOR * clip.noise / (np.sqrt(2) * clip.step)
-        frames = max(int(np.ceil(noise / self.slower)), 1)
+        frames = len(clip) if noise >= self.slower * len(clip) else max(int(np.ceil(noise / self.slower)), 1)
         fast = np.nan_to_num(speeds(clip, clip.joints, frames), nan=0.0).max(axis=1)
         still = fast < self.slower + noise / frames
         for start, stop in runs(still):

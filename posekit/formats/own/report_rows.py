@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,11 +104,15 @@ def write_report_table(path: str | Path, columns: VerdictColumns, frames: Report
 
 
 def _tables(rows: Iterator[ReportRow]) -> Iterator[dict[str, NDArray[Any]]]:
-    while some := list(islice(rows, ROWS_AT_ONCE)):
+    first = True
+    while (some := list(islice(rows, ROWS_AT_ONCE))) or first:  # a report of nothing is a table without rows
+        columns = zip(*some, strict=True) if some else [()] * len(ReportRow._fields)
+        kinds = get_type_hints(ReportRow).values()
         yield {
-            name: np.array(values)
-            for name, values in zip(ReportRow._fields, zip(*some, strict=True), strict=True)
+            name: np.array(values, dtype=kind)
+            for name, values, kind in zip(ReportRow._fields, columns, kinds, strict=True)
         }
+        first = False
 
 
 def _violation(judged: PlaceValue) -> str:
