@@ -83,6 +83,15 @@ def leave(right: Array, width: Any, own: Array, push: Array) -> None:
             push[a] -= right[k, a] * right[k, 6]
 
 
+def eliminate_coupled(
+    matrix: Array, right: Array, width: Any, damping: Any, floor: Any, damped: Array, own: Array, push: Array
+) -> None:
+    """Damp and factor a block, solve for its coupling and gradient (U, 7), and take from what it touches its part."""
+    damped_factor(matrix, width, damping, floor, damped)
+    solve_forward(matrix, width, right, 7)
+    leave(right, width, own, push)
+
+
 def follow(L: Array, right: Array, width: Any, shift: Array, damped: Array, step: Array) -> Any:
     """Solve for the step of an eliminated block when what it is coupled with moves; return the decrease it promises."""
     gain = 0.0
@@ -104,6 +113,7 @@ COMPILED_TYPES = {
     "solve_backward": "",
     "next_damping": "",
     "leave": "",
+    "eliminate_coupled": "",
     "follow": "",
 }
 """The kernels, in the order in which they need each other: compiled into those that call them."""

@@ -22,8 +22,8 @@ from posekit.compiled.block_kernels import (
     MOST_DAMPING,
     MOST_STEPS,
     damped_factor,
+    eliminate_coupled,
     follow,
-    leave,
     next_damping,
     solve_backward,
     solve_forward,
@@ -249,9 +249,9 @@ def descend_postures(
                         break
                     folds += bent
                     slack += more
-                    damped_factor(L[limb], reach, damping, h[DIAGONAL_FLOOR], damped[limb])
-                    solve_forward(L[limb], reach, right[limb], 7)
-                    leave(right[limb], reach, own, push)
+                    eliminate_coupled(
+                        L[limb], right[limb], reach, damping, h[DIAGONAL_FLOOR], damped[limb], own, push
+                    )
                     of_torso = limb < FIRST_LEG or f[LEGS_ON_TORSO] > 0.0
                     add_limb(
                         limb, TURN_TORSO if of_torso else TURN_HIPS, J, own, push, P, g, matrix, gradient
@@ -263,9 +263,7 @@ def descend_postures(
             curve(offsets, g, matrix)
             if seen:
                 slack += head_block(now, d, f, watch, room, L[4], right[4], own, push)[1]
-                damped_factor(L[4], 3, damping, h[DIAGONAL_FLOOR], damped[4])
-                solve_forward(L[4], 3, right[4], 7)
-                leave(right[4], 3, own, push)
+                eliminate_coupled(L[4], right[4], 3, damping, h[DIAGONAL_FLOOR], damped[4], own, push)
                 for a in range(6):
                     gradient[a] += push[a]
                     for b in range(6):

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 
 from posekit.compiled import limb_block_kernels, trunk_block_kernels
 from posekit.compiled.block_kernels import (
-    damped_factor,
-    leave,
+    eliminate_coupled,
     solve_backward,
-    solve_forward,
 )
 from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.compiled.limb_block_kernels import (
@@ -84,9 +82,7 @@ def tabulate_trunks(
         curve(offsets, g, matrix[n])
         if f[HEAD_COUNT] > 0.0:
             head_block(s, d, f, nothing, room, L, right, own, push)
-            damped_factor(L, 3, 0.0, floor, damped)
-            solve_forward(L, 3, right, 7)
-            leave(right, 3, own, push)
+            eliminate_coupled(L, right, 3, 0.0, floor, damped, own, push)
             for a in range(6):
                 gradient[n, a] += push[a]
                 for b in range(6):
@@ -161,9 +157,7 @@ def tabulate_limbs(
                 continue
             for k in range(BOX_ANGLES):
                 counts[limb, m, 1] += room_of_limb[3][2, k] != 0.0
-            damped_factor(L, reach, 0.0, floor, damped)
-            solve_forward(L, reach, right, 7)
-            leave(right, reach, own, push)
+            eliminate_coupled(L, right, reach, 0.0, floor, damped, own, push)
             for c in range(width):
                 for i in range(6):
                     carried[i, c] = 0.0
@@ -286,9 +280,7 @@ def know_postures(
                         if reach > 4:
                             levers[end, limb, i, 4 + segment, n] = length * s[at + i]
             know_turns(s, d, limb, x, tangents, room_of_limb[0], L)
-            damped_factor(L, reach, 0.0, floor, damped)
-            solve_forward(L, reach, along, 7)
-            leave(along, reach, own, push)
+            eliminate_coupled(L, along, reach, 0.0, floor, damped, own, push)
             of_torso = limb < FIRST_LEG or f[LEGS_ON_TORSO] > 0.0
             add_limb(limb, TURN_TORSO if of_torso else TURN_HIPS, J, own, push, P, g, M, gradient)
             for a in range(reach):
@@ -302,9 +294,7 @@ def know_postures(
         curve(offsets, g, M)
         if f[HEAD_COUNT] > 0.0:
             head_block(s, d, f, nothing, room, L, along, own, push)
-            damped_factor(L, 3, 0.0, floor, damped)
-            solve_forward(L, 3, along, 7)
-            leave(along, 3, own, push)
+            eliminate_coupled(L, along, 3, 0.0, floor, damped, own, push)
             for a in range(6):
                 for b in range(6):
                     M[a, b] += own[a, b]
