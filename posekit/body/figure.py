@@ -283,12 +283,17 @@ class Figure(ShortRepr):
             behind=self.shoulder_offset < 0 if behind is None else behind,
         )
         stale = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
-        return replace(
-            self,
+        # What was checked of the old text holds of the new one, which differs in lengths that are checked here.
+        figure = object.__new__(Figure)
+        figure.__dict__.update(
             urdf=text,
+            srdf=self.srdf,
+            source=self.source,
             side_known=behind is not None or (same and self.side_known),
-            moved_lengths={**stale, **closed.moved},
+            moved_lengths=MappingProxyType({**stale, **closed.moved}),
+            limits=self.limits,
         )
+        return figure
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
         """Return the figure as it is known within uncertain lengths: they may leave the side of the shoulders open."""

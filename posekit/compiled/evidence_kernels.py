@@ -8,6 +8,9 @@ import numpy as np
 
 from posekit.geometry import Array
 
+NEGLIGIBLE_SQUARE = 72.0
+"""Squared deviations beyond which a bell is nothing beside outliers: e^-36 of it is left."""
+
 
 def weigh_lower(
     likely: Array,
@@ -63,8 +66,12 @@ def weigh_lower(
                     turning = lengths[g] * width[j]
                     variance = blur[n, i] * blur[n, i] + turning * turning
                     off = seen[n, i] - lengths[g] * cosine[j]
-                    bell = math.exp(-0.5 * off * off / variance) / math.sqrt(2.0 * math.pi * variance)
-                    total[g] += weight * (bell + outlier) * depth[n, i]
+                    likely_here = outlier
+                    if off * off < NEGLIGIBLE_SQUARE * variance:
+                        likely_here += math.exp(-0.5 * off * off / variance) / math.sqrt(
+                            2.0 * math.pi * variance
+                        )
+                    total[g] += weight * likely_here * depth[n, i]
             for g in range(grid):
                 out[n, i, g] = math.log(total[g]) + most
 

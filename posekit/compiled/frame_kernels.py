@@ -68,20 +68,22 @@ def screen(kind: int, w: Array, at: int) -> Any:
     return NOT_CLEAR
 
 
-def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) -> Any:
-    """Screen many postures by one rule.
+def screens(rules: Table, of: Table, points: Array, w: Array, places: Bytes, presumed: Array) -> Any:
+    """Screen many postures by some rules.
 
     Parameters
     ----------
-    kind : int
-        Which screen is asked, as `screen` takes it.
+    rules : int array (C, 2)
+        Which screen is asked, as `screen` takes it, and where in `w` its numbers begin.
+    of : int array (C, K)
+        The points that each reads, -1 behind the last.
     points : array (N, P, 3)
-        The points of each posture that the rule reads, metres.
+        The points of each posture, metres.
     w : array
-        As `screen` takes it, with the rule's numbers from `NUMBERS_AT` on.
-    places : int array (N,)
+        As `screen` takes it, with the rules' numbers from `NUMBERS_AT` on.
+    places : int array (N, C)
         Filled.
-    presumed : array (N, W)
+    presumed : array (M, W)
         Filled from the top, W numbers for every place violated.
 
     Returns
@@ -91,14 +93,16 @@ def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) 
     """
     count = 0
     for i in range(points.shape[0]):
-        for p in range(points.shape[1]):
-            for k in range(3):
-                w[3 * p + k] = points[i, p, k]
-        places[i] = screen(kind, w, NUMBERS_AT)
-        if places[i] >= 0:
-            for k in range(presumed.shape[1]):
-                presumed[count, k] = w[PRESUMED_AT + k]
-            count += 1
+        for c in range(rules.shape[0]):
+            for p in range(of.shape[1]):
+                if of[c, p] >= 0:
+                    for k in range(3):
+                        w[3 * p + k] = points[i, of[c, p], k]
+            places[i, c] = screen(rules[c, 0], w, rules[c, 1])
+            if places[i, c] >= 0:
+                for k in range(presumed.shape[1]):
+                    presumed[count, k] = w[PRESUMED_AT + k]
+                count += 1
     return count
 
 
@@ -291,7 +295,7 @@ def grow(
 COMPILED_TYPES = {
     "lift": "",
     "screen": "",
-    "screens": "(i8, f8[:, :, ::1], f8[::1], i1[::1], f8[:, ::1])",
+    "screens": "(i8[:, ::1], i8[:, ::1], f8[:, :, ::1], f8[::1], i1[:, ::1], f8[:, ::1])",
     "grow": (
         "(i8, i8, b1, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, f8[:, :, ::1], i1[:, ::1], "
         "f8[:, ::1], i8[::1], i8[:, ::1], i8[:, :, ::1], i8[:, :, ::1], f8[::1], i8[::1], i8, i8[::1], i4[::1], "

@@ -102,13 +102,13 @@ def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.int
 def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
     """Return which postures are not clearly valid by which of C checks (N, C); compiled loops ask their screens."""
     doubtful = np.zeros((len(points), len(checks)), dtype=np.bool_)
-    fast = is_fast(0)
+    fast = {c: one for c, check in enumerate(checks) if is_fast(0) and (one := check.passing) is not None}
+    if fast:
+        places, _ = screened([*fast.values()], [checks[c].points for c in fast], points)
+        doubtful[:, [*fast]] = places != NO_VIOLATION
     for column, check in enumerate(checks):
-        own = points[:, list(check.points)]
-        if fast and check.passing is not None:
-            doubtful[:, column] = screened(check.passing, own)[0] != NO_VIOLATION
-        else:
-            doubtful[:, column] = check.judge(own).violated.any(axis=1)
+        if column not in fast:
+            doubtful[:, column] = check.judge(points[:, list(check.points)]).violated.any(axis=1)
     return doubtful
 
 

@@ -80,8 +80,8 @@ def ranked(
                 joints[rows], lengths, frame[rows], residual[rows], chi2[rows] if known else None, off, up
             ),
         )
-        for known in (False, True)
-        if (rows := np.flatnonzero(refined == known)).size or not known
+        for known in sorted(set(refined.tolist()) or {False})
+        if len(rows := np.flatnonzero(refined == known)) or not len(joints)
     ]
     probability = np.empty(len(joints))
     terms: dict[str, Array] = {name: np.zeros(len(joints)) for _, part in parts for name in part.terms}

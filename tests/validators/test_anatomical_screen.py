@@ -79,10 +79,10 @@ def compare(check: AnatomicalLimb, points: np.ndarray) -> tuple[np.ndarray, np.n
     """Return what the screen says of postures, and what the judge; where the screen is sure they are the same."""
     own = np.ascontiguousarray(points[:, check.points])
     with np.errstate(invalid="ignore"):
-        places, presumed = screened(check.rule, own)
+        places = screened([check.rule], [range(own.shape[1])], own)[0][:, 0]
         violated = check.judge(own).violated
     first = np.where(violated.any(axis=1), violated.argmax(axis=1), NO_VIOLATION)
-    assert presumed is None
+    assert not check.rule.presumed
     clear = places != NOT_CLEAR
     np.testing.assert_array_equal(places[clear], first[clear])
     return places, first
@@ -172,4 +172,4 @@ def test_what_cannot_be_judged_passes_or_is_left_to_the_judge() -> None:
             if k < len(check.points) - 1 or len(check.limb) == 2:
                 assert places[0] == NO_VIOLATION
             assert (places[1:3] == NOT_CLEAR).all()
-        assert screened(check.rule, np.empty((0, len(check.points), 3)))[0].shape == (0,)
+        assert screened([check.rule], [check.points], np.empty((0, 19, 3)))[0].shape == (0, 1)

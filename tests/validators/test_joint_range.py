@@ -229,7 +229,7 @@ def test_what_passes_the_screen_by_the_tolerance_alone_passes_with_directions() 
         own = points[:, list(check.points)]
         passing = check.passing
         assert passing is not None
-        clear = screened(passing, own)[0] == NO_VIOLATION
+        clear = screened([passing], [check.points], points)[0][:, 0] == NO_VIOLATION
         violated = np.asarray(check.judge(own).violated.any(axis=1))
         assert not violated[clear].any()
         assert clear.any() and violated.any()

@@ -78,8 +78,9 @@ def places(check: Check, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     assert check.rule is not None
     with np.errstate(all="ignore"):
         violated = check.judge(own).violated
-        screened, presumed = tree.screened(check.rule, own)
-    if presumed is not None:
+        found, presumed = tree.screened([check.rule], [range(own.shape[1])], own, presuming=True)
+    screened = found[:, 0]
+    if check.rule.presumed:
         assert len(presumed) == (screened >= 0).sum()
         assert not len(presumed) or check.confirm(presumed)
     return screened, np.where(violated.any(axis=1), violated.argmax(axis=1), NO_VIOLATION)
