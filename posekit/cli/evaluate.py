@@ -206,7 +206,7 @@ def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
     """Print how far a result is from the truth."""
     import numpy as np
 
-    from posekit.cli.true_joints import before_camera, true_joints
+    from posekit.cli.true_joints import before_camera
     from posekit.evaluate.comparison import compare
     from posekit.formats.format import Content
     from posekit.formats.motion import postures_of, read_motion
@@ -226,10 +226,9 @@ def _tell_of_result(path: Path, truth: Path, given: Iterable[str]) -> None:
             f"--truth {truth}: {against.holds.value}; expected a view with truth, or motion of the same seconds"
         )
     result = read_result(path)
-    joints, in_camera = true_joints(truth, None, None, np.array([one.time for one in result.frames]))
-    if not in_camera:
+    joints, said = before_camera(result, truth)
+    if against.holds is Content.MOTION:
         joints[:, [JOINT[name] for name in postures_of(read_motion(truth)).derived]] = np.nan
-        joints, said = before_camera(result, joints)
         say(f"truth {truth}: {said}")
     for line in compare(result, joints).lines:
         say(line)

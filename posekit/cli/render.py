@@ -287,8 +287,11 @@ def _truth_of(
     if not isinstance(content, Result) or rejected:
         raise InputError("--truth: is drawn beside what was recovered; expected a result, without --rejected")
     times = np.array([one.time for one in content.frames])
-    joints, in_camera = true_joints(path, view, view_path, times)
-    return joints if in_camera else before_camera(content, joints)[0]
+    if view is not None:
+        joints, in_camera = true_joints(path, view, view_path, times)
+        if in_camera:
+            return joints
+    return before_camera(content, path)[0]
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -2,44 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from posekit.errors import InputError
+from posekit.skeleton import JOINTS
 
 if TYPE_CHECKING:
     from posekit.formats.own import Result, View
     from posekit.geometry import Array
 
 
-def before_camera(result: Result, joints: Array) -> tuple[Array, str]:
-    """Turn motion's joints (F, 14, 3) into the frame of the camera that a result holds; say how.
+def before_camera(result: Result, path: Path) -> tuple[Array, str]:
+    """Read the truth of a result's frames in the frame of the camera that it holds; say how it was laid.
 
     Axes are reconciled by the image of the result's postures: those of the motion's world may be others than the
-    calibration's.
+    calibration's. So are frames: seconds of pictures may be assumed ones, and picture k the motion's frame k.
 
     Raises
     ------
     InputError
-        Where the camera's place is not known, or the motion is not seen where the postures are.
+        Where the file has no truth of these frames, the camera's place is not known, or the motion is not seen where
+        the postures are.
     """
     import numpy as np
 
     from posekit.cameras import PinholeCamera
+    from posekit.formats.format import Content
+    from posekit.formats.recognising import recognise
     from posekit.views.truth import turned_before
 
-    camera, image = result.camera, np.full((*joints.shape[:2], 2), np.nan)
+    camera, times = result.camera, np.array([one.time for one in result.frames])
+    if recognise(path).holds is Content.VIEW:
+        return true_joints(path, None, None, times)[0], "its frames are the result's"
+    image = np.full((len(times), len(JOINTS), 2), np.nan)
     if camera is not None:
         sees = PinholeCamera(K=camera.K, distortion=camera.distortion)
         for k, frame in enumerate(result.frames):
             if len(frame.joints):
                 first = 0 if frame.answer is None else int(frame.answer.representatives[0])
                 image[k] = sees.project(frame.joints[first])
-    turned, told = turned_before(camera, image, joints)
-    return (
-        turned,
-        f"its axes {told.turn} are the camera's world; it is seen {told.error:.1f} px beside them (median)",
-    )
+    readers: list[tuple[Callable[[], Array], str]] = [
+        (lambda: true_joints(path, None, None, times)[0], ""),
+        (
+            lambda: _numbered(path, len(times)),
+            "; picture k is its frame k: at their seconds it is farther off",
+        ),
+    ]
+    laid, refused = [], []
+    for read, how in readers:
+        try:
+            laid.append((*turned_before(camera, image, read()), how))
+        except InputError as error:
+            refused.append(error)
+    if not laid:
+        raise refused[0]
+    turned, told, how = min(laid, key=lambda one: one[1].error)
+    axes = f"its axes {told.turn} are the camera's world"
+    return turned, f"{axes}; it is seen {told.error:.1f} px beside the postures (median){how}"
+
+
+def _numbered(path: Path, count: int) -> Array:
+    """Return the first frames of motion (count, 14, 3), one a picture; NaN where it has none."""
+    import numpy as np
+
+    from posekit.formats.held_postures import held_postures
+    from posekit.formats.recognising import recognise
+
+    held = held_postures(path, recognise(path))
+    own = held.frame < count
+    joints = np.full((count, len(JOINTS), 3), np.nan)
+    joints[held.frame[own]] = held.postures.joints[own]
+    return joints
 
 
 def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> tuple[Array, bool]:

@@ -298,3 +298,19 @@ def test_pictures_from_the_middle_of_a_clip_are_held_against_their_own_frames(
     save("first.npz", joints=late[4:], clip=np.zeros(FRAMES - 4, dtype=int))
     for name in ("since.npz", "result.npz"):
         assert command("evaluate", name, "--truth", "first.npz").out.partition("\n")[2] == by_view
+
+
+def test_pictures_whose_rate_was_assumed_are_held_against_as_many_frames(
+    command: Callable[..., Any], tmp_path: Path
+) -> None:
+    save("walk.npz")
+    assert command("synth", "mocap", "walk.npz", "-o", "view.json", "--frames", "3", "--dt", "0.1").code == 0
+    assert command("recover", "view.json", "-o", "result.npz").code == 0
+    result = posekit.read_result("result.npz")
+    # Every third frame is a picture: by number where the motion has these alone, by second where it is twice as slow.
+    save("third.npz", joints=joints()[::3], clip=np.zeros(len(joints()[::3]), dtype=int))
+    frames = [replace(one, time=2.0 * k / 30) for k, one in enumerate(result.frames)]
+    posekit.write_result("slow.npz", replace(result, frames=frames))
+    said, *table = command("evaluate", "slow.npz", "--truth", "third.npz").out.splitlines()
+    assert said.endswith("; picture k is its frame k: at their seconds it is farther off")
+    assert table == command("evaluate", "result.npz", "--truth", "view.json").out.splitlines()

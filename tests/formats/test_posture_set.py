@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 import posekit
 from posekit.errors import InputError
+from posekit.formats.own.frame_answer import FrameAnswer
+from posekit.formats.own.frame_tables import table_arrays
 from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.view import View
 from posekit.geometry import Array
@@ -122,3 +124,21 @@ def test_sets_that_are_none_are_refused(change: dict[str, object], message: str)
     made = PostureSet.of(bodies_of(TRUNKS, LIMBS, ALL_BODIES[:81]))
     with pytest.raises(InputError, match=message):
         PostureSet(**{name: getattr(made, name) for name in vars(made)} | change)
+
+
+@pytest.mark.parametrize("last", [126, 127, 128, 129, 32767, 32768, 40000])
+def test_numbers_of_an_npz_hold_the_largest_of_them(last: int) -> None:
+    answer = FrameAnswer(
+        representatives=np.array([0, last]),
+        probability=np.array([0.6, 0.4]),
+        near=np.full(11, np.nan),
+        far=np.full(11, np.nan),
+        region_mean=np.empty((0, 14, 3)),
+        region_covariance=np.empty((0, 14, 3, 3)),
+        region_probability=np.empty((0, 14)),
+        region_level=np.full(14, np.nan),
+    )
+    arrays = table_arrays(FrameAnswer, [answer, None], "m", within="answer/", precision=[None, None])
+    rows = arrays["answer/representatives"].rows
+    assert rows[0].tolist() == [0, last]
+    assert rows[0].itemsize <= (1 if last < 128 else 2 if last < 32768 else 4)

@@ -79,7 +79,8 @@ def table_arrays(
         counts.append(np.where(there, [len(row) for row in rows], -1))
         written = padded_column(column, rows, unit, short)
         if column.kind == "int":
-            least = np.min_scalar_type(-max(int(row.max(initial=1)) for row in rows))
+            # A signed type that holds the largest, whose negative alone would fit into one that is too small.
+            least = np.min_scalar_type(-max(int(row.max(initial=1)) for row in rows) - 1)
             written = Ragged(rows=[row.astype(least) for row in rows], fill=-1)
         arrays[within + name] = written
     return {f"{within}counts": np.stack(counts, axis=1), **arrays}
