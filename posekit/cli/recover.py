@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from posekit.following.following import Following
-    from posekit.formats.own import Result, View
+    from posekit.formats.own import Result
     from posekit.recovery.recovery import Recovery
     from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.views.opened import Opened
@@ -186,7 +186,11 @@ def recover(
             figure_path = None if write_urdf is None else of_person(write_urdf, one, alone=False)
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
-        further = _further_lines(recovery, scaled, following, None if truth is None else one.view)
+        further = _further_lines(recovery, scaled, following)
+        if truth is not None:
+            from posekit.evaluate.comparison import compare
+
+            further += compare(result, one.view.truth).lines
         written.append(_write(result, path, figure_path, one, recovery, further))
     first, found, _ = recovered[0]
     if any(len(frame) for frame in found.frames):
@@ -250,19 +254,15 @@ def _check_urdf_path(path: Path | None) -> None:
 
 
 def _further_lines(
-    recovery: Recovery, scaled: ScaledFollowing | None, following: Following | None, truth: View | None
+    recovery: Recovery, scaled: ScaledFollowing | None, following: Following | None
 ) -> list[str]:
-    """Say the scale that was found, the paths, and how far the survivors are from the truth of a view."""
+    """Say the scale that was found, and the paths."""
     lines = [] if scaled is None else [_scale_line(scaled)]
     if following is not None:
         from posekit.recovery.summary import following_line
         from posekit.recovery.swapped_labels import swapped_line
 
         lines += [line for line in (swapped_line(recovery), following_line(following)) if line]
-    if truth is not None:
-        from posekit.evaluate.comparison import compare
-
-        lines += compare(recovery, truth.truth).lines
     return lines
 
 

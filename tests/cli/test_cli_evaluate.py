@@ -314,3 +314,17 @@ def test_pictures_whose_rate_was_assumed_are_held_against_as_many_frames(
     said, *table = command("evaluate", "slow.npz", "--truth", "third.npz").out.splitlines()
     assert said.endswith("; picture k is its frame k: at their seconds it is farther off")
     assert table == command("evaluate", "result.npz", "--truth", "view.json").out.splitlines()
+
+
+def test_a_followed_result_says_how_far_its_path_is_off(command: Callable[..., Any], tmp_path: Path) -> None:
+    save("walk.npz")
+    words = ("--frames", "3", "--dt", "0.1", "--noise", "1")
+    assert command("synth", "mocap", "walk.npz", "-o", "view.json", *words).code == 0
+    truth = posekit.read_view("view.json").truth
+    said = command("recover", "view.json", "-o", "result.npz", "--follow", "1", "--truth", "walk.npz").out
+    out = command("evaluate", "result.npz", "--truth", "view.json").out
+    assert out in said
+    assert "| best of N | first-ranked | path " in " ".join(out.split())
+    path = posekit.read_result("result.npz").paths.joints[0]
+    away = np.nanmedian(1000 * np.linalg.norm(path - truth, axis=-1).mean(axis=1))
+    assert f"{away:.0f} / " in next(line for line in out.splitlines() if "where it is" in line).split("|")[4]
