@@ -261,6 +261,15 @@ def test_confidences_that_are_all_the_same_tell_nothing() -> None:
     assert check_sides(front(0.8)).verdict == check_sides(swap(front(0.8))).verdict == "unknown"
 
 
+def test_a_face_that_is_put_on_every_head_tells_nothing() -> None:
+    """MediaPipe is sure of eyes, nose and ears from behind, and less of limbs that are hidden."""
+    there = front(0.8)
+    confidence = np.linspace(0.3, 0.9, there.confidence.size).reshape(there.confidence.shape)
+    confidence[:, FACE] = 1.0
+    sure = replace(there, confidence=confidence)
+    assert check_sides(sure).verdict == check_sides(swap(sure)).verdict == "unknown"
+
+
 def test_who_stands_on_their_hands_raises_no_alarm() -> None:
     assert check_sides(front(up=-1.0)).verdict == "unknown"
 

@@ -77,8 +77,12 @@ def _way(width: Array, least: float) -> NDArray[np.int8]:
 
 
 def informed(landmarks: Array, confidence: Array) -> bool:
-    """Tell whether what is seen of the face says something: confidences (F, 21) differ, or face points are missing."""
-    known = confidence[~np.isnan(confidence)]
+    """Tell whether what is seen of the face says something: its confidences (F, 21) differ, or points are missing.
+
+    There are detectors that put a face on every head and are sure of it, from behind too (MediaPipe).
+    """
+    head = [*FACE_LANDMARKS, *EAR_LANDMARKS]
+    known = confidence[:, head][~np.isnan(confidence[:, head])]
     if len(known) and float(np.ptp(known)) > CONFIDENCE_RANGE_INFORMED:
         return True
     there = ~np.isnan(landmarks[:, FACE_LANDMARKS, 0])
