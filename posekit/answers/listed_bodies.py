@@ -47,7 +47,7 @@ class ListedFrame(Protocol):
 
     @property
     def unlisted_probability(self) -> float:
-        """What the bodies hold at most that are not listed."""
+        """What the bodies hold that are not listed."""
         ...
 
 

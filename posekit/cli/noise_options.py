@@ -54,7 +54,7 @@ class Uncertain:
             "--coverage",
             "SHARE",
             "Under noise, list the likeliest postures that hold this share of the probability; 1: all. What is not "
-            "listed is counted and bounded.",
+            "listed is counted and weighed.",
         ),
     ] = 0.99
 

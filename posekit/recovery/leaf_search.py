@@ -1,4 +1,4 @@
-"""Leaves refined, the likeliest first: those that hold the probability that is asked, and no more."""
+"""Leaves refined, one of each valley, of which those are listed that hold the probability that is asked."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ HOPELESS_CHI2_AT_WALLS: Final = 250.0
 LEAVES_AT_ONCE: Final = 60_000
 """Leaves that are refined together: each takes some kilobytes on the way."""
 
-MAX_LISTING_ROUNDS: Final = 4
-"""Times that bodies are taken in likeliest first, before all that are left of a frame are."""
+P_DECIMALS: Final = 6
+"""Decimals of foretold probabilities that tell leaves apart: of fewer, each machine would choose otherwise."""
 
 
 def refine_leaves(
@@ -64,10 +64,11 @@ def refine_leaves(
 
 
 class _LeafSearch:
-    """Some leaves, their trunks and limbs refined by themselves, of which the likeliest are refined as whole bodies.
+    """Some leaves, their trunks and limbs refined by themselves, of which one of each valley is refined whole.
 
-    What whole bodies come to is foretold from their trunks and limbs; those that hold the probability asked for, of
-    what is foretold, are refined, and more until those which pass hold it.
+    Where lengths vary, a branch has a valley of postures in which searches stop here and there. What whole bodies come
+    to is foretold from their trunks and limbs: of each valley that tells it which fits best so and passes, whatever
+    share of the probability is listed.
     """
 
     def __init__(
@@ -83,78 +84,51 @@ class _LeafSearch:
         self.checks, self.listing = checks, listing
         self.p, self.group = begun.promised_p.copy(), np.unique(frame, return_inverse=True)[1].reshape(-1)
         self.row, self.refined = np.arange(0), replace(begun.finish(np.arange(0)), frame=np.arange(0))
-        self.explained, self.done, self.leads = (np.zeros(count, dtype=np.bool_) for _ in range(3))
+        self.explained, self.done = (np.zeros(count, dtype=np.bool_) for _ in range(2))
         self.contradicted: list[Contradiction] = []
-        possible = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
-        self.score = np.where(possible, 0.0, -np.inf)
-        # Where lengths vary a branch may have a valley of postures, in which searches stop here and there.
+        self.legal = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
         vary = begun.search.problem.shape_weight is not None
-        self.alike = alike(begun, frame) if vary else np.arange(count)
-        if not listing.all:
-            self.joints = begun.joints
-            self._rate(np.flatnonzero(possible), begun.promised[possible])
+        self.valley = alike(begun, frame) if vary else np.arange(count)
+        self.order = np.lexsort((-np.round(self.p, P_DECIMALS), self.valley))
 
     def outcomes(self) -> LeafOutcomes:
         """Refine, reject, merge and list."""
-        for turn in range(MAX_LISTING_ROUNDS + 1):
-            chosen = self._chosen(every=turn == MAX_LISTING_ROUNDS)
-            if not (len(chosen) or turn == 0):
-                break
+        most = 1
+        while len(chosen := self._waiting(most)):
             self._refine(chosen)
-            self._merge()
-        listed, share = self._listed(self.row[self.merged.rows])
-        merged = self.merged.take(np.flatnonzero(listed[self.row[self.merged.rows]]))
-        legal = np.isfinite(self.score)
-        unlisted = legal.copy()
-        unlisted[self.row[merged.group >= 0]] = False
+            most *= 2
+        merged = merge(self.refined)
+        rows = self.row[merged.rows]
+        score = self.listing.score(merged.refined.joints, merged.refined.chi2, self.frame[rows])
+        share = np.zeros(len(self.frame))
+        share[rows] = softmax(score, self.group[rows])
+        whole = np.zeros(len(self.frame), dtype=np.bool_)
+        whole[rows] = True
+        spare = np.full(int(self.group.max(initial=-1)) + 1, 1.0 - self.listing.coverage)
+        listed = whole if self.listing.all else likeliest(share, self.group, spare)
+        legal = np.flatnonzero(self.legal)
+        number = np.full(int(self.valley.max(initial=-1)) + 1, -1)
+        number[self.valley[self.row]] = merged.group
+        merged = replace(merged, group=number[self.valley[legal]])
         return LeafOutcomes(
             p=self.p,
             contradicted=tuple(self.contradicted),
-            explained=self.explained | legal,
+            explained=self.explained | self.legal,
             kept=listed,
-            unlisted=unlisted,
+            unlisted=whole & ~listed,
             share=share,
-            survivors=RefinedSurvivors.of(merged, self.known[self.row]),
-            made_of=(FactoredLeaves.of(self.begun, self.frame, legal),),
+            survivors=RefinedSurvivors.of(merged.take(np.flatnonzero(listed[rows])), self.known[self.row]),
+            made_of=(FactoredLeaves.of(self.begun, self.frame, self.legal),),
         )
 
-    def _rate(self, rows: NDArray[np.intp], chi2: Array) -> None:
-        """Score some leaves as they are now."""
-        self.score[rows] = self.listing.score(self.joints[rows], chi2, self.frame[rows])
-
-    def _merge(self) -> None:
-        """Make one of what became one, of all leaves that passed so far."""
-        self.merged = merge(self.refined, told=self.alike[self.row])
-        self.leads[self.done] = False
-        self.leads[self.row[self.merged.rows]] = True
-
-    def _lead(self) -> None:
-        """Find which of the leaves that are not refined stand for themselves: others would become one with these."""
-        waiting = ~self.done & np.isfinite(self.score)
+    def _waiting(self, most: int) -> NDArray[np.intp]:
+        """Return the next leaves of each valley that none tells yet, no more than `most` of each."""
         told = np.zeros(len(self.frame), dtype=np.bool_)
-        told[self.alike[self.row]] = True
-        rows = np.flatnonzero(waiting & ~told[self.alike])
-        rows = rows[np.lexsort((-self.p[rows], self.alike[rows]))]
-        waiting[:] = False
-        waiting[rows[np.diff(self.alike[rows], prepend=-1) > 0]] = True
-        self.leads = np.where(self.done, self.leads, waiting)
-
-    def _chosen(self, *, every: bool) -> NDArray[np.intp]:
-        """Return the leaves to be refined next; all that are left of frames which lack some, if `every`."""
-        if self.listing.all:
-            return np.flatnonzero(np.isfinite(self.score) & ~self.done)
-        self._lead()
-        share, left = self._shares(self.leads)
-        # A tenth of what may be left out is for those that are only foretold: of the rest the likeliest are listed.
-        spare = np.full(len(left), 0.1 * (1.0 - self.listing.coverage))
-        wanted = ~self.done & self.leads & (left > spare)[self.group]
-        return np.flatnonzero(wanted if every else likeliest(np.where(wanted, share, 0.0), self.group, spare))
-
-    def _shares(self, among: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Return what share of its frame's probability each of some leaves has (N,), and those not refined (F,)."""
-        some = among & np.isfinite(self.score)
-        share = np.where(some, softmax(np.where(some, self.score, -np.inf), self.group), 0.0)
-        return share, np.asarray(np.bincount(self.group, np.where(self.done, 0.0, share)), dtype=np.float64)
+        told[self.valley[self.row]] = True
+        rows = self.order[(self.legal & ~self.done & ~told[self.valley])[self.order]]
+        first = np.diff(self.valley[rows], prepend=-1) > 0
+        place = np.arange(len(rows)) - np.flatnonzero(first)[np.cumsum(first) - 1]
+        return np.sort(rows[place < most])
 
     def _refine(self, chosen: NDArray[np.intp]) -> None:
         """Refine some leaves as whole bodies, and judge them."""
@@ -164,39 +138,19 @@ class _LeafSearch:
         rows = chosen[likely]
         joints = np.where(self.known[rows, :, None], part.joints[likely], np.nan)
         found = contradictions(self.checks, np.concatenate([joints, part.head[likely]], axis=1), rows)
-        legal = np.zeros(len(self.frame), dtype=np.bool_)
-        legal[rows] = True
+        self.legal[chosen] = False
+        self.legal[rows] = True
         for one in found:
-            legal[one.row] = False
+            self.legal[one.row] = False
         self.contradicted += found
-        own = legal[chosen]
-        self.score[chosen[~own]] = -np.inf
-        part = part.select(own)
+        passed = self.order[(self.legal & self.done)[self.order]]
+        tells = np.zeros(len(self.frame), dtype=np.bool_)
+        tells[passed[np.diff(self.valley[passed], prepend=-1) > 0]] = True
+        own = tells[chosen]
         row = np.concatenate([self.row, chosen[own]])
-        joined = Refined.joined([self.refined, part], self.begun.search.problem.take(row))
+        joined = Refined.joined([self.refined, part.select(own)], self.begun.search.problem.take(row))
         order = np.argsort(row)
         self.row, self.refined = row[order], joined.select(order)
-        if not self.listing.all:
-            self.joints[chosen[own]] = part.joints
-            self._rate(chosen[own], part.chi2)
-
-    def _listed(self, rows: NDArray[np.intp]) -> tuple[NDArray[np.bool_], Array]:
-        """Choose those of the merged leaves, at `rows`, that are listed.
-
-        Returns
-        -------
-        bool array (N,)
-            Those.
-        array (N,)
-            What share of its frame's probability each leaf has that is listed, or leads others that are not.
-        """
-        listed = np.zeros(len(self.frame), dtype=np.bool_)
-        listed[rows] = True
-        if self.listing.all:
-            return listed, np.zeros(len(listed))
-        share, left = self._shares(listed | (~self.done & self.leads))
-        spare = np.maximum(1.0 - self.listing.coverage - left, 0.0)
-        return likeliest(np.where(listed, share, 0.0), self.group, spare), share
 
 
 def blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:

@@ -121,9 +121,9 @@ class FrameRecovery(Pictured):
     cameras : CameraRecords, optional
         Of all frames of the view.
     unlisted : int
-        How many postures that were not ruled out are not listed for being too unlikely, at most (`coverage`).
+        How many postures that were not ruled out are not listed for being too unlikely (`coverage`).
     unlisted_probability : float
-        Which share of the frame's probability they have at most.
+        Which share of the frame's probability they have.
     made_of : callable, optional
         Returns the set where not all of its postures are listed: see `posture_set`.
     """

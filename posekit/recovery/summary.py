@@ -79,13 +79,13 @@ def _count_line(recovery: Recovery) -> str:
 
 
 def _unlisted(recovery: Recovery) -> str:
-    """Say how many more there are that are not listed, and what they hold at most."""
+    """Say how many more there are that are not listed, and what they hold of a frame at most."""
     unlisted = sum(frame.unlisted for frame in recovery.frames)
     if not unlisted:
         return ""
     most = max(frame.unlisted_probability for frame in recovery.frames)
     share = percent(most) if most else "under 1 %"  # what is less than rounding is not impossible
-    return f"; up to {unlisted} more hold {share} of a frame at most (--coverage 1 lists them)"
+    return f"; {unlisted} more hold {share} of a frame at most (--coverage 1 lists them)"
 
 
 def _scale_lines(recovery: Recovery) -> list[str]:

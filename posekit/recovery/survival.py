@@ -25,15 +25,15 @@ class LeafOutcomes:
     Parameters
     ----------
     p : array (N,)
-        The probability that noise alone gives a chi2 as large; of leaves that are not listed, as what is promised.
+        The probability that noise alone gives a chi2 as large; of leaves that were not refined, as what is promised.
     contradicted : tuple of Contradiction
         Those that the noise explains and a check contradicts.
     explained, kept : bool array (N,)
         Those that the noise explains, and of those that no check contradicts the likeliest that became one.
     unlisted : bool array (N,)
-        Those that are too unlikely to be listed, and may be explained, or become one with another.
+        Those kept but for being too unlikely to be listed.
     share : array (N,)
-        What share of its frame's probability each of these, or of those kept, has as far as is known.
+        What share of its frame's probability each of these, or of those kept, has.
     survivors : RefinedSurvivors
         Those kept, in the leaves' order.
     made_of : tuple of FactoredLeaves

@@ -167,7 +167,7 @@ class FrameTrees(ShortRepr):
     unlisted : int
         How many postures are not listed for being too unlikely.
     unlisted_probability : float
-        Which share of the frame's probability they have at most.
+        Which share of the frame's probability they have.
     posture_set : callable, optional
         Returns the trunks and limbs of which all that may be are made, where not every posture is listed.
     outliers : tuple of str

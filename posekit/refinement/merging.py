@@ -65,7 +65,6 @@ def merge(
     *,
     within: float = MERGE_DISTANCE_METRES,
     keep: NDArray[np.bool_] | None = None,
-    told: NDArray[np.intp] | None = None,
 ) -> Merged:
     """Merge survivors of a frame that became one: all joints within a distance of those of a likelier one.
 
@@ -80,9 +79,6 @@ def merge(
         Metres that no joint may be apart.
     keep : bool array (N,), optional
         Which survivors are looked at: those that the noise explains (`Refined.explained`).
-    told : int array (N,), optional
-        Numbers, the same of survivors of a frame that are told as one (`posekit.refinement.alike`): the likeliest of
-        them takes in the others first.
 
     Raises
     ------
@@ -101,13 +97,7 @@ def merge(
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
-    leader = np.arange(len(rows))
-    if told is not None:
-        _, first, which = np.unique(told[rows], return_index=True, return_inverse=True)
-        leader = first[which.reshape(-1)]
-    leaders = np.flatnonzero(leader == np.arange(len(rows)))
-    near = groups_of(refined.frame[rows[leaders]], joints[leaders], within)
-    leader = leaders[near][np.searchsorted(leaders, leader)]
+    leader = groups_of(refined.frame[rows], joints, within)
     stands = np.flatnonzero(leader == np.arange(len(rows)))
     number = np.full(len(rows), -1)
     number[stands] = np.arange(len(stands))

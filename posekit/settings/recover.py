@@ -69,7 +69,7 @@ class RecoverSettings(JudgingSettings, ShortRepr):
         default what the view says, else what is known of the person (`posekit.body.uncertainty`).
     coverage : float
         Which share of the probability the listed postures of a refined frame hold at least, likeliest first; what is
-        not listed is counted and bounded. By default 0.99; 1 lists all. Frames that are exact list all.
+        not listed is counted and weighed. By default 0.99; 1 lists all. Frames that are exact list all.
 
     Raises
     ------

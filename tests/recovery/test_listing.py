@@ -16,7 +16,6 @@ from posekit.ranking.ranking import softmax
 from posekit.recovery import Recovery, recover
 from posekit.recovery.listing import likeliest
 from posekit.recovery.summary import summary_lines
-from posekit.refinement.merging import MERGE_DISTANCE_METRES
 from posekit.samples import write_samples
 from posekit.settings import RecoverSettings
 from posekit.synthesis import random_views
@@ -38,42 +37,35 @@ def both() -> tuple[Recovery, Recovery]:
     return recovered()
 
 
-def test_what_is_listed_is_the_likeliest_of_all() -> None:
-    """Where lengths are uncertain a valley of one branch may be told by another of its postures: see the next."""
-    fewer, both = 0, recovered(length_deviation=0.0)
-    for k, (whole, part) in enumerate(zip(both[0].frames, both[1].frames, strict=True)):
+@pytest.mark.parametrize("asked", [{}, {"length_deviation": 0.0}])
+def test_every_body_is_listed_or_counted_with_its_probability(asked: dict[str, float]) -> None:
+    assert_share_of_the_whole(*recovered(**asked), COVERAGE)
+
+
+def test_what_the_sample_recording_leaves_out_is_exact(tmp_path: Path) -> None:
+    write_samples(tmp_path)
+    (opened,) = open_views(tmp_path / "keypoints", Source(camera=str(tmp_path / "calibration.toml")))
+    assert_share_of_the_whole(recover(opened.view, coverage=1.0), recover(opened.view), 0.99)
+
+
+def assert_share_of_the_whole(every: Recovery, some: Recovery, coverage: float) -> None:
+    fewer = 0
+    for k, (whole, part) in enumerate(zip(every.frames, some.frames, strict=True)):
+        assert whole.unlisted == 0 == whole.unlisted_probability
+        assert len(whole) == len(part) + part.unlisted
+        assert part.rejected.get("noise/unlisted", 0) == part.unlisted
         if not len(whole):
-            assert not len(part)
             continue
-        apart = np.abs(whole.joints[:, None] - part.joints[None]).max(axis=(2, 3))
-        twin = apart.argmin(axis=0)
-        assert (apart[twin, np.arange(len(part))] < MERGE_DISTANCE_METRES).all()  # another may stand for both
-        p = both[0].probability[k]
-        out = np.ones(len(whole), dtype=np.bool_)
-        out[twin] = False
-        assert p[out].max(initial=0.0) <= p[twin].min() + 1e-9
-        assert p[twin].sum() >= COVERAGE
-        # What was never refined is foretold to second order.
-        assert p[out].sum() <= 1.1 * part.unlisted_probability + 1e-9
-        assert out.sum() <= part.unlisted
-        fewer += int(out.sum())
+        p, apart = every.probability[k], np.abs(whole.joints[:, None] - part.joints).max(axis=(2, 3))
+        listed = apart.min(axis=1) == 0.0
+        np.testing.assert_array_equal(whole.joints[listed], part.joints)
+        assert p.sum() == pytest.approx(1.0) == some.probability[k].sum()
+        np.testing.assert_allclose(some.probability[k], p[listed] / p[listed].sum(), rtol=1e-9)
+        assert part.unlisted_probability == pytest.approx(p[~listed].sum(), rel=1e-9, abs=1e-12)
+        assert part.unlisted_probability <= 1 - coverage + 1e-12
+        assert p[~listed].max(initial=0.0) < p[listed].min()
+        fewer += part.unlisted
     assert fewer > 0
-
-
-def test_the_likeliest_are_listed_where_lengths_are_uncertain(both: tuple[Recovery, Recovery]) -> None:
-    for k, (whole, part) in enumerate(zip(both[0].frames, both[1].frames, strict=True)):
-        if not len(whole):
-            continue
-        first = whole.joints[both[0].probability[k].argmax()]
-        near = np.linalg.norm(part.joints - first, axis=2).max(axis=1).min()
-        assert near < 0.1  # metres: of one branch
-
-
-def test_what_is_not_listed_is_bounded_and_counted(both: tuple[Recovery, Recovery]) -> None:
-    assert all(frame.unlisted == 0 == frame.unlisted_probability for frame in both[0].frames)
-    for frame in both[1].frames:
-        assert 0 <= frame.unlisted_probability <= 1 - COVERAGE + 1e-9
-        assert frame.rejected.get("noise/unlisted", 0) == frame.unlisted
 
 
 def test_of_what_is_not_listed_nothing_is_said_to_be_impossible(both: tuple[Recovery, Recovery]) -> None:

@@ -79,8 +79,8 @@ def test_lengths_that_are_known_are_kept(recovery: Recovery) -> None:
         assert (frame.length_residual < 1e-9).all()
 
 
-def test_every_leaf_is_accounted_for(recovery: Recovery) -> None:
-    for frame in recovery.frames:
+def test_every_leaf_is_accounted_for(scene: SyntheticScene) -> None:
+    for frame in recover(noisy(scene), coverage=1.0).frames:
         assert len(frame) + sum(frame.rejected.values()) == 8192 * max(frame.hypotheses, 1)
         assert frame.refined is not None
         merged = frame.rejected.get("noise/merged", 0)

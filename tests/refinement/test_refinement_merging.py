@@ -107,15 +107,3 @@ def test_a_distance_that_is_none_is_refused(within: float) -> None:
 def test_codes_must_be_one_each() -> None:
     with pytest.raises(InputError, match="3 branch codes for 100"):
         merge(survivors()).codes(["a", "b", "c"])
-
-
-def test_what_is_told_as_one_becomes_the_likeliest_of_it() -> None:
-    refined = survivors()
-    told = np.arange(100) // 4
-    merged = merge(refined, within=0.0, told=told)
-    for one in np.unique(told):
-        rows = np.flatnonzero(told == one)
-        stands = np.flatnonzero(np.isin(merged.rows, rows))
-        assert len(stands) == 1
-        assert refined.p[merged.rows[stands[0]]] == refined.p[rows].max()
-        assert (merged.group[rows] == stands[0]).all()

@@ -74,9 +74,9 @@ class ResultFrame(SurvivorColumns):
     posture_set : PostureSet, optional
         All that the frame can be.
     unlisted : int
-        How many whole bodies of the set are not among the survivors here, at most.
+        How many bodies that were not ruled out are not among the survivors here.
     unlisted_probability : float
-        What these hold at most, of the probability of all.
+        What these hold of the probability of all.
     answer : FrameAnswer, optional
         What is to be said of the frame first.
     """
