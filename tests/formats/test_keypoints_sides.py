@@ -308,6 +308,18 @@ def test_a_jump_is_found_where_it_is(group: str, part: slice, long: int) -> None
         assert f"jump in {long} pictures" in found.warnings[-1]
 
 
+def test_legs_do_not_jump_where_shoulders_go_with_them() -> None:
+    """Somebody turned round, and the elbows and wrists of a detector stayed: hips against shoulders would be wrong."""
+    alone, together = 0, 0
+    for scene in walks(False, 24, 0.08)[::2]:
+        there = exchanged(seen(scene, np.random.default_rng(13), head=False), LEGS, slice(10, 13))
+        alone += int(check_sides(there).legs[10:13].sum())
+        turned = check_sides(exchanged(there, slice(5, 7), slice(10, 13)))
+        together += int((turned.legs & ~turned.arms)[10:13].sum())
+    assert alone > 10
+    assert together < alone / 3
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_signs_are_the_best_there_are(seed: int) -> None:
     from itertools import product

@@ -18,7 +18,7 @@ from posekit.formats.keypoints.side_flips import LIMB_GROUPS, flips
 from posekit.formats.keypoints.side_gait import gait_evidence
 from posekit.formats.keypoints.tracking import track
 from posekit.formats.skeleton_maps import LANDMARK_INDEX, SkeletonMap
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.safe_io import cut
 from posekit.skeleton import other_side
 
@@ -121,9 +121,9 @@ def check_sides(keypoints: KeyPoints) -> SideCheck:
         rows = np.flatnonzero(tracked.person == person)
         rows = rows[np.diff(tracked.frame[rows], prepend=-1) > 0]
         body, frame = landmarks[rows].copy(), tracked.frame[rows]
-        for group, parts in LIMB_GROUPS.items():
-            jumps[group][rows] = flips(body, frame, parts) > 0
-            body[jumps[group][rows]] = _exchanged(body[jumps[group][rows]], parts)
+        for group, found in _jumps(body, frame).items():
+            jumps[group][rows] = found
+            body[found] = _exchanged(body[found], LIMB_GROUPS[group])
         told = gait_evidence(body, frame)
         front = votes.look(body, confidence[rows], occluded[rows])
         if front:
@@ -131,6 +131,22 @@ def check_sides(keypoints: KeyPoints) -> SideCheck:
         for name, worth in told.items():
             total[name] = total.get(name, 0.0) - worth
     return _judged(tracked, jumps, total, votes)
+
+
+def _jumps(landmarks: Array, frame: NDArray[np.intp]) -> dict[str, NDArray[np.bool_]]:
+    """Find the pictures of one person whose arms or legs jump to the other side.
+
+    Arms or legs alone do not, where shoulders and hips agree: exchanged they would be against each other. Somebody who
+    turns round between pictures looks as if they did.
+    """
+    ways = order(landmarks)
+    found = {group: flips(landmarks, frame, parts) > 0 for group, parts in LIMB_GROUPS.items()}
+    alone = found["arms"] ^ found["legs"]
+    for jumped in found.values():
+        for start, end in runs(jumped.copy()):
+            agreement = (ways.shoulders * ways.hips * alone)[start:end]
+            jumped[start:end] = agreement.sum() <= 0
+    return found
 
 
 def _exchanged(landmarks: Array, parts: tuple[str, ...]) -> Array:
