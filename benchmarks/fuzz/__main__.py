@@ -38,19 +38,19 @@ def changed(data: bytes, rng: random.Random) -> bytes:
     return damaged(data, rng) if said is None else said
 
 
-def drawn(seeds: dict[str, list[Path]], rng: random.Random) -> Case:
+def drawn(seeds: dict[str, list[Path]], folder: Path, rng: random.Random) -> Case:
     """Draw a case."""
     share = rng.random()
     if share < OPTION_SHARE:
         return option_case(rng)
-    return kill_case(rng) if share < OPTION_SHARE + KILL_SHARE else file_case(seeds, rng, changed)
+    return kill_case(rng) if share < OPTION_SHARE + KILL_SHARE else file_case(seeds, folder, rng, changed)
 
 
 def keep(folder: Path, number: int, case: Case, outcome: Outcome) -> None:
     """Keep a case that is not clean: its file, and what came of it."""
     folder.mkdir(parents=True, exist_ok=True)
     if case.name:
-        (folder / f"{number}.{case.name}").write_bytes(case.data)
+        (folder / f"{number}.{Path(case.name).name}").write_bytes(case.data)
     said = {
         "kind": case.kind,
         "arguments": case.arguments,
@@ -89,7 +89,7 @@ def main() -> int:
         ends, number = time.monotonic() + 60 * given.minutes, 0
         while time.monotonic() < ends:
             rng = random.Random(f"{given.seed}.{number}")
-            case = drawn(seeds, rng)
+            case = drawn(seeds, seeds_folder, rng)
             outcome = tried(case, seeds_folder, folder)
             counts[case.kind, outcome.what] += 1
             if not outcome.clean:

@@ -13,7 +13,15 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import typer.main
 
-from benchmarks.fuzz.others import write_cameras_of_others, write_choices, write_points_of_others
+from benchmarks.fuzz.others import (
+    write_body_angles,
+    write_cameras_of_others,
+    write_choices,
+    write_lines,
+    write_points_of_others,
+    write_robot_folders,
+)
+from posekit.batch.view_table import write_view_table
 from posekit.cli.main import application
 from posekit.formats.keypoints import key_point_formats
 from posekit.formats.own import read_view, schema_text
@@ -28,9 +36,16 @@ POSTURE_COMMANDS: Final = (
     "convert IN OUT.bvh",
     "convert IN OUT.npz",
 )
-RESULT_COMMANDS: Final = (*POSTURE_COMMANDS, "convert IN OUT.trc", "render IN -o OUT.html", "inspect IN")
+RESULT_COMMANDS: Final = (
+    *POSTURE_COMMANDS,
+    "convert IN OUT.trc",
+    "convert IN OUT.rrd",
+    "convert IN OUT.json --to postures",
+    "convert IN OUT.parquet --posture all",
+    "render IN -o OUT.html",
+)
 COMMANDS: Final = {
-    "motion": POSTURE_COMMANDS,
+    "motion": (*POSTURE_COMMANDS, "evaluate IN -o OUT.json --frames-per-clip 1 --yaw-step 180"),
     "result": RESULT_COMMANDS,
     "view": ("recover IN -o OUT.json", "inspect IN", "recover IN -o OUT.npz --deviation 1"),
     "key points": ("inspect IN", "recover IN -o OUT.json --fov 60 --stature 175cm --size 1920x1080"),
@@ -50,13 +65,37 @@ COMMANDS: Final = {
         "validate IN -o OUT.json --urdf panda",
     ),
     "survivors": ("inspect IN", "validate IN -o OUT.json"),
+    "postures": POSTURE_COMMANDS,
+    "body angles": ("inspect IN", "validate IN -o OUT.json --body-model SEEDS/model.npz"),
+    "body model": ("validate SEEDS/angles.npz -o OUT.json --body-model IN",),
+    "figure folder": POSTURE_COMMANDS,
+    "arm folder": (
+        "validate SEEDS/arm.csv -o OUT.json --checks joint-range,collision --urdf IN/arm.urdf",
+        "validate SEEDS/arm.csv -o OUT.json --checks joint-range,collision --urdf IN/arm.urdf --srdf IN/arm.srdf",
+    ),
+    "arm motion": (
+        "validate IN -o OUT.json --checks joint-range,collision --urdf SEEDS/arm/arm.urdf",
+        "inspect IN",
+    ),
+    "COLMAP folder": ("recover SEEDS/keypoints -o OUT.json --stature 175cm --camera IN",),
+    "batch folder": (
+        "inspect IN",
+        "validate IN/shards -o OUT.json",
+        "batch SEEDS/walk.json -o IN --jobs 1",
+    ),
+    "view table": ("batch IN -o OUT --jobs 1", "inspect IN"),
+    "live lines": (
+        "follow --stdin --size 1280x720 --stature 175cm < IN",
+        "follow --stdin --size 1280x720 --stature 175cm --keep-going < IN",
+    ),
     "nearer": ("recover SEEDS/photo.json -o OUT.json --nearer IN", "inspect IN"),
     "lengths": (
         "recover SEEDS/keypoints -o OUT.json --camera SEEDS/calibration.toml --lengths IN --stature 175cm",
         "inspect IN",
     ),
 }
-"""Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files."""
+"""Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files; of a damaged
+file in a folder IN is the folder. What follows < is read from standard input."""
 OPTION_COMMANDS: Final = (
     "recover SEEDS/walk.json -o OUT.json",
     "recover SEEDS/photo.json -o OUT.npz",
@@ -72,11 +111,15 @@ OPTION_COMMANDS: Final = (
     "synth random -o OUT.json",
     "synth object ur5 -o OUT.json",
     "synth mocap SEEDS/walk.npz -o OUT.json",
+    "follow --stdin --size 1280x720 --stature 175cm < SEEDS/lines.jsonl",
+    "validate SEEDS/arm.csv -o OUT.json --urdf SEEDS/arm/arm.urdf --checks joint-range,collision",
+    "batch SEEDS/walk.json -o OUT --jobs 1",
+    "samples OUT",
 )
 KILLED_COMMANDS: Final = (
     *OPTION_COMMANDS,
-    "batch SEEDS/walk.json -o OUT",
-    "batch SEEDS/keypoints -o OUT",
+    "batch SEEDS/keypoints -o OUT --jobs 1",
+    "reproduce taylor -o OUT --no-pictures",
 )
 ODD_VALUES: Final = (
     *(
@@ -131,7 +174,7 @@ ODD_VALUES: Final = (
 
 
 class Case(NamedTuple):
-    """One attack: its kind, the arguments, and the damaged file with the name that it gets."""
+    """One attack: its kind, the arguments, and the damaged file with the name that it gets, or its place in a folder."""
 
     kind: str
     arguments: list[str]
@@ -175,7 +218,16 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
     seeds["key points"].append(folder / "mediapipe.csv")
     seeds["camera"] = write_cameras_of_others(folder)
     seeds["points"] = write_points_of_others(folder)
-    seeds |= write_choices(folder)
+    seeds |= write_choices(folder) | write_body_angles(folder) | write_robot_folders(folder)
+    seeds |= write_lines(folder)
+    run(["convert", str(folder / "walk.npz"), str(folder / "person"), "--to", "urdf"])
+    run(["batch", str(folder / "walk.json"), "-o", str(folder / "batch"), "--jobs", "1"])
+    for kind, made in (("figure", "person"), ("batch", "batch")):
+        seeds[f"{kind} folder"] = sorted(path for path in (folder / made).rglob("*") if path.is_file())
+    run(["convert", str(folder / "walk.npz"), str(folder / "postures.json"), "--to", "postures"])
+    seeds["postures"] = [folder / "postures.json", folder / "person" / "configurations.npz"]
+    write_view_table(folder / "table.parquet", read_view(folder / "walk.json"))
+    seeds["view table"] = [folder / "table.parquet"]
     run(["recover", str(folder / "walk.json"), "-o", str(folder / "result.json.gz")])
     seeds["result"].append(folder / "result.json.gz")
     gripper = ["recover", str(folder / "gripper.json"), "-o", str(folder / "object.json")]
@@ -205,13 +257,17 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
 
 
 def file_case(
-    seeds: dict[str, list[Path]], rng: random.Random, damage: Callable[[bytes, random.Random], bytes]
+    seeds: dict[str, list[Path]],
+    folder: Path,
+    rng: random.Random,
+    damage: Callable[[bytes, random.Random], bytes],
 ) -> Case:
     """Damage a file of some kind, and choose a command that reads it."""
     kind = rng.choice([kind for kind, files in seeds.items() if files])
     path = rng.choice(seeds[kind])
     data = damage(path.read_bytes(), rng)
-    return Case(f"{kind} {path.suffix}", rng.choice(COMMANDS[kind]).split(), path.name, data)
+    name = str(path.relative_to(folder)) if path.is_relative_to(folder) else path.name
+    return Case(f"{kind} {path.suffix}", rng.choice(COMMANDS[kind]).split(), name, data)
 
 
 def kill_case(rng: random.Random) -> Case:
@@ -224,7 +280,8 @@ def kill_case(rng: random.Random) -> Case:
 def option_case(rng: random.Random) -> Case:
     """Give a command one to three of its options, with odd values."""
     arguments = rng.choice(OPTION_COMMANDS).split()
-    for name, is_flag in rng.sample(_options(*arguments[:2]), rng.randint(1, 3)):
+    known = _options(*arguments[:2])
+    for name, is_flag in rng.sample(known, min(rng.randint(1, 3), len(known))):
         arguments += [name] if is_flag else [name, rng.choice(ODD_VALUES)]
     return Case("options", arguments)
 

@@ -1,19 +1,24 @@
-"""Whole files that posekit reads and does not write: cameras, points and choices as others spell them."""
+"""Whole files that posekit reads and does not write: cameras, points, robots and choices as others spell them."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from PIL import Image
 
 from posekit.formats.cameras import read_cameras, write_cameras
+from posekit.formats.own import read_view
 from posekit.formats.skeleton_maps import load_skeleton_map
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, JOINTS
 from tests.detector_files import landmarks_of, scatter
+from tests.formats.test_body_angles import clip_arrays, model_arrays
+from tests.robots.test_hostile_models import OBJ, VALID, dae, stl, triangle
 
 FOCAL_35MM_TAG = 41989
+COLMAP_CAMERA: Final = "# cameras\n1 OPENCV 1280 720 1000 1000 640 360 0.1 0 0 0\n"
 K_WIDTH_HEIGHT = ([[1000.0, 0.0, 640.0], [0.0, 1000.0, 360.0], [0.0, 0.0, 1.0]], 1280, 720)
 
 
@@ -30,7 +35,7 @@ def write_cameras_of_others(folder: Path) -> list[Path]:
         "<dist_coeffs type_id='opencv-matrix'><rows>1</rows><cols>5</cols><dt>d</dt><data>0 0 0 0 0</data>"
         "</dist_coeffs></opencv_storage>",
         "camera.json": json.dumps({"K": K, "dist": [0.1, 0, 0, 0, 0], "width": width, "height": height}),
-        "cameras.txt": f"# cameras\n1 OPENCV {width} {height} 1000 1000 640 360 0.1 0 0 0\n",
+        "cameras.txt": COLMAP_CAMERA,
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -77,3 +82,52 @@ def write_choices(folder: Path) -> dict[str, list[Path]]:
         encoding="utf-8",
     )
     return {"nearer": [folder / "nearer.json"], "lengths": [folder / "lengths.toml"]}
+
+
+def write_body_angles(folder: Path) -> dict[str, list[Path]]:
+    """Write a clip as AMASS has it, and a body model; return the files by kind."""
+    np.savez(folder / "angles.npz", **clip_arrays())
+    np.savez(folder / "model.npz", **model_arrays())
+    return {"body angles": [folder / "angles.npz"], "body model": [folder / "model.npz"]}
+
+
+def write_robot_folders(folder: Path) -> dict[str, list[Path]]:
+    """Write an arm with meshes of three formats, its motion, and a model of COLMAP; return the files by kind."""
+    arm, model = folder / "arm", folder / "colmap"
+    arm.mkdir()
+    model.mkdir()
+    urdf = VALID
+    shapes = ('<sphere radius="0.1"/>', '<box size="0.1 0.2 0.3"/>', '<cylinder radius="0.1" length="0.5"/>')
+    meshes = {"a.stl": stl(1, triangle()), "b.obj": OBJ + b"f 1 2 3\n", "c.dae": dae()}
+    for shape, (name, data) in zip(shapes, meshes.items(), strict=True):
+        urdf = urdf.replace(shape, f'<mesh filename="{name}" scale="0.1 0.1 0.1"/>')
+        (arm / name).write_bytes(data)
+    (arm / "arm.urdf").write_text(urdf, encoding="utf-8")
+    (arm / "arm.srdf").write_text(
+        '<robot name="r"><disable_collisions link1="a" link2="c" reason="x"/></robot>', encoding="utf-8"
+    )
+    names = "time,root_pos_x,root_pos_y,root_pos_z,root_rot_x,root_rot_y,root_rot_z,root_rot_w,j"
+    rows = [f"{k / 30:.4f},0,0,1,0,0,0,1,{k / 20}" for k in range(10)]
+    (folder / "arm.csv").write_text("\n".join([names, *rows]), encoding="utf-8")
+    (model / "cameras.txt").write_text(COLMAP_CAMERA, encoding="utf-8")
+    (model / "images.txt").write_text("1 1 0 0 0 0.1 0.2 3 1 a.jpg\n1.5 2.5 -1\n", encoding="utf-8")
+    return {
+        "arm folder": sorted(arm.iterdir()),
+        "arm motion": [folder / "arm.csv"],
+        "COLMAP folder": sorted(model.iterdir()),
+    }
+
+
+def write_lines(folder: Path) -> dict[str, list[Path]]:
+    """Write a walk as lines of a live detector, by name and by number."""
+    view = read_view(folder / "walk.json")
+    header = json.dumps({"size": [1280, 720], "stature": "175cm", "deviation": 2})
+    lines = [
+        json.dumps({"time": k / 30, "points": dict(zip(JOINTS, points.tolist(), strict=True))})
+        for k, points in enumerate(view.image)
+    ]
+    lines += [
+        json.dumps({"time": 1 + k / 30, "points": points.tolist()}) for k, points in enumerate(view.image)
+    ]
+    (folder / "lines.jsonl").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
+    return {"live lines": [folder / "lines.jsonl"]}

@@ -5,19 +5,25 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import resource
 import shutil
 import signal
 import sys
 import time
 import traceback
+from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+import jsonschema
 import numpy as np
 
 from benchmarks.fuzz.cases import Case
+from posekit.formats.own.object_view_schema import OBJECT_VIEW_SCHEMA, ObjectViewFile
+from posekit.formats.own.schemas import SCHEMA_NAMES, schema
+from posekit.skeleton import POINTS
 
 MEMORY_BYTES: Final = 4 << 30
 PROCESSOR_SECONDS: Final = 20
@@ -25,6 +31,8 @@ PATIENCE_SECONDS: Final = 120.0
 """Of the clock: others may use the processor too."""
 ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 LONGEST_REFUSAL: Final = 2000
+TEXT_ENDINGS: Final = (".bvh", ".trc", ".mot", ".csv")
+NOT_FINITE: Final = re.compile(r"(?i)(?<![\w.])[-+]?(nan|inf|infinity)(?![\w.])")
 TRACEBACK: Final = "Traceback (most recent call last)"
 CRASHED: Final = 70
 """The code of a fork that an exception ended."""
@@ -108,7 +116,11 @@ def _run_alone(arguments: list[str], said: Path, processor: int) -> int:
         os.setsid()
         signal.signal(signal.SIGINT, signal.default_int_handler)
         out = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        source = os.devnull
+        if "<" in arguments:
+            place = arguments.index("<")
+            source, arguments = arguments[place + 1], arguments[:place] + arguments[place + 2 :]
+        os.dup2(os.open(source, os.O_RDONLY), 0)
         os.dup2(out, 1)
         os.dup2(out, 2)
         sys.stdout, sys.stderr = (os.fdopen(stream, "w", errors="backslashreplace") for stream in (1, 2))
@@ -129,9 +141,12 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
     """Try a case in a folder that is emptied before."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
+    top = case.name.partition("/")[0]
+    if top != case.name:
+        shutil.copytree(seeds / top, folder / top)
     if case.name:
         (folder / case.name).write_bytes(case.data)
-    arguments = placed(case.arguments, folder / case.name, folder / "out", seeds)
+    arguments = placed(case.arguments, folder / top, folder / "out", seeds)
     before = {path.name for path in folder.iterdir()}
     here = Path.cwd()
     os.chdir(folder)
@@ -153,7 +168,19 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
         return _refusal(said, written)
     if code not in (0, 1):
         return Outcome(f"exit {code}", said[-300:])
-    return _accepted(written, folder)
+    found = _accepted(written, folder)
+    return _answered(said) if found.clean and case.arguments[0] == "follow" else found
+
+
+def _answered(said: str) -> Outcome:
+    """Judge the lines of a live stream: each is JSON whose numbers are finite."""
+    try:
+        for line in said.splitlines():
+            if not line.startswith("posekit: "):
+                _in_domain(json.loads(line, parse_constant=_not_finite))
+    except ValueError as error:
+        return Outcome("not finite", f"{error}: {said[-300:]}")
+    return Outcome("accepted")
 
 
 def _killed(case: Case, code: int | None, folder: Path) -> Outcome:
@@ -209,9 +236,18 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
             return Outcome("left over", path.name)
         if path.suffix == ".json":
             try:
-                _in_domain(json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite))
+                held = json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
+                _in_domain(held)
             except ValueError as error:
                 return Outcome("not finite", f"{path.name}: {error}")
+            if isinstance(held, dict) and held.get("schema") in SCHEMA_NAMES:
+                wrong = next(_validator(held["schema"], _is_of_object(held)).iter_errors(held), None)
+                if wrong is not None:
+                    return Outcome("not of its schema", f"{path.name}: {wrong.json_path}: {wrong.message}"[:600])
+        if path.suffix in TEXT_ENDINGS:
+            odd = NOT_FINITE.search(path.read_text(encoding="utf-8"))
+            if odd is not None:
+                return Outcome("not finite", f"{path.name}: {odd[0]!r}")
         if path.suffix == ".npz":
             with np.load(path) as held:
                 infinite = [
@@ -226,6 +262,17 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
             if refused and "recover it with --linkage" not in again.read_text(errors="replace"):
                 return Outcome("not read again", f"{path.name}: {again.read_text(errors='replace')[-400:]}")
     return Outcome("accepted")
+
+
+@cache
+def _validator(name: str, of_object: bool) -> Any:
+    return jsonschema.Draft202012Validator(ObjectViewFile.model_json_schema() if of_object else schema(name))
+
+
+def _is_of_object(held: dict[str, Any]) -> bool:
+    """Tell a view of an object, which has the points of its linkage, from a person's."""
+    frames = held["frames"] if held["schema"] == OBJECT_VIEW_SCHEMA and "frames" in held else [{}]
+    return not frames[0].get("image", {}).keys() <= set(POINTS)
 
 
 def _in_domain(held: object) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -193,6 +194,7 @@ def run_folder(path: Path) -> Iterator[RunFolder]:
     """
     if path.exists() and not path.is_dir():
         raise refusal(path, "", "a file", "a folder", "choose another name")
+    made = not path.exists()
     make_folder(path)
     try:
         strange = sorted(one.name for one in path.iterdir() if one.name not in OWN_ENTRIES)
@@ -226,8 +228,22 @@ def run_folder(path: Path) -> Iterator[RunFolder]:
             yield folder
         finally:
             clear(folder.parts)
+            _leave_nothing(path, made)
     finally:
         os.close(handle)
+
+
+def _leave_nothing(path: Path, made: bool) -> None:
+    """Take away what a run has in its folder, and the folder where it was made, if nothing was opened or asked."""
+    asked = path / ASKED_FILE, path / MANIFEST_FILE
+    if any(one.exists() for one in asked) or any((path / SHARDS_FOLDER).iterdir()):
+        return
+    if not any((path / STAGED_FOLDER).glob("*.json")):  # what was opened is not opened again by the next run
+        for name in (PARTS_FOLDER, STAGED_FOLDER, SHARDS_FOLDER):
+            shutil.rmtree(path / name, ignore_errors=True)
+        (path / LOCK_FILE).unlink()
+        if made:
+            path.rmdir()
 
 
 def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:

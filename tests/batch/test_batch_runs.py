@@ -253,6 +253,11 @@ def test_only_bad_inputs_are_an_error(tmp_path: Path) -> None:
     (tmp_path / "b.json").write_text("[")
     with pytest.raises(InputError, match=r"a\.json.*\(and 1 more\)"):
         run_batch([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "out", RECIPE)
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "out").mkdir()
+    with pytest.raises(InputError, match=r"a\.json"):
+        run_batch([tmp_path / "a.json"], tmp_path / "out", RECIPE)
+    assert not list((tmp_path / "out").iterdir())
 
 
 def test_a_folder_that_cannot_be_listed_is_refused(

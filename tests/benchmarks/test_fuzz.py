@@ -49,7 +49,7 @@ def test_what_a_file_says_is_changed_and_its_grammar_stays(seeds: Path, name: st
 @pytest.mark.parametrize("kept", sorted(FINDS.glob("*.case.json")), ids=lambda path: path.name)
 def test_a_find_of_before_is_clean(seeds: Path, tmp_path: Path, kept: Path) -> None:
     held = json.loads(kept.read_text(encoding="utf-8"))
-    data = kept.with_name(kept.name.replace("case.json", held["name"])).read_bytes() if held["name"] else b""
+    data = kept.with_name(kept.name.replace("case.json", Path(held["name"]).name)).read_bytes() if held["name"] else b""
     found = tried(Case(held["kind"], held["arguments"], held["name"], data), seeds, tmp_path / "case")
     assert found.clean, found
 
@@ -107,6 +107,8 @@ def outcome(seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, comman
         ("raise SystemExit(3)", "exit 3"),
         ("import os; os.abort()", "signal 6"),
         ("(folder / 'x.json').write_text('[NaN]')", "not finite"),
+        ("(folder / 'x.csv').write_text('a,-inf')", "not finite"),
+        ("(folder / 'x.json').write_text('{\"schema\": \"posekit.view/1\"}')", "not of its schema"),
         ("(folder / 'x.part').touch()", "left over"),
         ("import time; time.sleep(9)", "hang"),
     ],
