@@ -51,6 +51,7 @@ SECTIONS: Final = (
     ("The papers", "posekit.papers"),
     ("Samples", "posekit.samples"),
     ("Command line", "posekit.cli"),
+    ("The command", "posekit.__main__"),
 )
 """Title, and the package or module; those of a package's folders that are packages have pages of their own."""
 

@@ -52,17 +52,9 @@ class Outcome(NamedTuple):
 
 def run_command(arguments: list[str]) -> int:
     """Run a command in this process, and return its exit code."""
-    module = import_module("posekit.cli.main")
-    take_signals = module.take_signals
-
-    def begin() -> None:
-        take_signals()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING_SIGNALS)
-
     sys.argv = ["posekit", *arguments]
-    vars(module)["take_signals"] = begin  # in this fork alone
     try:
-        module.main()
+        import_module("posekit.__main__").main()
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     return 0
@@ -80,7 +72,7 @@ def in_fork(
     `kill` is a signal that it gets, and after how many seconds; 0 for none.
     """
     said.write_bytes(b"")  # a killed fork may not come to it
-    # A signal that comes before the command begins says nothing of the command.
+    # A signal that comes before the command begins says nothing of the command, which hears it later.
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING_SIGNALS)
     child = os.fork()
     if child == 0:

@@ -26,11 +26,11 @@ def demo(
 ) -> None:
     """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables."""
     from posekit import papers
-    from posekit.safe_io.writing import make_folder
+    from posekit.safe_io.writing import results_folder
 
-    make_folder(output)
-    for line in papers.demo(output, pictures=pictures):
-        say(line)
+    with results_folder(output):
+        for line in papers.demo(output, pictures=pictures):
+            say(line)
     say("\ntry next, and open postures.html in a browser:")
     for command in TRY_NEXT:
         say(f"  {program()} {command}")

@@ -27,19 +27,19 @@ def reproduce(
 ) -> None:
     """Write what a paper prints, reproduced beside it; of all, each row with its check in one page."""
     from posekit import papers
-    from posekit.safe_io.writing import make_folder
+    from posekit.safe_io.writing import results_folder
 
     if paper not in PAPER_NAMES:
         raise InputError(
             f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPER_NAMES)}"
         )
     work = _effort(effort)
-    make_folder(output)
-    if paper == "taylor":
-        lines = papers.reproduce_taylor(output, pictures=pictures)
-    else:
-        make = papers.reproduce_all if paper == "all" else papers.reproduce_lee_chen
-        lines = make(output, pictures=pictures, effort=work)
+    with results_folder(output):
+        if paper == "taylor":
+            lines = papers.reproduce_taylor(output, pictures=pictures)
+        else:
+            make = papers.reproduce_all if paper == "all" else papers.reproduce_lee_chen
+            lines = make(output, pictures=pictures, effort=work)
     for line in lines:
         say(line)
     names = (

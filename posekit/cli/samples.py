@@ -22,9 +22,11 @@ def samples(
     ],
 ) -> None:
     """Write a folder of small files to try posekit with: views, motion, key points, a photograph, robots."""
+    from posekit.safe_io.writing import results_folder
     from posekit.samples import write_samples
 
-    contents = write_samples(folder)
+    with results_folder(folder):
+        contents = write_samples(folder)
     width = max(map(len, contents))
     for name, what in contents.items():
         say(f"{name:{width}}  {what}")

@@ -23,12 +23,16 @@ IMPORTING_FILE: Final = "<frozen importlib._bootstrap>"
 
 
 def take_signals() -> None:
-    """Let SIGTERM and SIGINT end this process by an exception; a SIGINT that is ignored stays ignored."""
+    """Let SIGTERM and SIGINT, also those held back until now, end this process by an exception.
+
+    A SIGINT that is ignored stays ignored.
+    """
     on_signal = partial(_on_signal, os.getpid())
     signal.signal(signal.SIGTERM, on_signal)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, on_signal)
     sys.unraisablehook = partial(_on_lost, on_signal)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
 
 
 def _on_signal(owner: int, number: int, frame: FrameType | None) -> None:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
-from posekit.errors import TooLargeError
+from posekit.errors import InputError, TooLargeError
 from posekit.safe_io.json_file import MAX_BYTES
 from posekit.safe_io.refusal import cut, refusal
 from posekit.safe_io.regular_file import is_packed
@@ -139,6 +139,27 @@ def make_folder(path: str | Path) -> None:
         raise refusal(
             path, "", error.strerror or str(error), "a folder for results", "choose another name"
         ) from None
+
+
+@contextmanager
+def results_folder(path: Path) -> Iterator[None]:
+    """Make a folder for several results; where one cannot be written, say that those before it stay.
+
+    Raises
+    ------
+    InputError
+        Where the folder cannot be made, or as the block raised it.
+    """
+    there = set(path.iterdir()) if path.is_dir() else None
+    make_folder(path)
+    try:
+        yield
+    except InputError as error:
+        if set(path.iterdir()) - (there or set()):
+            raise InputError(f"{error}; what was finished before stays in {cut(str(path))}") from None
+        if there is None:
+            path.rmdir()
+        raise
 
 
 def safe_stem(name: str) -> str:

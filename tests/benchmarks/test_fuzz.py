@@ -91,7 +91,7 @@ def outcome(seeds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, comman
         exec(command, {"folder": Path.cwd()})
 
     if command:
-        monkeypatch.setattr(import_module("posekit.cli.main"), "main", main)
+        monkeypatch.setattr(import_module("posekit.__main__"), "main", main)
     return tried(Case("options", VALIDATE), seeds, tmp_path / "case")
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import json
 import os
+import resource
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from posekit.errors import InputError
 from posekit.safe_io import write_text
 from posekit.skeleton import DOFS
 
+ROOT = Path(__file__).parents[2]
 LONG = "x" * 300
 COMMANDS_WITH_LONG_NAMES = [
     ("inspect", LONG),
@@ -159,6 +162,41 @@ main()
     )
     assert (ended.returncode, ended.stderr) == (code, f"posekit: error: {says}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["modules"]
+
+
+@pytest.mark.parametrize(("most", "stays"), [(100, False), (20_000, True)])
+def test_a_disk_that_fills_leaves_no_empty_folder_and_says_what_stays(
+    run: Callable[..., Any], tmp_path: Path, most: int, stays: bool
+) -> None:
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, usual[1]))
+    try:
+        outcome = run("samples", "out")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    assert outcome.code == 2 and "File too large" in outcome.err
+    assert ("what was finished before stays in out" in outcome.err) == stays
+    assert (tmp_path / "out" / "walk.json").is_file() == (tmp_path / "out").exists() == stays
+
+
+def test_a_signal_that_comes_while_the_command_loads_is_one_line() -> None:
+    module, _, name = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]["posekit"].partition(":")
+    program = f"""
+import os, signal, sys
+class Finder:
+    def find_spec(name, path, target=None):
+        if name == "typer":
+            os.kill(os.getpid(), signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Finder)
+sys.argv = ["posekit", "--version"]
+from {module} import {name} as main
+main()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (130, "posekit: error: interrupted\n")
 
 
 def test_a_long_list_is_no_name_of_a_file(run: Callable[..., Any]) -> None:
