@@ -142,6 +142,35 @@ def make_folder(path: str | Path) -> None:
 
 
 @contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """Give a folder beside the target, which takes its place, or whose entries do, when the block ends well.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written; errors of the block that name it name the target instead.
+    """
+    beside = path.absolute().with_name(f".{secrets.token_hex(8)}.part")
+    try:
+        beside.mkdir()
+        yield beside
+        if path.exists():  # it may be the one that the command was called in
+            for entry in beside.iterdir():
+                entry.replace(path / entry.name)
+        else:
+            beside.replace(path)
+    except InputError as error:
+        raise InputError(str(error).replace(str(beside), str(path))) from None
+    except OSError as error:
+        reason = cut(error.strerror or str(error))
+        raise refusal(
+            path, "", reason, "a folder that can be written", "check permissions and free space"
+        ) from None
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+@contextmanager
 def results_folder(path: Path) -> Iterator[None]:
     """Make a folder for several results; where one cannot be written, say that those before it stay.
 

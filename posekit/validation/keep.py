@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,8 @@ from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_rows import csv_line
 from posekit.formats.own.report_table import said_of_span
-from posekit.safe_io import cut, refusal, write_lines
-from posekit.safe_io.writing import make_folder
+from posekit.safe_io import refusal, write_lines
+from posekit.safe_io.writing import make_folder, replacing_folder
 
 ROUNDING_SECONDS: Final = 1e-6
 """Seconds that the difference of two times may be off."""
@@ -98,21 +97,9 @@ def keep_clips(
     """
     check_keep_folder(folder)
     make_folder(folder.parent)
-    beside = folder.absolute().with_name(f".{secrets.token_hex(8)}.part")
-    try:
-        beside.mkdir()
+    with replacing_folder(folder) as beside:
         kept = Kept(clips=tuple(_written(beside, clips, frames, spans)))
         write_lines(beside / MANIFEST_NAME, map(csv_line, [KeptClip._fields, *kept.clips]))
-        if folder.exists():  # empty; it may be the one that the command was called in
-            for entry in beside.iterdir():
-                entry.replace(folder / entry.name)
-        else:
-            beside.replace(folder)
-    except OSError as error:
-        reason = cut(error.strerror or str(error))
-        raise refusal(folder, "", reason, "a folder that can be written", "check free space") from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
     return kept
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.safe_io import writing
-from posekit.safe_io.writing import json_pieces, replacing, write_text
+from posekit.safe_io.writing import json_pieces, replacing, replacing_folder, write_text
 
 
 def test_content_replaces_content(tmp_path):
@@ -49,6 +49,16 @@ def test_a_full_disk_is_one_line(tmp_path):
     with pytest.raises(InputError, match="got No space left on device; expected a file that can be written"):
         with replacing(tmp_path / "out", sync=True):
             raise OSError(28, "No space left on device")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_in_a_folder_that_grows_names_the_folder_that_was_asked_for(tmp_path):
+    path = tmp_path / "out"
+    with pytest.raises(InputError) as caught, replacing_folder(path) as folder:
+        (folder / "first").write_text("whole")
+        with replacing(folder / "second"):
+            raise OSError(28, "No space left on device")
+    assert str(caught.value).startswith(f"{path}/second: got No space left on device")
     assert not list(tmp_path.iterdir())
 
 

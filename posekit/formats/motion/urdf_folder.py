@@ -12,10 +12,7 @@ from __future__ import annotations
 
 import csv
 import io
-import secrets
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
@@ -31,6 +28,7 @@ from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array
 from posekit.safe_io import cut, open_npz, refusal, replacing, shown, write_text
+from posekit.safe_io.writing import replacing_folder
 from posekit.skeleton import POINTS
 
 FOLDER_SCHEMA: Final = "posekit.configurations/1"
@@ -64,7 +62,8 @@ def write_urdf_folder(path: str | Path, figure: Figure, q: Array, time: Array, *
     """
     q = checked(path, figure, q, time, up)
     seconds = np.asarray(time, dtype=np.float64)
-    with _filling(Path(path)) as folder:
+    _check_folder(Path(path))
+    with replacing_folder(Path(path)) as folder:
         write_text(folder / FIGURE_FILE, [figure.urdf])
         write_text(folder / SRDF_FILE, [figure.srdf])
         write_text(folder / MUJOCO_FILE, [mujoco_text(figure)])
@@ -146,9 +145,8 @@ def _table(figure: Figure, q: Array, time: Array) -> Iterator[bytes]:
     yield text.getvalue().encode("ascii")
 
 
-@contextmanager
-def _filling(folder: Path) -> Iterator[Path]:
-    """Give a folder beside the target, which takes its place when the block ends well."""
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that holds anything else."""
     if folder.exists() and not folder.is_dir():
         raise refusal(folder, "", "a file", "the name of a folder", "choose another name")
     there = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
@@ -156,20 +154,6 @@ def _filling(folder: Path) -> Iterator[Path]:
     if other:
         got = f"a folder that holds {cut(other[0])}"
         raise refusal(folder, "", got, "a new or empty folder", "choose another name")
-    beside = folder.absolute().with_name(f".{secrets.token_hex(8)}.part")
-    try:
-        beside.mkdir()
-        yield beside
-        folder.mkdir(exist_ok=True)
-        for name in FOLDER_FILES:
-            (beside / name).replace(folder / name)
-    except OSError as error:
-        reason = cut(error.strerror or str(error))
-        raise refusal(
-            folder, "", reason, "a folder that can be written", "check permissions and free space"
-        ) from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 URDF_FORMAT: Final = MotionFormat(
