@@ -18,6 +18,7 @@ from benchmarks.fuzz.others import (
     write_cameras_of_others,
     write_choices,
     write_lines,
+    write_object_views,
     write_points_of_others,
     write_robot_folders,
 )
@@ -25,6 +26,7 @@ from posekit.batch.view_table import write_view_table
 from posekit.cli.main import application
 from posekit.formats.keypoints import key_point_formats
 from posekit.formats.own import read_view, schema_text
+from posekit.linkages.reading import load_linkage
 from posekit.robots.find import find
 from posekit.samples import write_samples
 from tests.detector_files import view_keypoints, write_keypoints
@@ -53,9 +55,13 @@ COMMANDS: Final = {
     "camera": ("recover SEEDS/keypoints -o OUT.json --stature 175cm --camera IN",),
     "ranges": ("validate SEEDS/walk.npz -o OUT.json --ranges IN",),
     "profile": ("validate SEEDS/walk.npz -o OUT.json --profile IN",),
-    "linkage": ("recover SEEDS/gripper.json -o OUT.json --linkage IN --scale min", "inspect IN"),
+    "linkage": ("recover SEEDS/STEM.json -o OUT.json --linkage IN --scale min", "inspect IN"),
     "skeleton": ("inspect SEEDS/coco.json --skeleton IN",),
-    "robot": ("validate SEEDS/robot.npz -o OUT.json --urdf IN", "inspect IN"),
+    "motion skeleton": (
+        "inspect SEEDS/motion.trc --skeleton IN",
+        "convert SEEDS/motion.csv OUT.bvh --skeleton IN",
+    ),
+    "robot": ("validate SEEDS/person/configurations.npz -o OUT.json --urdf IN", "inspect IN"),
     "robot motion": ("validate IN -o OUT.json --urdf g1", "inspect IN"),
     "report": ("inspect IN",),
     "object": (
@@ -94,8 +100,8 @@ COMMANDS: Final = {
         "inspect IN",
     ),
 }
-"""Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files; of a damaged
-file in a folder IN is the folder. What follows < is read from standard input."""
+"""Commands by kind of file: IN is the damaged file, OUT what is written, SEEDS the folder of whole files, STEM
+its name; of a damaged file in a folder IN is the folder. What follows < is read from standard input."""
 OPTION_COMMANDS: Final = (
     "recover SEEDS/walk.json -o OUT.json",
     "recover SEEDS/photo.json -o OUT.npz",
@@ -238,14 +244,12 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
         run(["convert", str(folder / "result.npz"), str(path), "--posture", "all"])
         seeds["survivors"].append(path)
     built_in = Path(find("stick_figure").urdf).parent
-    for kind, pattern in (
-        ("ranges", "ranges"),
-        ("profile", "profiles"),
-        ("linkage", "linkages"),
-        ("skeleton", "skeleton_maps"),
-    ):
-        seeds[kind] = sorted((built_in / pattern).glob("*.toml"))
-    seeds["robot"] = [built_in / "stick_figure.urdf", Path(find("simple_humanoid").urdf)]
+    for kind in ("range", "profile", "linkage"):
+        seeds["ranges" if kind == "range" else kind] = sorted((built_in / f"{kind}s").glob("*.toml"))
+    seeds["skeleton"] = [built_in / "skeleton_maps" / "coco_17.toml"]
+    seeds["motion skeleton"] = [built_in / "skeleton_maps" / "posekit.toml"]
+    write_object_views(folder, {path.stem: load_linkage(path).points for path in seeds["linkage"]})
+    seeds["robot"] = [built_in / "stick_figure.urdf"]
     seeds["robot motion"] = [folder / "robot.npz"]
     run(["validate", str(folder / "walk.npz"), "-o", str(folder / "report.json")])
     (folder / "schema.json").write_text(schema_text("view"), encoding="utf-8")
@@ -267,7 +271,8 @@ def file_case(
     path = rng.choice(seeds[kind])
     data = damage(path.read_bytes(), rng)
     name = str(path.relative_to(folder)) if path.is_relative_to(folder) else path.name
-    return Case(f"{kind} {path.suffix}", rng.choice(COMMANDS[kind]).split(), name, data)
+    command = rng.choice(COMMANDS[kind]).replace("STEM", path.stem)
+    return Case(f"{kind} {path.suffix}", command.split(), name, data)
 
 
 def kill_case(rng: random.Random) -> Case:

@@ -106,8 +106,8 @@ def write_robot_folders(folder: Path) -> dict[str, list[Path]]:
     (arm / "arm.srdf").write_text(
         '<robot name="r"><disable_collisions link1="a" link2="c" reason="x"/></robot>', encoding="utf-8"
     )
-    names = "time,root_pos_x,root_pos_y,root_pos_z,root_rot_x,root_rot_y,root_rot_z,root_rot_w,j"
-    rows = [f"{k / 30:.4f},0,0,1,0,0,0,1,{k / 20}" for k in range(10)]
+    names = "time,root_pos_x,root_pos_y,root_pos_z,root_rot_x,root_rot_y,root_rot_z,root_rot_w,j,k"
+    rows = [f"{k / 30:.4f},0,0,1,0,0,0,1,{k / 20},{k / 10}" for k in range(10)]
     (folder / "arm.csv").write_text("\n".join([names, *rows]), encoding="utf-8")
     (model / "cameras.txt").write_text(COLMAP_CAMERA, encoding="utf-8")
     (model / "images.txt").write_text("1 1 0 0 0 0.1 0.2 3 1 a.jpg\n1.5 2.5 -1\n", encoding="utf-8")
@@ -118,10 +118,22 @@ def write_robot_folders(folder: Path) -> dict[str, list[Path]]:
     }
 
 
+def write_object_views(folder: Path, linkages: dict[str, tuple[str, ...]]) -> None:
+    """Write a view of each of some linkages by its points, on a parabola."""
+    for name, points in linkages.items():
+        image = {point: [40.0 * k, 7.0 * k * k] for k, point in enumerate(points)}
+        view = {
+            "schema": "posekit.view/1",
+            "camera": {"model": "scaled-orthographic", "scale": None},
+            "frames": [{"time": 0.0, "image": image}],
+        }
+        (folder / f"{name}.json").write_text(json.dumps(view), encoding="utf-8")
+
+
 def write_lines(folder: Path) -> dict[str, list[Path]]:
     """Write a walk as lines of a live detector, by name and by number."""
     view = read_view(folder / "walk.json")
-    header = json.dumps({"size": [1280, 720], "stature": "175cm", "deviation": 2})
+    header = json.dumps({"size": [1280, 720], "stature": 1.75, "deviation": 2})
     lines = [
         json.dumps({"time": k / 30, "points": dict(zip(JOINTS, points.tolist(), strict=True))})
         for k, points in enumerate(view.image)

@@ -19,6 +19,7 @@ from posekit.formats.own import ValidationReport, read_report, write_report
 from posekit.safe_io import extra, refusal
 from posekit.safe_io.writing import make_folder
 from posekit.validation import AskedValidation, WantedDetail, validate_files
+from posekit.validation.files import none_judged
 
 PART_BYTES: Final = 64_000_000
 PART_FILES: Final = 500
@@ -116,7 +117,7 @@ def validate_archive(
     Raises
     ------
     InputError
-        Where the folder cannot be written, or what is asked is impossible.
+        Where the folder cannot be written, no file can be judged, or what is asked is impossible.
     """
     extra("pyarrow.parquet", "parquet", "verdicts in a folder")
     if output.exists() and not output.is_dir():
@@ -124,7 +125,14 @@ def validate_archive(
     made = not output.exists()
     make_folder(output)
     try:
-        return _judge_parts(list(parts_of(files, output, asked)), workers or Workers(), progress)
+        parts = list(parts_of(files, output, asked))
+        totals = _judge_parts(parts, workers or Workers(), progress)
+        if totals.refused and not totals.frames.total():
+            for part in parts:
+                part.report.unlink()
+                part.table.unlink()
+            raise none_judged(len(files), totals.refused[0])
+        return totals
     except BaseException:
         if made and not any(output.iterdir()):  # what is impossible leaves nothing behind
             output.rmdir()

@@ -151,11 +151,15 @@ def validate_files(
         if progress is not None:
             progress(1)
     if strict and built.empty:
-        why = (*refused, *left_out)[0]
-        raise InputError(f"none of {len(paths)} files can be judged; the first: {why}")
+        raise none_judged(len(paths), (*refused, *left_out)[0])
     name = asked.told if asked.urdf or not built.own else "as recovered"
     others = {"left_out": left_out} if left_out else {}
     return replace(built.report({"urdf": name, **others}), refused=tuple(refused))
+
+
+def none_judged(count: int, first: str) -> InputError:
+    """Word that none of some files can be judged, with why the first cannot."""
+    return InputError(f"none of {count} files can be judged; the first: {first}" if count > 1 else first)
 
 
 def _other_content(path: Path) -> str:

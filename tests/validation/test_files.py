@@ -254,6 +254,14 @@ def test_an_archive_that_cannot_be_judged_leaves_no_folder(run, folder: Path, tm
     assert not (tmp_path / "out").exists()
 
 
+def test_an_archive_of_broken_files_alone_leaves_no_folder(run, tmp_path: Path) -> None:
+    for name in ("a.npz", "b.npz"):
+        (tmp_path / name).write_text("junk", encoding="utf-8")
+    outcome = run("a.npz", "b.npz", "-o", "out", "--jobs", "1")
+    assert outcome.code == 2 and outcome.err.count("\n") == 1 and "none of 2 files" in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_archive_goes_on_where_it_was(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
