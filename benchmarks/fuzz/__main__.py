@@ -26,10 +26,15 @@ from benchmarks.fuzz.damage import damaged
 from benchmarks.fuzz.structure import rearranged
 from benchmarks.fuzz.trial import Outcome, in_fork, placed, tried
 from posekit.formats.markdown import table_lines
+from posekit.safe_io import write_lines
 
 WHOLE_SECONDS = 600
 OPTION_SHARE, KILL_SHARE = 0.25, 0.05
 """The shares of cases that are odd options, and whole commands that are killed; the others are damaged files."""
+
+
+COUNTED_EVERY = 100
+"""Cases after which the counts are written, beside what was found."""
 
 
 def changed(data: bytes, rng: random.Random) -> bytes:
@@ -59,6 +64,14 @@ def keep(folder: Path, number: int, case: Case, outcome: Outcome) -> None:
         "detail": outcome.detail,
     }
     (folder / f"{number}.case.json").write_text(json.dumps(said, indent=1), encoding="utf-8")
+
+
+def counted(counts: Counter[tuple[str, str]]) -> list[str]:
+    """Return a table of outcomes by kind."""
+    whats = sorted({what for _, what in counts})
+    kinds = sorted({kind for kind, _ in counts})
+    rows = [(kind, *(counts[kind, what] for what in whats)) for kind in kinds]
+    return table_lines(("kind", *whats), [*rows, ("all", *(sum(counts[k, w] for k in kinds) for w in whats))])
 
 
 def main() -> int:
@@ -96,14 +109,11 @@ def main() -> int:
                 keep(given.output, number, case, outcome)
                 print(f"{number}: {outcome.what}: {' '.join(case.arguments)}", file=sys.stderr, flush=True)
             number += 1
-    whats = sorted({what for _, what in counts})
-    kinds = sorted({kind for kind, _ in counts})
-    rows = [(kind, *(counts[kind, what] for what in whats)) for kind in kinds]
-    print(
-        *table_lines(("kind", *whats), [*rows, ("all", *(sum(counts[k, w] for k in kinds) for w in whats))]),
-        sep="\n",
-    )
-    return int(any(not Outcome(what).clean for what in whats))
+            if number % COUNTED_EVERY == 0:
+                given.output.mkdir(parents=True, exist_ok=True)
+                write_lines(given.output / "counts.md", counted(counts))
+    print(*counted(counts), sep="\n")
+    return int(any(not Outcome(what).clean for _, what in counts))
 
 
 if __name__ == "__main__":
