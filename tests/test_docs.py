@@ -68,7 +68,7 @@ def test_every_module_is_on_one_page(page: ModuleType) -> None:
 
 def test_a_package_on_no_page_is_named(page: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page, "SECTIONS", page.SECTIONS[:-1])
-    with pytest.raises(ValueError, match=r"^posekit\.cli: on no page"):
+    with pytest.raises(ValueError, match=r"^posekit\.__main__: on no page"):
         page.pages()
 
 

@@ -25,7 +25,7 @@ from benchmarks.fuzz.others import (
 from posekit.batch.view_table import write_view_table
 from posekit.cli.main import application
 from posekit.formats.keypoints import key_point_formats
-from posekit.formats.own import read_view, schema_text
+from posekit.formats.own import View, read_view, schema_text
 from posekit.linkages.reading import load_linkage
 from posekit.robots.find import find
 from posekit.samples import write_samples
@@ -180,7 +180,7 @@ ODD_VALUES: Final = (
 
 
 class Case(NamedTuple):
-    """One attack: its kind, the arguments, and the damaged file with the name that it gets, or its place in a folder."""
+    """One attack: its kind, the arguments, and the damaged file with its name, or its place in a folder."""
 
     kind: str
     arguments: list[str]
@@ -211,17 +211,7 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
     run(["synth", "random", "-o", str(folder / "random.json"), "--frames", "2"])
     seeds["view"] = [folder / "walk.json", folder / "photo.json", folder / "random.json"]
     view = read_view(folder / "random.json")
-    for name in key_point_formats():
-        path = folder / (f"{name}.csv" if name in ("deeplabcut",) else f"{name}.json")
-        try:
-            write_keypoints(path, view_keypoints(view, name), name)
-        except (OSError, KeyError, ValueError):
-            continue
-        seeds["key points"] += [path] if path.is_file() else sorted(path.glob("*.*"))[:1]
-    shutil.copy(next(iter((folder / "keypoints").iterdir())), folder / "openpose_keypoints.json")
-    seeds["key points"].append(folder / "openpose_keypoints.json")
-    write_keypoints(folder / "mediapipe.csv", view_keypoints(view, "mediapipe"), "mediapipe")
-    seeds["key points"].append(folder / "mediapipe.csv")
+    seeds["key points"] = _write_key_points(folder, view)
     seeds["camera"] = write_cameras_of_others(folder)
     seeds["points"] = write_points_of_others(folder)
     seeds |= write_choices(folder) | write_body_angles(folder) | write_robot_folders(folder)
@@ -243,13 +233,7 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
         path = folder / f"survivors.{ending}"
         run(["convert", str(folder / "result.npz"), str(path), "--posture", "all"])
         seeds["survivors"].append(path)
-    built_in = Path(find("stick_figure").urdf).parent
-    for kind in ("range", "profile", "linkage"):
-        seeds["ranges" if kind == "range" else kind] = sorted((built_in / f"{kind}s").glob("*.toml"))
-    seeds["skeleton"] = [built_in / "skeleton_maps" / "coco_17.toml"]
-    seeds["motion skeleton"] = [built_in / "skeleton_maps" / "posekit.toml"]
-    write_object_views(folder, {path.stem: load_linkage(path).points for path in seeds["linkage"]})
-    seeds["robot"] = [built_in / "stick_figure.urdf"]
+    seeds |= _built_in_tables(folder)
     seeds["robot motion"] = [folder / "robot.npz"]
     run(["validate", str(folder / "walk.npz"), "-o", str(folder / "report.json")])
     (folder / "schema.json").write_text(schema_text("view"), encoding="utf-8")
@@ -258,6 +242,38 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
     if lacking:
         raise RuntimeError(f"seeds could not be written: {', '.join(lacking)}")
     return seeds
+
+
+def _write_key_points(folder: Path, view: View) -> list[Path]:
+    """Write what detectors would of a view, in every format; return the files."""
+    found: list[Path] = []
+    for name in key_point_formats():
+        path = folder / (f"{name}.csv" if name in ("deeplabcut",) else f"{name}.json")
+        try:
+            write_keypoints(path, view_keypoints(view, name), name)
+        except (OSError, KeyError, ValueError):
+            continue
+        found += [path] if path.is_file() else sorted(path.glob("*.*"))[:1]
+    shutil.copy(next(iter((folder / "keypoints").iterdir())), folder / "openpose_keypoints.json")
+    found.append(folder / "openpose_keypoints.json")
+    write_keypoints(folder / "mediapipe.csv", view_keypoints(view, "mediapipe"), "mediapipe")
+    found.append(folder / "mediapipe.csv")
+    return found
+
+
+def _built_in_tables(folder: Path) -> dict[str, list[Path]]:
+    """Return the built-in tables and figure by kind, and write a view of each linkage."""
+    built_in = Path(find("stick_figure").urdf).parent
+    linkages = sorted((built_in / "linkages").glob("*.toml"))
+    write_object_views(folder, {path.stem: load_linkage(path).points for path in linkages})
+    return {
+        "ranges": sorted((built_in / "ranges").glob("*.toml")),
+        "profile": sorted((built_in / "profiles").glob("*.toml")),
+        "linkage": linkages,
+        "skeleton": [built_in / "skeleton_maps" / "coco_17.toml"],
+        "motion skeleton": [built_in / "skeleton_maps" / "posekit.toml"],
+        "robot": [built_in / "stick_figure.urdf"],
+    }
 
 
 def file_case(

@@ -227,15 +227,9 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
         if path.name.endswith(".part"):
             return Outcome("left over", path.name)
         if path.suffix == ".json":
-            try:
-                held = json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
-                _in_domain(held)
-            except ValueError as error:
-                return Outcome("not finite", f"{path.name}: {error}")
-            if isinstance(held, dict) and held.get("schema") in SCHEMA_NAMES:
-                wrong = next(_validator(held["schema"], _is_of_object(held)).iter_errors(held), None)
-                if wrong is not None:
-                    return Outcome("not of its schema", f"{path.name}: {wrong.json_path}: {wrong.message}"[:600])
+            fault = _json_fault(path)
+            if fault is not None:
+                return fault
         if path.suffix in TEXT_ENDINGS:
             odd = NOT_FINITE.search(path.read_text(encoding="utf-8"))
             if odd is not None:
@@ -254,6 +248,20 @@ def _accepted(written: list[Path], folder: Path) -> Outcome:
             if refused and "recover it with --linkage" not in again.read_text(errors="replace"):
                 return Outcome("not read again", f"{path.name}: {again.read_text(errors='replace')[-400:]}")
     return Outcome("accepted")
+
+
+def _json_fault(path: Path) -> Outcome | None:
+    """Judge a JSON file: its numbers are finite, and it is what its published schema says."""
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
+        _in_domain(held)
+    except ValueError as error:
+        return Outcome("not finite", f"{path.name}: {error}")
+    if isinstance(held, dict) and held.get("schema") in SCHEMA_NAMES:
+        wrong = next(_validator(held["schema"], _is_of_object(held)).iter_errors(held), None)
+        if wrong is not None:
+            return Outcome("not of its schema", f"{path.name}: {wrong.json_path}: {wrong.message}"[:600])
+    return None
 
 
 @cache

@@ -49,7 +49,11 @@ def test_what_a_file_says_is_changed_and_its_grammar_stays(seeds: Path, name: st
 @pytest.mark.parametrize("kept", sorted(FINDS.glob("*.case.json")), ids=lambda path: path.name)
 def test_a_find_of_before_is_clean(seeds: Path, tmp_path: Path, kept: Path) -> None:
     held = json.loads(kept.read_text(encoding="utf-8"))
-    data = kept.with_name(kept.name.replace("case.json", Path(held["name"]).name)).read_bytes() if held["name"] else b""
+    data = (
+        kept.with_name(kept.name.replace("case.json", Path(held["name"]).name)).read_bytes()
+        if held["name"]
+        else b""
+    )
     found = tried(Case(held["kind"], held["arguments"], held["name"], data), seeds, tmp_path / "case")
     assert found.clean, found
 

@@ -180,7 +180,9 @@ def test_a_disk_that_fills_leaves_no_empty_folder_and_says_what_stays(
 
 
 def test_a_signal_that_comes_while_the_command_loads_is_one_line() -> None:
-    module, _, name = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]["posekit"].partition(":")
+    module, _, name = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "scripts"
+    ]["posekit"].partition(":")
     program = f"""
 import os, signal, sys
 class Finder:
