@@ -217,6 +217,7 @@ class TestResult:
             (lambda f: f["frames"][0]["levels"]["point"].pop(), "levels"),
             (lambda f: f["frames"][0]["postures"][0].pop("certified"), "certified"),
             (lambda f: f.pop("points"), "points"),
+            (lambda f: f.update(points=["a", "b", "d"]), 'segments: got "c"; expected names of points'),
             (lambda f: f.update(more=1), "no field of this name"),
         ],
     )
