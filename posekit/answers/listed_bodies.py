@@ -123,6 +123,11 @@ class ListedBodies(ShortRepr):
         return np.asarray(given + np.eye(3) * FLOOR_METRES**2)
 
     @property
+    def unseen(self) -> int:
+        """How many joints were not seen: where they are, nothing tells how sure it is."""
+        return int(np.isnan(self.depth_variance).all(axis=0).sum()) if len(self) else 0
+
+    @property
     def depth_variance(self) -> Array:
         """The variance of every joint's depth (N, 14), square metres; NaN where it is not known."""
         given = self.uncertainty

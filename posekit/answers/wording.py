@@ -50,7 +50,7 @@ def answer_lines(answers: Sequence[Answer]) -> list[str]:
     limbs = _limbs(answers[least])
     if len(answers) == 1:
         return [
-            f"likeliest: {percent(sure[0])} sure, to 5 cm in every joint; {limbs}",
+            f"likeliest: {percent(sure[0])} sure, to 5 cm in {_joints(answers)}; {limbs}",
             f"what else it can be: {_others(answers[0])}",
         ]
     others = _nothing_else([answers[k] for k in found])
@@ -59,10 +59,18 @@ def answer_lines(answers: Sequence[Answer]) -> list[str]:
         some = "1 distinct posture holds" if middle == 1 else f"{middle:g} distinct postures hold"
         others = f"{some} {held} in the median frame, {max(count)} in frame {most}"
     return [
-        f"likeliest: {percent(float(np.median(sure)))} sure in the median frame, to 5 cm in every joint; least sure is "
-        f"frame {least}, {percent(min(sure))}: {limbs}",
+        f"likeliest: {percent(float(np.median(sure)))} sure in the median frame, to 5 cm in {_joints(answers)}; "
+        f"least sure is frame {least}, {percent(min(sure))}: {limbs}",
         f"what else it can be: {others}",
     ]
+
+
+def _joints(answers: Sequence[Answer]) -> str:
+    """Say of which joints something is sure: not of those that no picture shows."""
+    unseen = [answer.bodies.unseen for answer in answers]
+    if not any(unseen):
+        return "every joint"
+    return f"every joint that is seen ({'' if len(unseen) == 1 else 'up to '}{max(unseen)} of 14 are not)"
 
 
 def path_words(probability: Sequence[float]) -> str:

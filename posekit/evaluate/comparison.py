@@ -16,6 +16,7 @@ from posekit.geometry import Array
 from posekit.measures import mpjpe, pa_mpjpe
 from posekit.recovery.ranked import probabilities
 from posekit.recovery.recovery import FrameRecovery, Recovery
+from posekit.skeleton import JOINT
 from posekit.validation import recovered_with
 
 MEASURE_LABELS: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
@@ -23,7 +24,7 @@ MEASURE_LABELS: Final = ("where it is", "moved to the true middle", "turned and 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """Errors of F frames in three measures: mean distance of the joints that are known in both, metres.
+    """Errors of F frames in three measures: mean distance of the joints that are known in both, and were seen, metres.
 
     The measures: in the camera frame as it is; after moving the middle of its joints onto the truth's; after a
     similarity (`posekit.measures.pa_mpjpe`).
@@ -83,14 +84,17 @@ def compare(recovery: Recovery | Result, truth: Array) -> Comparison:
     for k, frame in enumerate(frames):
         joints = frame.joints
         known = np.isfinite(truth[k, :, 0])
+        # What was not seen is inferred, one of many places: its distance says nothing of the picture.
+        known[[JOINT[name] for name in (frame.inferred or [{}])[0]]] = False
+        true = np.where(known[:, None], truth[k], np.nan)
         if path is not None and (np.isfinite(path[k, :, 0]) & known).any():
-            found["path"][k] = np.stack(_errors(path[k][None], truth[k]), axis=-1)[0]
+            found["path"][k] = np.stack(_errors(path[k][None], true), axis=-1)[0]
         both = np.isfinite(joints[..., 0]) & known
         if not both.any(axis=1).all() or not len(
             frame
         ):  # the joints that are known are the same in all survivors
             continue
-        errors = np.stack(_errors(joints, truth[k]), axis=-1)
+        errors = np.stack(_errors(joints, true), axis=-1)
         found["best"][k] = np.nanmin(errors, axis=0)
         found["first"][k] = errors[first[k]]
         found["middle"][k] = np.nanmedian(errors, axis=0)

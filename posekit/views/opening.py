@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 from typing import Final
@@ -14,7 +15,7 @@ from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_peopl
 from posekit.formats.keypoints.persons import PERSON_RULES
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import shown
-from posekit.views.camera import in_pixels, sighting
+from posekit.views.camera import in_pixels, sighting, split_camera
 from posekit.views.opened import Opened
 from posekit.views.person import person
 from posekit.views.person_view import ASSUMED_VIEW_RATE, person_view
@@ -49,7 +50,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
     people = list_people(sighted.keypoints)
     figure, of_lengths, length_deviation = person(source, sighted.camera, found.layout, Path(path))
     if source.person != "all":
-        chosen = [choose_person(sighted.keypoints, source.person or "largest")]
+        chosen = [choose_person(sighted.keypoints, source.person or _of_camera(found, source) or "largest")]
     else:
         chosen = [choose(sighted.keypoints, one.person) for one in people]
     opened = []
@@ -86,6 +87,20 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             "smaller --min-confidence, or another file"
         )
     return opened
+
+
+def _of_camera(found: KeyPoints, source: Source) -> str:
+    """Return the number of the camera whose pictures these are, of a file that has those of several; else nothing."""
+    if not found.by_camera:
+        return ""
+    there = sorted({str(number) for number in found.person.tolist()}, key=int)
+    number = re.search(r"(\d+)\Z", split_camera(source.camera)[1] if source.camera else "")
+    if number is None or str(int(number[1])) not in there:
+        raise InputError(
+            f"{found.source}: what cameras {', '.join(there)} saw; expected one of them; name it with --camera, as "
+            f"config.toml:cam_{there[0]}, or say --person {there[0]}"
+        )
+    return str(int(number[1]))
 
 
 def _assumed_rate(found: KeyPoints, source: Source) -> list[str]:

@@ -39,6 +39,16 @@ def test_one_frame_is_told_with_its_limbs_and_its_alternative():
     ]
 
 
+def test_nothing_is_sure_of_joints_that_no_picture_shows():
+    uncertainty = np.tile(np.eye(3) * 0.005**2, (1, 14, 1, 1))
+    uncertainty[:, [JOINT["left_knee"], JOINT["left_ankle"]]] = np.nan
+    (half,) = answers_of(
+        [ListedBodies(joints=ONE.bodies.joints, probability=np.ones(1), uncertainty=uncertainty)]
+    )
+    assert "sure, to 5 cm in every joint that is seen (2 of 14 are not); " in answer_lines([half])[0]
+    assert "in every joint that is seen (up to 2 of 14 are not); " in answer_lines([ONE, half])[0]
+
+
 def test_what_is_sure_is_told_as_sure():
     first, second = answer_lines([ONE])
     assert first.startswith("likeliest: 100 % sure")

@@ -260,6 +260,25 @@ def test_caliscope_has_a_matrix(tmp_path: Path) -> None:
         read_cameras(save(tmp_path, "mirrored.toml", mirrored))
 
 
+@pytest.mark.parametrize("up", ["+x", "-x", "+y", "-y", "+z", "-z"])
+def test_the_world_is_up_where_turned_pictures_are(up: str, tmp_path: Path) -> None:
+    """Cameras that stand level, on either side and on their head: pictures are upright after their quarter turns."""
+    down = (-1.0 if up[0] == "+" else 1.0) * np.eye(3)["xyz".index(up[1])]
+    level = np.stack([side := np.roll(np.abs(down), 1), down, np.cross(side, down)])  # right, down, forward
+    tables = []
+    for count in (-1, 0, 1, 2):
+        c, s = np.round([np.cos(count * np.pi / 2), np.sin(count * np.pi / 2)])
+        R = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ level
+        tables.append(
+            f"[cam_{count % 4}]\nrotation_count = {count}\nmatrix = [[900, 0, 640], [0, 900, 360], [0, 0, 1]]\n"
+            f"rotation = {json.dumps(R.tolist())}\ntranslation = [0.0, 0.0, 3.0]\n"
+        )
+    cameras = read_cameras(save(tmp_path, "config.toml", "".join(tables)))
+    assert {camera.up for camera in cameras.values()} == {up}
+    without = read_cameras(save(tmp_path, "less.toml", "".join(tables).replace("rotation_count = 2\n", "")))
+    assert {camera.up for camera in without.values()} == {""}
+
+
 def test_anipose_says_no_up_and_has_the_boards_unit(tmp_path: Path) -> None:
     text = POSE2SIM.replace("fisheye = false\n", "").replace("[ 0.32, 0.95, 2.89]", "[ 320.0, 950.0, 2890.0]")
     path = save(tmp_path, "calibration.toml", text)

@@ -19,6 +19,8 @@ from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_names import LANDMARK_NAMES
 from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.views.opening import open_views
+from posekit.views.source import Source
 from tests.detector_files import suiting, write_keypoints
 
 MEDIAPIPE = load_skeleton_map("mediapipe_33")
@@ -337,3 +339,33 @@ def test_any_json_is_read_or_refused(document: object, tmp_path_factory: Any) ->
         read_keypoints(path, "mediapipe")
     except InputError as error:
         assert "\n" not in str(error)
+
+
+def of_caliscope(path: Path, ports: tuple[int, ...]) -> Path:
+    """Write what cameras saw of one person, as caliscope does: each the landmarks elsewhere, and a point of a hand."""
+    rows = ["sync_index,port,frame_index,frame_time,point_id,img_loc_x,img_loc_y,obj_loc_x,obj_loc_y"]
+    for k in range(2):
+        for port in ports:
+            for index, (x, y, *_) in enumerate(PLACES.tolist()):
+                rows.append(f"{k},{port},{k + port},{4000 + k / 20},{index},{1000 * x + port},{1000 * y},,")
+            rows.append(f"{k},{port},{k + port},{4000 + k / 20},105,1,1,,")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.mark.filterwarnings("ignore:.*left and right")  # of a body that is none
+def test_what_cameras_saw_is_told_apart_by_the_camera(tmp_path: Path) -> None:
+    path = of_caliscope(tmp_path / "xy.csv", (0, 2))
+    found = read_keypoints(path)
+    assert found.by_camera and found.person.tolist() == [0, 2, 0, 2] and found.pictures == ("0", "1")
+    np.testing.assert_allclose(found.points[1], 1000 * PLACES[:, :2] + [2, 0])
+    np.testing.assert_allclose(found.time, [0, 0.05])
+    config = tmp_path / "config.toml"
+    camera = "matrix = [[900, 0, 640], [0, 900, 360], [0, 0, 1]]\nsize = [1280, 720]\n"
+    config.write_text(f"[cam_2]\n{camera}[cam_3]\n{camera}")
+    (seen,) = open_views(path, Source(camera=f"{config}:cam_2", stature=1.7))
+    expected = open_views(path, Source(camera=f"{config}:cam_2", stature=1.7, person="2"))[0].view.image
+    np.testing.assert_array_equal(seen.view.image, expected)
+    for one in (Source(stature=1.7), Source(camera=f"{config}:cam_3", stature=1.7)):
+        with pytest.raises(InputError, match=r"what cameras 0, 2 saw; expected one of them; .* --person 0"):
+            open_views(path, one)

@@ -10,7 +10,8 @@ unit is that of the calibration board, mostly millimetres.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ from posekit.cameras.rotation import rotation_from_given_vector, rotation_from_r
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.formats.cameras.fields import fitted, made, numbers, refuse_misspelt, translation
-from posekit.geometry import vector_from_rotation
+from posekit.geometry import Array, vector_from_rotation
 from posekit.safe_io import cut, one_line, read_toml, refusal, shown, write_text
 
 MAX_BYTES: Final = 10_000_000
@@ -29,6 +30,8 @@ ANIPOSE_UNIT: Final = "mm"
 TABLE_FIELDS: Final = ("size", "matrix", "distortions", "rotation", "translation", "fisheye")
 NO_CAMERAS: Final = ("metadata", "capture_volume", "charuco", "checkerboard")
 """Tables that Pose2Sim and Caliscope write beside the cameras."""
+LEAST_UPRIGHT: Final = 0.8
+"""Cosine between an axis of the world and what is up in the pictures, in the mean, from which the axis is up."""
 
 
 def read_pose2sim(path: Path, unit: str | float | None = None) -> dict[str, CalibratedCamera]:
@@ -58,7 +61,26 @@ def read_pose2sim(path: Path, unit: str | float | None = None) -> dict[str, Cali
                 path, f"{cut(key)}.name", f"{shown(camera.name)} twice", "each name once", "rename one"
             )
         found[camera.name] = camera
+    turned = [table.get("rotation_count") for table in cameras.values()]
+    if not up and (axis := _up_of_pictures(turned, [camera.R for camera in found.values()])):
+        return {name: replace(camera, up=axis) for name, camera in found.items()}
     return found
+
+
+def _up_of_pictures(turned: Sequence[Any], rotations: Sequence[Array | None]) -> str:
+    """Return the axis of the world that points up in pictures which are upright after some quarter turns.
+
+    Caliscope's ``rotation_count``, clockwise, says how pictures are turned before a person is looked for in them.
+    """
+    if not all(isinstance(count, int) for count in turned) or any(R is None for R in rotations):
+        return ""
+    of_camera = np.array([[0, -1, 0], [-1, 0, 0], [0, 1, 0], [1, 0, 0]], dtype=np.float64)
+    ups = [of_camera[count % 4] @ R for count, R in zip(turned, rotations, strict=True) if R is not None]
+    mean = np.mean(ups, axis=0) if ups else np.zeros(3)
+    along = int(np.argmax(np.abs(mean)))
+    if abs(mean[along]) < LEAST_UPRIGHT:
+        return ""
+    return ("+" if mean[along] > 0 else "-") + "xyz"[along]
 
 
 def _camera(

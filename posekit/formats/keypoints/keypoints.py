@@ -57,6 +57,8 @@ class KeyPoints(ShortRepr):
         Whether the pictures are of one film; in a collection of photographs nobody is followed.
     normalised : bool
         Whether the points are fractions of the picture, whose size is not known.
+    by_camera : bool
+        Whether it is one person whom several cameras saw: `person` is the number of the camera.
 
     Raises
     ------
@@ -79,6 +81,7 @@ class KeyPoints(ShortRepr):
     score: Array = field(default_factory=_nothing)
     sequence: bool = True
     normalised: bool = False
+    by_camera: bool = False
 
     def __post_init__(self) -> None:
         count, people, pictures = len(self.layout.points), len(self.frame), len(self.pictures)

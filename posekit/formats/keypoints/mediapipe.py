@@ -64,16 +64,16 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where nothing looks like 33 landmarks, or they are world landmarks.
     """
-    rows = DetectionRows(str(given.path))
+    rows, by_camera = DetectionRows(str(given.path)), False
     if given.suffix == ".csv":
-        add_table(rows, given.text)
+        by_camera = add_table(rows, given.text)
     else:
         for path, document in rows.documents(given):
             add_document(rows, document, path.stem)
     usual = {len(LANDMARK_NAMES): load_skeleton_map("mediapipe_33")}
     fitting = by_count(len(LANDMARK_NAMES), layout, given.path, usual)
     found = rows.keypoints("mediapipe", fitting, normalised=True)
-    return _in_pixels(found)
+    return replace(_in_pixels(found), by_camera=by_camera)
 
 
 def _in_pixels(found: KeyPoints) -> KeyPoints:
@@ -97,7 +97,7 @@ def _in_pixels(found: KeyPoints) -> KeyPoints:
 
 MEDIAPIPE_FORMAT: Final = KeyPointFormat(
     name="mediapipe",
-    title="MediaPipe Pose: 33 landmarks as JSON of frames, or as CSV",
+    title="MediaPipe Pose: 33 landmarks as JSON of frames, or as CSV, caliscope's xy too",
     suffixes=(".json", ".csv"),
     folder=True,
     looks_like=looks_like,

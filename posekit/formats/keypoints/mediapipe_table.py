@@ -1,4 +1,8 @@
-"""MediaPipe's landmarks in CSV: a row a frame (wide), or a row a landmark (long)."""
+"""MediaPipe's landmarks in CSV: a row a frame (wide), or a row a landmark (long), as caliscope writes it too.
+
+Caliscope's ``xy_HOLISTIC.csv`` (mprib/caliscope) has what each of its cameras, a ``port``, saw of one person: pixels,
+points 0 to 32 MediaPipe's of the body, ``frame_time`` seconds of a clock.
+"""
 
 from __future__ import annotations
 
@@ -44,6 +48,14 @@ VALUE_COLUMN_NAMES = {
     **dict.fromkeys(VISIBILITY_NAMES, "visibility"),
     **dict.fromkeys(PRESENCE_NAMES, "presence"),
 }
+CALISCOPE_COLUMN_NAMES = {
+    "sync_index": "frame",
+    "port": "port",
+    "frame_time": "time",
+    "point_id": "landmark",
+    "img_loc_x": "x",
+    "img_loc_y": "y",
+}
 _PART = "|".join(sorted(VALUE_COLUMN_NAMES, key=len, reverse=True))
 _BEHIND = re.compile(rf"(?P<name>.+?)[\s._-]+(?P<part>{_PART})\Z", re.IGNORECASE)
 _BEFORE = re.compile(rf"(?P<part>{_PART})[\s._-]*(?P<name>[^\s._-].*)\Z", re.IGNORECASE)
@@ -64,9 +76,12 @@ def looks_like_table(text: str) -> bool:
 def _header(text: str) -> list[str]:
     first = text.lstrip().partition("\n")[0][:20_000]
     try:
-        return [name.strip() for name in next(csv.reader([first]), [])]
+        names = [name.strip() for name in next(csv.reader([first]), [])]
     except csv.Error:
         return []
+    if set(CALISCOPE_COLUMN_NAMES) <= set(names):
+        return [CALISCOPE_COLUMN_NAMES.get(name, "") for name in names]
+    return names
 
 
 def _is_long(header: list[str]) -> bool:
@@ -98,8 +113,8 @@ def _columns(header: list[str]) -> dict[int, dict[str, int]]:
     return {k: parts for k, parts in named.items() if k < len(LANDMARK_NAMES) and {"x", "y"} <= set(parts)}
 
 
-def add_table(rows: DetectionRows, text: str) -> None:
-    """Note the rows of a table.
+def add_table(rows: DetectionRows, text: str) -> bool:
+    """Note the rows of a table; return whether numbers of people are those of the cameras that saw one person.
 
     Raises
     ------
@@ -109,12 +124,13 @@ def add_table(rows: DetectionRows, text: str) -> None:
     header = _header(text)
     if _is_long(header):
         _add_long(rows, header, text)
-        return
+        return "port" in header
     columns = _columns(header)
     if not columns:
         expected = "columns as nose_x, nose_y, nose_visibility, or frame, landmark, x, y, visibility"
         raise refusal(rows.source, "line 1", shown(",".join(header)), expected, "name the columns so")
     _add_wide(rows, header, columns, text)
+    return False
 
 
 def _lines(rows: DetectionRows, header: list[str], text: str) -> Iterator[tuple[int, list[str]]]:
@@ -201,7 +217,8 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
     which = header.index(one_of(header, LANDMARK_COLUMN_NAMES) or "")
     x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
     surest = _column(header, (*VISIBILITY_NAMES, *PRESENCE_NAMES))
-    who = _column(header, PERSON_COLUMN_NAMES)
+    port = _column(header, ("port",))
+    who = _column(header, PERSON_COLUMN_NAMES) if port is None else port
     people: dict[tuple[str, str], tuple[Array, Array]] = {}
     labels: dict[str, float] = {}
     for line, fields in _lines(rows, header, text):
@@ -210,7 +227,7 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
         rows.picture(key)
         index = landmark(fields[which].strip())
         if index is None:
-            if not fields[which].strip():
+            if not fields[which].strip() or port is not None:  # of hands and face
                 continue
             expected = f"a landmark's name, or its number 0 to {len(LANDMARK_NAMES) - 1}"
             raise refusal(rows.source, f"line {line}: {header[which]}", shown(fields[which]), expected)
@@ -221,6 +238,9 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
         points[index] = [_value(rows, line, header[k], fields[k]) for k in (x, y)]
         if surest is not None:
             sure[index] = _value(rows, line, header[surest], fields[surest])
-    for (key, _), (points, sure) in people.items():
-        rows.add(key, points, sure)
-    note_times(rows, labels, list(labels.values()), unit)
+    for (key, person), (points, sure) in people.items():
+        rows.add(key, points, sure, person=None if port is None else person)
+    times = np.array(list(labels.values()))
+    if port is not None and np.isfinite(times).any():
+        times -= np.nanmin(times)
+    note_times(rows, labels, times.tolist(), unit)
