@@ -10,18 +10,12 @@ from functools import cache
 from itertools import chain, islice, zip_longest
 from pathlib import Path
 
+import pytest
+
 from benchmarks.mutants.files import ROOT, files_of_rooms, folders_of_tests
 from benchmarks.mutants.line_map import map_lines, read_maps
 from benchmarks.mutants.mutations import Mutant, mutants
-from benchmarks.mutants.runner import (
-    PATIENCE_SECONDS,
-    TESTED_SECONDS,
-    as_line,
-    chosen_tests,
-    in_fork,
-    load_libraries,
-    tried,
-)
+from benchmarks.mutants.runner import OPTIONS, PATIENCE_SECONDS, TESTED_SECONDS, Collected, as_line, chosen_tests
 
 
 def drawn(files: list[str], seed: int) -> Iterator[Mutant]:
@@ -63,7 +57,6 @@ def main() -> None:
     parser.add_argument(
         "--seconds", type=float, default=TESTED_SECONDS, help="of tests that a fault is given"
     )
-    parser.add_argument("--part", default="0/1", help="I/N: this process takes every N-th, from the I-th")
     parser.add_argument(
         "--again", action="store_true", help="try those that survived and are not explained once more"
     )
@@ -72,27 +65,29 @@ def main() -> None:
     files = [file for found in files_of_rooms().values() for file in found]
     if not maps.is_dir():
         map_lines(maps / "all.json", files, folders_of_tests())
-    seconds, lines = read_maps(maps)
-    load_libraries()
-
-    @cache
-    def fails(name: str) -> bool:
-        return in_fork(None, [name], PATIENCE_SECONDS + 3 * seconds.get(name, 0.0)) != ""
-
     explained = json.loads((Path(__file__).parent / "explained.json").read_text(encoding="utf-8"))
     before: list[dict[str, str]] = []
     if results.exists():
         before = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
     last = {each["name"]: "explained" if name_of(each) in explained else each["outcome"] for each in before}
-    part, parts = map(int, given.part.split("/"))
-    for number, mutant in enumerate(islice(drawn(files, given.seed), given.count)):
-        known = last.get(mutant.name)
-        if number % parts != part or (known and not (given.again and known == "survived")):
-            continue
-        tests = chosen_tests(mutant, lines.get(mutant.file, {}), seconds, given.seconds)
-        trial = tried(mutant, tests, seconds, fails)
-        with results.open("a", encoding="utf-8") as out:
-            print(as_line(mutant, trial), file=out, flush=True)
+
+    def work(tests: Collected) -> None:
+        seconds, lines = read_maps(maps, tests.items)
+
+        @cache
+        def fails(name: str) -> bool:
+            return tests.in_fork(None, [name], PATIENCE_SECONDS + 3 * seconds[name]) != ""
+
+        for mutant in islice(drawn(files, given.seed), given.count):
+            known = last.get(mutant.name)
+            if known and not (given.again and known == "survived"):
+                continue
+            chosen = chosen_tests(mutant, lines.get(mutant.file, {}), seconds, given.seconds)
+            trial = tests.tried(mutant, chosen, seconds, fails)
+            with results.open("a", encoding="utf-8") as out:
+                print(as_line(mutant, trial), file=out, flush=True)
+
+    pytest.main([*folders_of_tests(), *OPTIONS], plugins=[Collected(work)])
     outcomes = {
         each["name"]: each for each in map(json.loads, results.read_text(encoding="utf-8").splitlines())
     }

@@ -6,9 +6,7 @@ import contextlib
 import json
 import math
 import os
-import subprocess
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -85,16 +83,10 @@ def map_lines(path: Path, files: list[str], arguments: list[str]) -> None:
         pytest.main([*arguments, "-q", "-p", "no:cacheprovider"], plugins=[plugin])
 
 
-def names_of_tests(known: Iterable[str]) -> set[str]:
-    """Return which of some tests there still are: one that is gone stops pytest, and would seem to find a fault."""
-    files = sorted({name.split("::")[0] for name in known if Path(name.split("::")[0]).exists()})
-    asked = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", *files]
-    listed = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.splitlines()
-    return set(known) & set(listed)
-
-
-def read_maps(folder: Path) -> tuple[dict[str, float], dict[str, dict[int, set[str]]]]:
-    """Read the seconds of tests that pass, and tests of lines of files; under 0 those that run any line of a file."""
+def read_maps(
+    folder: Path, there: Container[str]
+) -> tuple[dict[str, float], dict[str, dict[int, set[str]]]]:
+    """Read the seconds of tests that pass and are there, and tests of lines of files; under 0 those of any line."""
     seconds: dict[str, float] = {}
     lines: dict[str, dict[int, set[str]]] = {}
     for path in sorted(folder.glob("*.json")):
@@ -107,5 +99,4 @@ def read_maps(folder: Path) -> tuple[dict[str, float], dict[str, dict[int, set[s
                 ran = {names[number] for number in numbers}
                 own.setdefault(int(line), set()).update(ran)
                 own[0] |= ran
-    there = names_of_tests(seconds)
     return {name: took for name, took in seconds.items() if name in there}, lines

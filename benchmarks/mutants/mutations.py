@@ -59,7 +59,8 @@ class Mutant(NamedTuple):
 def mutants(file: str, source: str) -> Iterator[Mutant]:
     """Yield the faults of a file: operators, comparisons, numbers, names in quotes, calls, returns, refusals.
 
-    Left out are annotations, docstrings, `__all__`, what only a type checker reads, and the words of refusals.
+    Left out are annotations, docstrings, `__all__`, what only a type checker reads, the words of refusals, and that
+    what is zipped is equally long.
     """
     begins = [0]
     for text in source.encode().splitlines(keepends=True):
@@ -98,6 +99,8 @@ def _inside(node: ast.AST, on_loading: bool) -> Iterator[tuple[ast.AST, bool]]:
     for field, value in ast.iter_fields(node):
         if field in ("annotation", "returns", "decorator_list", "type_ignores", "bases"):
             continue
+        if field == "keywords":
+            value = [each for each in value if each.arg != "strict"]
         called = field == "body" and isinstance(node, ast.FunctionDef | ast.Lambda)
         for each in value if isinstance(value, list) else [value]:
             if isinstance(each, ast.AST) and each is not docstring and not _not_run(each):
@@ -128,7 +131,7 @@ def _changed(node: ast.AST) -> Iterator[ast.AST | str]:
             yield ast.BoolOp(ast.And() if isinstance(operator, ast.Or) else ast.Or(), values)
         case ast.UnaryOp(ast.Not() | ast.USub() | ast.Invert(), operand):
             yield operand
-        case ast.Call(function, arguments, [*keywords, ast.keyword(str())]):
+        case ast.Call(function, arguments, [*keywords, ast.keyword(str() as last)]) if last != "strict":
             yield ast.Call(function, arguments, keywords)
         case ast.IfExp(test, body, orelse):
             yield ast.IfExp(test, orelse, body)

@@ -1,21 +1,21 @@
-"""One fault at a time in a fork: the tests that run its line, nearest and fastest first, until one fails."""
+"""One fault at a time in a fork of a process that has collected the tests: those that run its line, until one fails."""
 
 from __future__ import annotations
 
 import contextlib
-import importlib
+import gc
 import importlib.machinery
 import json
 import math
 import os
-import pkgutil
 import resource
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FunctionType
 from typing import Final, Literal, NamedTuple
 
 import pytest
@@ -23,20 +23,20 @@ import pytest
 from benchmarks.mutants.files import ROOT
 from benchmarks.mutants.mutations import Mutant
 
-FIRST_TESTS: Final = 25
-"""The first few usually find a fault: the others are not collected for them."""
-TESTED_SECONDS: Final = 60.0
+TESTED_SECONDS: Final = 20.0
 """How long the tests that run a fault's line may take the processor by the map, unless told otherwise: more may find
 more."""
-FILE_SECONDS: Final = 20.0
-"""How long near tests of other lines of its file may take besides, in that time."""
+BESIDE: Final = 1.5
+"""How many times that long they may take with near tests of other lines of its file."""
 ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
 """Rooms whose tests are near, beside the file's own."""
-PATIENCE_SECONDS: Final = 20.0
+PATIENCE_SECONDS: Final = 10.0
 """Of processor, beyond three times what the map says: a fault that does not end is found."""
 BUSY_MACHINE: Final = 10.0
 """How many times as long that may last by the clock, where other processes run."""
 MEMORY_BYTES: Final = 8 << 30
+OPTIONS: Final = ("-x", "-q", "-s", "-p", "no:cacheprovider")
+"""What pytest is told."""
 
 Outcome = Literal["killed", "survived", "endless"]
 
@@ -49,14 +49,9 @@ class Trial(NamedTuple):
     seconds: float
 
 
-def load_libraries() -> None:
-    """Import posekit with everything that it needs, and forget posekit: forks have the libraries loaded."""
-    import posekit
-
-    for module in pkgutil.walk_packages(posekit.__path__, "posekit."):
-        importlib.import_module(module.name)
-    for name in [name for name in sys.modules if name.split(".")[0] == "posekit"]:
-        del sys.modules[name]
+def file_of(name: str) -> str:
+    """Return the file of a test."""
+    return name.split("::")[0]
 
 
 def chosen_tests(
@@ -72,74 +67,126 @@ def chosen_tests(
     of_file = {name for name in lines.get(0, set()) if name in seconds}
     own = lines.get(mutant.line, of_file) & of_file
     # A line that no test runs was run by whatever was imported first: any of them may read what it made.
-    loading = mutant.on_loading or not own
-    beside = tested + FILE_SECONDS * tested / TESTED_SECONDS
-    if loading:
-        rounds = (near & of_file, tested / 2), (near - of_file, tested), (of_file - near, beside)
+    if mutant.on_loading or not own:
+        rounds = (near & of_file, tested / 2), (near - of_file, tested), (of_file - near, BESIDE * tested)
     else:
-        rounds = (own & near, tested), (own - near, tested), ((near & of_file) - own, beside)
+        rounds = (own & near, tested), (own - near, tested), ((near & of_file) - own, BESIDE * tested)
     chosen: list[str] = []
     total = 0.0
     for names, limit in rounds:
-        # Of one file together, which costs its import: those of the file whose tests are the fastest come first.
+        # Of one file together, which may cost its import: those of the file whose tests are the fastest come first.
         held: dict[str, list[float]] = {}
         for name in names:
-            held.setdefault(name.split("::")[0], []).append(seconds[name])
-        mean = {name: sum(held[file]) / len(held[file]) for name in names for file in [name.split("::")[0]]}
-        for name in sorted(names, key=lambda n: (mean[n], seconds[n], n)):
+            held.setdefault(file_of(name), []).append(seconds[name])
+        mean = {file: sum(each) / len(each) for file, each in held.items()}
+        for name in sorted(names, key=lambda n: (mean[file_of(n)], file_of(n), seconds[n], n)):
             if total + seconds[name] <= limit or not chosen:
                 chosen.append(name)
                 total += seconds[name]
     return chosen
 
 
-def tried(mutant: Mutant, tests: list[str], seconds: dict[str, float], fails: Callable[[str], bool]) -> Trial:
-    """Run tests on a fault until one fails that passes without it."""
-    began = time.monotonic()
-    left = tests
-    while left:
-        some, left = left[:FIRST_TESTS], left[FIRST_TESTS:]
-        if len(tests) - len(left) > FIRST_TESTS:
-            some, left = some + left, []
-        found = in_fork(mutant, some, PATIENCE_SECONDS + 3 * sum(seconds[name] for name in some))
-        if found is None:
-            return Trial("endless", "", time.monotonic() - began)
-        if found:
-            if not fails(found):
-                return Trial("killed", found, time.monotonic() - began)
-            left = [name for name in (*some, *left) if name != found]
-    return Trial("survived", "", time.monotonic() - began)
+class Collected:
+    """A pytest plugin: when the tests are collected it hands itself to `work`, in place of running them.
 
+    Parameters
+    ----------
+    work : callable
+        What is done with the collected tests.
+    """
 
-def in_fork(mutant: Mutant | None, tests: list[str], patience: float) -> str | None:
-    """Run tests in a fork, and return the first that fails, empty where none does, None where they do not end."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reading)
-        code = 1
-        try:
-            os.setsid()
-            null = os.open(os.devnull, os.O_RDWR)
-            for stream in (0, 1, 2):
-                os.dup2(null, stream)
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-            allowed = math.ceil(sum(os.times()[:2]) + patience)
-            resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 60))
-            os.chdir(ROOT)
-            if mutant is not None:
-                plant(mutant)
-            first = FirstFailure(writing)
-            done = pytest.main([*tests, "-x", "-q", "-p", "no:cacheprovider"], plugins=[first])
-            code = int(done)
-            if code not in (0, 1) and not first.told:
+    def __init__(self, work: Callable[[Collected], None]) -> None:
+        self._work = work
+        self.items: dict[str, pytest.Item] = {}
+        self._functions: dict[str, list[FunctionType]] = {}
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Take the tests, and find the functions of posekit that the faults are planted in."""
+        self.items = {item.nodeid: item for item in session.items}
+        for each in gc.get_objects():
+            if isinstance(each, FunctionType):
+                self._functions.setdefault(each.__code__.co_filename, []).append(each)
+        gc.freeze()
+        self._work(self)
+        return True
+
+    def tried(
+        self, mutant: Mutant, tests: list[str], seconds: dict[str, float], fails: Callable[[str], bool]
+    ) -> Trial:
+        """Run tests on a fault until one fails that passes without it."""
+        began = time.monotonic()
+        while True:
+            found = self.in_fork(mutant, tests, PATIENCE_SECONDS + 3 * sum(seconds[name] for name in tests))
+            outcome: Outcome = "endless" if found is None else "killed" if found else "survived"
+            if not found or not fails(found):
+                return Trial(outcome, found or "", time.monotonic() - began)
+            tests = [name for name in tests if name != found]
+
+    def in_fork(self, mutant: Mutant | None, tests: list[str], patience: float) -> str | None:
+        """Run tests in a fork, and return the first that fails, empty where none does, None where they do not end."""
+        reading, writing = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.close(reading)
+            try:
+                os.setsid()
+                null = os.open(os.devnull, os.O_RDWR)
+                for stream in (0, 1, 2):
+                    os.dup2(null, stream)
+                resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+                allowed = math.ceil(sum(os.times()[:2]) + patience)
+                resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 60))
+                os.chdir(ROOT)
+                os.write(writing, self._first_failure(mutant, tests).encode())
+            except BaseException:
                 os.write(writing, tests[0].encode())
-        except BaseException:
-            os.write(writing, tests[0].encode())
-        finally:
-            os._exit(code)
-    os.close(writing)
-    return _waited(child, reading, tests, patience)
+            finally:
+                os._exit(0)
+        os.close(writing)
+        return _waited(child, reading, tests, patience)
+
+    def _first_failure(self, mutant: Mutant | None, tests: list[str]) -> str:
+        """Return the first of some tests that fails with a fault, or nothing."""
+        failures = Failures()
+        if mutant is None or (not mutant.on_loading and self._changed_in_place(mutant)):
+            items = [self.items[name] for name in tests]
+            items[0].config.pluginmanager.register(failures)
+            for item, after in zip(items, [*items[1:], None], strict=True):
+                item.ihook.pytest_runtest_protocol(item=item, nextitem=after)
+                if failures.names:
+                    break
+        else:
+            plant(mutant)
+            for name in [name for name in sys.modules if name.split(".")[0] in ("posekit", "tests")]:
+                del sys.modules[name]
+            for _, some in groupby(tests, file_of):
+                names = list(some)
+                if pytest.main([*names, *OPTIONS], plugins=[failures]) not in (0, 1):
+                    failures.names.append(names[0])
+                if failures.names:
+                    break
+        return failures.names[0] if failures.names else ""
+
+    def _changed_in_place(self, mutant: Mutant) -> bool:
+        """Give the functions of a file the code that they have with a fault, and tell whether that can be done."""
+        path = ROOT / mutant.file
+        source = path.read_text(encoding="utf-8")
+        old, new = (compile(text, path, "exec") for text in (source, mutant.planted(source)))
+        try:
+            codes = dict(zip(_codes(old), _codes(new), strict=True))
+            for function in self._functions[str(path)]:
+                function.__code__ = codes[function.__code__]
+        except (KeyError, ValueError):  # a function is gone, or closes over other names
+            return False
+        return True
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield all codes inside a code."""
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield each
+            yield from _codes(each)
 
 
 def _waited(child: int, reading: int, tests: list[str], patience: float) -> str | None:
@@ -151,7 +198,7 @@ def _waited(child: int, reading: int, tests: list[str], patience: float) -> str 
         if done:
             status = found
         else:
-            time.sleep(0.02)
+            time.sleep(0.01)
     with os.fdopen(reading, "rb") as pipe:
         if status is None:
             with contextlib.suppress(ProcessLookupError):  # it has no group yet
@@ -162,34 +209,26 @@ def _waited(child: int, reading: int, tests: list[str], patience: float) -> str 
             return None
         os.set_blocking(pipe.fileno(), False)
         said = (pipe.read() or b"").decode()
-    if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU:
-        return None
-    if not said and (os.WIFSIGNALED(status) or os.waitstatus_to_exitcode(status) != 0):
-        return tests[0]
+    if os.WIFSIGNALED(status):
+        return None if os.WTERMSIG(status) == signal.SIGXCPU else tests[0]
     return said
 
 
-class FirstFailure:
-    """Tells which test failed first."""
+class Failures:
+    """A pytest plugin that keeps which tests fail, and which files cannot be imported."""
 
-    def __init__(self, pipe: int) -> None:
-        self._pipe, self.told = pipe, False
-
-    def tell(self, name: str) -> None:
-        """Say it once."""
-        if not self.told:
-            self.told = True
-            os.write(self._pipe, name.encode())
+    def __init__(self) -> None:
+        self.names: list[str] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Tell of a test or of its fixtures."""
+        """Keep a test, also where its fixtures fail."""
         if report.failed:
-            self.tell(report.nodeid)
+            self.names.append(report.nodeid)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Tell of a file that cannot be imported."""
+        """Keep a file that cannot be imported."""
         if report.failed:
-            self.tell(report.nodeid)
+            self.names.append(report.nodeid)
 
 
 def plant(mutant: Mutant) -> None:

@@ -56,16 +56,21 @@ def test_tests_of_the_line_come_first_and_the_nearest_of_them() -> None:
 def test_a_fault_is_found_by_a_test_and_one_that_changes_nothing_is_not() -> None:
     """In a process of its own, as it forks."""
     code = f"""
+import pytest
 from benchmarks.mutants.files import ROOT
 from benchmarks.mutants.mutations import Mutant, mutants
-from benchmarks.mutants.runner import in_fork, load_libraries
+from benchmarks.mutants.runner import OPTIONS, Collected
 
-load_libraries()
 faults = mutants({BITS!r}, (ROOT / {BITS!r}).read_text(encoding="utf-8"))
 wrong = next(each for each in faults if each.before == "return path")
 same = Mutant({BITS!r}, 1, 0, 3, chr(34) * 3, chr(34) * 3, on_loading=True)
-for fault, patience in ((None, 60), (same, 60), (wrong, 60), (None, 0)):
-    print(repr(in_fork(fault, [{BITS_TEST!r}], patience)))
+
+def work(tests):
+    for fault, patience in ((None, 60), (same, 60), (wrong, 60), (wrong._replace(on_loading=True), 60), (None, 0)):
+        print("found", tests.in_fork(fault, [{BITS_TEST!r}], patience))
+
+pytest.main([{BITS_TEST!r}, *OPTIONS], plugins=[Collected(work)])
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["''", "''", repr(BITS_TEST), "None"]
+    found = [line.split(" ", 1)[1] for line in done.stdout.splitlines() if line.startswith("found")]
+    assert found == ["", "", BITS_TEST, BITS_TEST, "None"]

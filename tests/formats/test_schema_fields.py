@@ -23,7 +23,7 @@ from posekit.formats.own.camera_model import (
 )
 from posekit.formats.own.live_schema import LiveFrame, LiveHeader, live_frame, live_header
 from posekit.formats.own.object_result_schema import ObjectFile
-from posekit.formats.own.object_view_schema import ObjectViewFile
+from posekit.formats.own.object_view_schema import ObjectFrameFields, ObjectViewFile
 from posekit.formats.own.postures_q_schema import ConfigurationsFile
 from posekit.formats.own.postures_schema import PosturesFile
 from posekit.formats.own.result_schema import ResultFile
@@ -68,6 +68,12 @@ def test_every_hint_is_that_of_a_field_and_every_tag_one_of_a_variant(model: typ
     named = {tag for tag in model.tags if " " not in tag}
     assert named <= set(texts(document))
     assert model.hints
+
+
+@pytest.mark.parametrize("model", [ObjectFrameFields, ObjectViewFile, LiveHeader, LiveFrame])
+def test_every_field_of_what_is_not_published_says_what_it_is(model: type[FileModel]) -> None:
+    for name, field in model.model_json_schema()["properties"].items():
+        assert {"description", "const", "$ref"} & set(field), name
 
 
 def line(**changes: Any) -> dict[str, Any]:

@@ -44,4 +44,6 @@ class ObjectViewFile(FileModel):
     schema_: Literal["posekit.view/1"] = Field(alias="schema")
     unit: Unit | None = Field(default=None, description="Of lengths; null where they are relative.")
     camera: ScaledOrthographicFields
-    frames: Annotated[list[ObjectFrameFields], Field(min_length=1), FailFast()]
+    frames: Annotated[list[ObjectFrameFields], Field(min_length=1), FailFast()] = Field(
+        description="One a picture."
+    )
