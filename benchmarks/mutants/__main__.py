@@ -15,7 +15,7 @@ import pytest
 from benchmarks.mutants.files import ROOT, files_of_rooms, folders_of_tests
 from benchmarks.mutants.line_map import map_lines, read_maps
 from benchmarks.mutants.mutations import Mutant, mutants
-from benchmarks.mutants.runner import OPTIONS, PATIENCE_SECONDS, TESTED_SECONDS, Collected, as_line, chosen_tests
+from benchmarks.mutants.runner import OPTIONS, TESTED_SECONDS, Collected, as_line, chosen_tests
 
 
 def drawn(files: list[str], seed: int) -> Iterator[Mutant]:
@@ -76,7 +76,7 @@ def main() -> None:
 
         @cache
         def fails(name: str) -> bool:
-            return tests.in_fork(None, [name], PATIENCE_SECONDS + 3 * seconds[name]) != ""
+            return tests.in_fork(None, [name], seconds) != ""
 
         for mutant in islice(drawn(files, given.seed), given.count):
             known = last.get(mutant.name)

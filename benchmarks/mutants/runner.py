@@ -12,7 +12,7 @@ import resource
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -30,10 +30,10 @@ BESIDE: Final = 1.5
 """How many times that long they may take with near tests of other lines of its file."""
 ALSO_NEAR: Final = {"validators": ("validation",), "cameras": ("recovery",), "tree": ("recovery",)}
 """Rooms whose tests are near, beside the file's own."""
-PATIENCE_SECONDS: Final = 10.0
-"""Of processor, beyond three times what the map says: a fault that does not end is found."""
-BUSY_MACHINE: Final = 10.0
-"""How many times as long that may last by the clock, where other processes run."""
+PATIENCE_SECONDS: Final = 8.0
+"""Of processor for a test, beyond three times what the map says: a fault that does not end is found."""
+BUSY_MACHINE: Final = 5.0
+"""How many times as long all tests may last by the clock, where other processes run."""
 MEMORY_BYTES: Final = 8 << 30
 OPTIONS: Final = ("-x", "-q", "-s", "-p", "no:cacheprovider")
 """What pytest is told."""
@@ -111,18 +111,24 @@ class Collected:
         return True
 
     def tried(
-        self, mutant: Mutant, tests: list[str], seconds: dict[str, float], fails: Callable[[str], bool]
+        self, mutant: Mutant, tests: list[str], seconds: Mapping[str, float], fails: Callable[[str], bool]
     ) -> Trial:
         """Run tests on a fault until one fails that passes without it."""
         began = time.monotonic()
         while True:
-            found = self.in_fork(mutant, tests, PATIENCE_SECONDS + 3 * sum(seconds[name] for name in tests))
+            found = self.in_fork(mutant, tests, seconds)
             outcome: Outcome = "endless" if found is None else "killed" if found else "survived"
             if not found or not fails(found):
                 return Trial(outcome, found or "", time.monotonic() - began)
             tests = [name for name in tests if name != found]
 
-    def in_fork(self, mutant: Mutant | None, tests: list[str], patience: float) -> str | None:
+    def in_fork(
+        self,
+        mutant: Mutant | None,
+        tests: list[str],
+        seconds: Mapping[str, float],
+        patience: float = PATIENCE_SECONDS,
+    ) -> str | None:
         """Run tests in a fork, and return the first that fails, empty where none does, None where they do not end."""
         reading, writing = os.pipe()
         child = os.fork()
@@ -134,26 +140,25 @@ class Collected:
                 for stream in (0, 1, 2):
                     os.dup2(null, stream)
                 resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-                allowed = math.ceil(sum(os.times()[:2]) + patience)
-                resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 60))
                 os.chdir(ROOT)
-                os.write(writing, self._first_failure(mutant, tests).encode())
+                failures = Failures(seconds, patience)
+                self._run(mutant, tests, failures)
+                os.write(writing, failures.first.encode())
             except BaseException:
                 os.write(writing, tests[0].encode())
             finally:
                 os._exit(0)
         os.close(writing)
-        return _waited(child, reading, tests, patience)
+        return _waited(child, reading, tests, patience + sum(seconds[name] for name in tests))
 
-    def _first_failure(self, mutant: Mutant | None, tests: list[str]) -> str:
-        """Return the first of some tests that fails with a fault, or nothing."""
-        failures = Failures()
+    def _run(self, mutant: Mutant | None, tests: list[str], failures: Failures) -> None:
+        """Run tests with a fault until one fails."""
         if mutant is None or (not mutant.on_loading and self._changed_in_place(mutant)):
             items = [self.items[name] for name in tests]
             items[0].config.pluginmanager.register(failures)
             for item, after in zip(items, [*items[1:], None], strict=True):
                 item.ihook.pytest_runtest_protocol(item=item, nextitem=after)
-                if failures.names:
+                if failures.first:
                     break
         else:
             plant(mutant)
@@ -162,10 +167,9 @@ class Collected:
             for _, some in groupby(tests, file_of):
                 names = list(some)
                 if pytest.main([*names, *OPTIONS], plugins=[failures]) not in (0, 1):
-                    failures.names.append(names[0])
-                if failures.names:
+                    failures.first = failures.first or names[0]
+                if failures.first:
                     break
-        return failures.names[0] if failures.names else ""
 
     def _changed_in_place(self, mutant: Mutant) -> bool:
         """Give the functions of a file the code that they have with a fault, and tell whether that can be done."""
@@ -215,20 +219,34 @@ def _waited(child: int, reading: int, tests: list[str], patience: float) -> str 
 
 
 class Failures:
-    """A pytest plugin that keeps which tests fail, and which files cannot be imported."""
+    """A pytest plugin that keeps which test fails first, and ends the process where one takes too long.
 
-    def __init__(self) -> None:
-        self.names: list[str] = []
+    Parameters
+    ----------
+    seconds : mapping
+        How long each test takes the processor without a fault.
+    patience : float
+        Seconds that it may take beyond three times that.
+    """
+
+    def __init__(self, seconds: Mapping[str, float], patience: float) -> None:
+        self.first = ""
+        self._seconds, self._patience = seconds, patience
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Give a test its time."""
+        allowed = math.ceil(sum(os.times()[:2]) + self._patience + 3 * self._seconds[nodeid])
+        resource.setrlimit(resource.RLIMIT_CPU, (allowed, resource.RLIM_INFINITY))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep a test, also where its fixtures fail."""
         if report.failed:
-            self.names.append(report.nodeid)
+            self.first = self.first or report.nodeid
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Keep a file that cannot be imported."""
         if report.failed:
-            self.names.append(report.nodeid)
+            self.first = self.first or report.nodeid
 
 
 def plant(mutant: Mutant) -> None:

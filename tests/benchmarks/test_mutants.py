@@ -63,11 +63,12 @@ from benchmarks.mutants.runner import OPTIONS, Collected
 
 faults = mutants({BITS!r}, (ROOT / {BITS!r}).read_text(encoding="utf-8"))
 wrong = next(each for each in faults if each.before == "return path")
+endless = wrong._replace(after="while True: pass")
 same = Mutant({BITS!r}, 1, 0, 3, chr(34) * 3, chr(34) * 3, on_loading=True)
 
 def work(tests):
-    for fault, patience in ((None, 60), (same, 60), (wrong, 60), (wrong._replace(on_loading=True), 60), (None, 0)):
-        print("found", tests.in_fork(fault, [{BITS_TEST!r}], patience))
+    for fault in (None, same, wrong, wrong._replace(on_loading=True), endless):
+        print("found", tests.in_fork(fault, [{BITS_TEST!r}], {{{BITS_TEST!r}: 0.0}}, 1.0 if fault is endless else 60.0))
 
 pytest.main([{BITS_TEST!r}, *OPTIONS], plugins=[Collected(work)])
 """
