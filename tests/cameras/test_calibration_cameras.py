@@ -1,6 +1,7 @@
 """Cameras in memory: what describes one, guesses, rotations, and which one is chosen."""
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -182,14 +183,26 @@ def test_no_such_angle(degrees: float) -> None:
 def test_bad_guesses_are_refused() -> None:
     with pytest.raises(CameraError, match="across"):
         camera_from_fov((640, 480), 60.0, "width")  # type: ignore[arg-type]
-    with pytest.raises(CameraError, match="whole numbers"):
-        camera_from_fov((640, 0), 60.0)
-    with pytest.raises(CameraError, match="whole numbers above 0"):
-        camera_from_fov((10**6 + 1, 480), 60.0)
-    assert camera_from_fov((10**6, 480), 60.0).size == (10**6, 480)
     for mm in (0.0, math.nan, -3.0):
         with pytest.raises(CameraError, match="mm"):
             camera_from_focal35((640, 480), mm)
+
+
+@pytest.mark.parametrize(
+    "size", [(640, 0), (0, 480), (-1, 480), (10**6 + 1, 480), (640,), (640, 480, 3), (640.0, 480), ()]
+)
+def test_a_size_of_no_picture_is_refused(size: Any) -> None:
+    for guess in (lambda: camera_from_fov(size, 60.0), lambda: camera_from_focal35(size, 50.0)):
+        with pytest.raises(CameraError, match=r"whole numbers above 0; got \("):
+            guess()
+
+
+@pytest.mark.parametrize("size", [(1, 10**6), (10**6, 1)])
+def test_a_size_of_the_smallest_and_the_largest_picture_is_taken(size: tuple[int, int]) -> None:
+    for one in (camera_from_fov(size, 179.0), camera_from_focal35(size, 1e4)):
+        assert one.size == size and one.deviation == 0.05 and "within 5 %" in one.how
+    with pytest.raises(CameraError, match="expected 0 to 10,000 mm"):
+        camera_from_focal35(size, math.nextafter(1e4, math.inf))
 
 
 def test_one_camera_is_chosen_and_several_are_named() -> None:

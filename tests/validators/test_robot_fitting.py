@@ -146,6 +146,16 @@ def test_the_model_takes_the_lengths_of_the_postures() -> None:
     assert rejected(validator("human", "model").check(joints), "rigid_parts").all()
 
 
+@pytest.mark.parametrize("behind", [True, False])
+@pytest.mark.parametrize("lengths", ["each", "median"])
+def test_the_model_has_its_shoulders_on_the_side_where_the_postures_have_them(
+    lengths: str, behind: bool
+) -> None:
+    figure = FIGURE.scaled({"right_shoulder-left_shoulder": 0.408}, behind=behind)
+    joints = figure.forward_kinematics(random_postures(figure, 1, np.random.default_rng(3)))[:, :14]
+    assert validator("human", lengths).check(joints).fk_distance.max() < 1e-5
+
+
 def test_each_posture_may_have_its_own_lengths() -> None:
     joints = np.concatenate([STANDING, 0.8 * STANDING, np.zeros((1, 14, 3))])
     report = validator("human", "each").check(joints)
