@@ -78,11 +78,14 @@ def main() -> None:
         def fails(name: str) -> bool:
             return tests.in_fork(None, [name], seconds) != ""
 
-        for mutant in islice(drawn(files, given.seed), given.count):
-            known = last.get(mutant.name)
+        for one in islice(drawn(files, given.seed), given.count):
+            known = last.get(one.name)
             if known and not (given.again and known == "survived"):
                 continue
-            chosen = chosen_tests(mutant, lines.get(mutant.file, {}), seconds, given.seconds)
+            own = lines.get(one.file, {})
+            # A line that no test runs is run while something is imported.
+            mutant = one._replace(on_loading=one.on_loading or not own.get(one.line))
+            chosen = chosen_tests(mutant, own, seconds, given.seconds)
             trial = tests.tried(mutant, chosen, seconds, fails)
             with results.open("a", encoding="utf-8") as out:
                 print(as_line(mutant, trial), file=out, flush=True)

@@ -83,9 +83,7 @@ def map_lines(path: Path, files: list[str], arguments: list[str]) -> None:
         pytest.main([*arguments, "-q", "-p", "no:cacheprovider"], plugins=[plugin])
 
 
-def read_maps(
-    folder: Path, there: Container[str]
-) -> tuple[dict[str, float], dict[str, dict[int, set[str]]]]:
+def read_maps(folder: Path, there: Container[str]) -> tuple[dict[str, float], dict[str, dict[int, set[str]]]]:
     """Read the seconds of tests that pass and are there, and tests of lines of files; under 0 those of any line."""
     seconds: dict[str, float] = {}
     lines: dict[str, dict[int, set[str]]] = {}

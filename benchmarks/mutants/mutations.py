@@ -99,8 +99,6 @@ def _inside(node: ast.AST, on_loading: bool) -> Iterator[tuple[ast.AST, bool]]:
     for field, value in ast.iter_fields(node):
         if field in ("annotation", "returns", "decorator_list", "type_ignores", "bases"):
             continue
-        if field == "keywords":
-            value = [each for each in value if each.arg != "strict"]
         called = field == "body" and isinstance(node, ast.FunctionDef | ast.Lambda)
         for each in value if isinstance(value, list) else [value]:
             if isinstance(each, ast.AST) and each is not docstring and not _not_run(each):
@@ -114,6 +112,8 @@ def _not_run(node: ast.AST) -> bool:
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
     if isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
+        return True
+    if isinstance(node, ast.keyword) and node.arg == "strict":
         return True
     return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
 

@@ -51,7 +51,7 @@ class Trial(NamedTuple):
 
 def file_of(name: str) -> str:
     """Return the file of a test."""
-    return name.split("::")[0]
+    return name.partition("::")[0]
 
 
 def chosen_tests(
@@ -65,21 +65,31 @@ def chosen_tests(
     rooms = {room for part in mutant.file.split("/")[1:] for room in (part, *ALSO_NEAR.get(part, ()))}
     near = {name for name in seconds if name.split("/")[1] in rooms}
     of_file = {name for name in lines.get(0, set()) if name in seconds}
-    own = lines.get(mutant.line, of_file) & of_file
+    running = lines.get(mutant.line, of_file) & of_file
     # A line that no test runs was run by whatever was imported first: any of them may read what it made.
-    if mutant.on_loading or not own:
+    if mutant.on_loading or not running:
         rounds = (near & of_file, tested / 2), (near - of_file, tested), (of_file - near, BESIDE * tested)
     else:
-        rounds = (own & near, tested), (own - near, tested), ((near & of_file) - own, BESIDE * tested)
+        rounds = (
+            (running & near, tested),
+            (running - near, tested),
+            ((near & of_file) - running, BESIDE * tested),
+        )
+    words = Path(mutant.file).stem.split("_")
+    unlike = {name: -sum(word in name for word in words) for name in seconds}
     chosen: list[str] = []
     total = 0.0
     for names, limit in rounds:
-        # Of one file together, which may cost its import: those of the file whose tests are the fastest come first.
-        held: dict[str, list[float]] = {}
+        # Of one file together, which may cost its import: first those whose names share most words with the fault's
+        # file, then of the file whose tests are the fastest.
+        held: dict[str, list[str]] = {}
         for name in names:
-            held.setdefault(file_of(name), []).append(seconds[name])
-        mean = {file: sum(each) / len(each) for file, each in held.items()}
-        for name in sorted(names, key=lambda n: (mean[file_of(n)], file_of(n), seconds[n], n)):
+            held.setdefault(file_of(name), []).append(name)
+        rank = {
+            file: (min(unlike[name] for name in own), sum(seconds[name] for name in own) / len(own), file)
+            for file, own in held.items()
+        }
+        for name in sorted(names, key=lambda n: (rank[file_of(n)], unlike[n], seconds[n], n)):
             if total + seconds[name] <= limit or not chosen:
                 chosen.append(name)
                 total += seconds[name]
@@ -118,7 +128,7 @@ class Collected:
         while True:
             found = self.in_fork(mutant, tests, seconds)
             outcome: Outcome = "endless" if found is None else "killed" if found else "survived"
-            if not found or not fails(found):
+            if found not in self.items or not fails(found):
                 return Trial(outcome, found or "", time.monotonic() - began)
             tests = [name for name in tests if name != found]
 

@@ -54,6 +54,13 @@ def test_quaternions_are_hamiltons(vector: list[float]) -> None:
     np.testing.assert_allclose(rotation_from_wxyz(q), rotation_from_vector(np.array(vector)), atol=1e-12)
 
 
+@pytest.mark.parametrize("length", [0.9991, 1.0, 1.0009])
+def test_a_quaternion_that_is_rounded_turns_and_does_not_stretch(length: float) -> None:
+    q = np.array([0.5, -0.5, 0.1, 0.7])
+    q /= np.linalg.norm(q)
+    np.testing.assert_allclose(rotation_from_wxyz(length * q), rotation_from_wxyz(q), atol=1e-12)
+
+
 def test_a_rounded_rotation_becomes_exact() -> None:
     R = rotation_from_vector(np.array([0.3, -0.2, 0.9]))
     exact = rotation_from_rounded(R.round(4))

@@ -223,3 +223,11 @@ def test_distorted_pixels_are_undistorted() -> None:
     _, found = search(seen, np.arange(20), np.full(20, 1e-6))
     for distance, depths in zip(true_distance(scene), found, strict=True):
         assert np.abs(depths.minima - distance).min() < 1e-5
+
+
+def test_where_nothing_is_within_the_tolerance_the_best_minimum_is_kept() -> None:
+    image = VIEWS.image + np.random.default_rng(4).normal(0.0, 0.002, VIEWS.image.shape) * 1000
+    _, _, found = searched(VIEWS, 0.0, 0.01, image)
+    known = [depths for depths in found if depths.known and len(depths.minima)]
+    assert len(known) > 0.9 * len([depths for depths in found if depths.known])
+    assert all(depths.residual[0] > 0 and len(depths.minima) == 1 for depths in known)
