@@ -157,6 +157,14 @@ class NearestConfiguration(ShortRepr):
 
     def of(self, given: Array) -> Array:
         """Return the nearest legal configuration (nq,) that is found, else one with less that is wrong."""
+        found, free = self._sought(given, outward=False)
+        return found if free else self._sought(given, outward=True)[0]
+
+    def _sought(self, given: Array, *, outward: bool) -> tuple[Array, bool]:
+        """Seek a legal configuration (nq,) near one; tell whether it is. `outward` is away from contact alone at first.
+
+        Meshes that cross have no depth: pulled back at each step, a configuration may never come out of them.
+        """
         space, best, least = self.space, given, np.inf
         q = self._inside(given)
         for _ in range(MOST_STEPS):
@@ -166,11 +174,12 @@ class NearestConfiguration(ShortRepr):
                 cost = float(back @ back)
                 if cost < least:
                     best, least = q, cost
-            step = self._step(q, back, value, slope)
+            pull = np.zeros_like(back) if outward and not np.isfinite(least) else back
+            step = self._step(q, pull, value, slope)
             if np.abs(step).max(initial=0.0) < SETTLED_STEP:
                 break
             q = self._inside(space.integrate(q[None], step[None])[0])
-        return best if np.isfinite(least) else q
+        return (best, True) if np.isfinite(least) else (q, False)
 
     def _step(self, q: Array, back: Array, value: Array, slope: Array) -> Array:
         """Step toward where the configuration was as far as bounds allow."""

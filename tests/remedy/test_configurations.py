@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +13,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.remedy import Repaired, repair_configurations
 from posekit.remedy.configurations import NearestConfiguration
+from posekit.samples.robot_squat import write_robot_squat
 from posekit.validators import Validator
 
 PANDA = Validator("panda")
@@ -41,6 +43,20 @@ def test_configurations_come_back_valid_by_a_fresh_validator() -> None:
     assert repaired.q is not None
     assert Validator("panda").check(q=repaired.q).valid.all()
     assert repaired.valid.all() and repaired.left == ()
+
+
+def test_meshes_that_cross_come_apart(tmp_path: Path) -> None:
+    """An arm deep in the chest of the sample's robot is brought out, in each of its frames."""
+    write_robot_squat(tmp_path / "squat.npz")
+    judge = Validator("g1")
+    assert judge.robot is not None
+    with np.load(tmp_path / "squat.npz") as held:
+        parts = [held[name][49:53] for name in ("root_pos", "root_quat_xyzw", "dof_pos")]
+    given = np.concatenate(parts, axis=1)
+    assert judge.check(q=given).invalid.all()
+    repaired = repair_configurations(given, judge)
+    assert repaired.q is not None and repaired.left == ()
+    assert Validator("g1").check(q=repaired.q).valid.all()
 
 
 def test_legal_configurations_come_back_as_they_were() -> None:
