@@ -27,15 +27,16 @@ def take_signals() -> None:
 
     A SIGINT that is ignored stays ignored.
     """
-    on_signal = partial(_on_signal, os.getpid())
+    came: list[int] = []
+    on_signal = partial(_on_signal, os.getpid(), came)
     signal.signal(signal.SIGTERM, on_signal)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, on_signal)
-    sys.unraisablehook = partial(_on_lost, on_signal)
+    sys.unraisablehook = partial(_on_lost, on_signal, came)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
 
 
-def _on_signal(owner: int, number: int, frame: FrameType | None) -> None:
+def _on_signal(owner: int, came: list[int], number: int, frame: FrameType | None) -> None:
     if os.getpid() != owner:
         _end_as_usual(number)
     while frame is not None:
@@ -43,6 +44,7 @@ def _on_signal(owner: int, number: int, frame: FrameType | None) -> None:
             _send_again(number)
             return
         frame = frame.f_back
+    came.append(number)
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     signal.signal(number, signal.SIG_DFL)
@@ -58,14 +60,19 @@ def _end_as_usual(number: int) -> Never:
     raise SystemExit(128 + number)
 
 
-def _on_lost(on_signal: Callable[[int, FrameType | None], None], lost: sys.UnraisableHookArgs) -> None:
-    """Look at an exception that came where none is passed on."""
+def _on_lost(
+    on_signal: Callable[[int, FrameType | None], None], came: list[int], lost: sys.UnraisableHookArgs
+) -> None:
+    """Look at an exception that came where none is passed on.
+
+    Once a signal came, objects that it found half made may not be taken down well: nobody needs to know.
+    """
     if isinstance(lost.exc_value, KeyboardInterrupt):
         _send_again(signal.SIGINT)
     elif isinstance(lost.exc_value, Ended):
         signal.signal(signal.SIGTERM, on_signal)
         _send_again(signal.SIGTERM)
-    else:
+    elif not came:
         sys.__unraisablehook__(lost)
 
 

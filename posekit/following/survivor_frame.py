@@ -15,6 +15,9 @@ from posekit.skeleton import JOINTS
 MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a joint is taken for a mistake."""
 
+MAX_SECONDS = 1e12
+"""Seconds, of either sign, beyond which a time is taken for a mistake: thirty thousand years."""
+
 MAX_DEVIATION_METRES = 1e3
 """Metres beyond which a standard deviation is taken for a mistake."""
 
@@ -63,8 +66,9 @@ class SurvivorFrame:
 
     def __post_init__(self) -> None:
         where = f"frame at {self.time!r} s"
-        if not math.isfinite(self.time):
-            raise InputError(f"{where}: the time is not finite; give every frame its time in seconds")
+        if not abs(self.time) <= MAX_SECONDS:
+            fault = "beyond what is a time" if math.isfinite(self.time) else "not finite"
+            raise InputError(f"{where}: the time is {fault}; give every frame its time in seconds")
         joints = np.array(self.joints, dtype=np.float64)
         if joints.ndim != 3 or joints.shape[1:] != (len(JOINTS), 3):
             raise InputError(

@@ -17,7 +17,7 @@ from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError, PosekitError
 from posekit.following import Follower
 from posekit.following.follower import LiveEstimate
-from posekit.following.survivor_frame import SurvivorFrame, check_order
+from posekit.following.survivor_frame import MAX_SECONDS, SurvivorFrame, check_order
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.live.sight import LiveCamera, LiveSight, likely_camera
 from posekit.live.tracked_posture import TrackedPosture, deviation_from
@@ -138,8 +138,8 @@ class Tracker(ShortRepr):
             had not been.
         """
         time = float(time)
-        if not math.isfinite(time):
-            raise InputError(f"time: got {time}; expected a number of seconds; give every picture its time")
+        if not abs(time) <= MAX_SECONDS:
+            raise InputError(f"time: got {time:g}; expected a number of seconds; give every picture its time")
         check_order(self._last, time, self._frame)
         view = self.sight.view(points, time, root)
         recovery, reason = None, NO_NECK

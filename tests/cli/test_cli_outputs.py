@@ -201,6 +201,29 @@ main()
     assert (ended.returncode, ended.stderr) == (130, "posekit: error: interrupted\n")
 
 
+def test_what_a_signal_leaves_half_made_is_not_complained_of() -> None:
+    program = """
+import os, signal
+from posekit.cli.signals import take_signals
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Half:
+    def __del__(self):
+        raise AttributeError("before it came" if before else "after it came")
+take_signals()
+before = True
+Half()
+before = False
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except KeyboardInterrupt:
+    Half()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=True
+    )
+    assert "before it came" in ended.stderr and "after it came" not in ended.stderr
+
+
 def test_a_long_list_is_no_name_of_a_file(run: Callable[..., Any]) -> None:
     pytest.importorskip("matplotlib")
     assert run("synth", "walker", "-o", "view.json", "--frames", 1).code == 0

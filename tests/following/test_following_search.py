@@ -398,6 +398,7 @@ def test_postures_that_never_have_a_neck_are_followed():
     ("given", "says"),
     [
         ({"time": math.nan}, "time is not finite"),
+        ({"time": -1e60}, "time is beyond what is a time"),
         ({"joints": np.zeros((2, 13, 3))}, "expected \\(N, 14, 3\\)"),
         ({"joints": np.full((2, 14, 3), math.inf)}, "farther than"),
         ({"joints": np.full((2, 14, 3), 1e7)}, "farther than"),

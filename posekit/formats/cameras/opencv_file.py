@@ -56,7 +56,7 @@ def _xml_value(element: ElementTree.Element) -> Any:
         inner = {child.tag: _xml_value(child) for child in element}
         if "data" in inner:
             return {
-                name: value[0] if isinstance(value, list) and name != "data" else value
+                name: value[0] if isinstance(value, list) and value and name != "data" else value
                 for name, value in inner.items()
             }
         if set(inner) == {"_"}:
