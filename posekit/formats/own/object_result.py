@@ -16,7 +16,7 @@ from posekit.formats.own.npz import suffix
 from posekit.formats.own.object_result_schema import OBJECT_SCHEMA, ObjectFile, ObjectFrameRecord
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.safe_io.json_file import read_json
-from posekit.safe_io.refusal import nearest, refusal, shown
+from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import check_target, json_pieces, write_text
 from posekit.tables.file_model import validated
 
@@ -180,9 +180,6 @@ def read_object(path: str | Path) -> ObjectResult:
     if len(file.lengths) != len(segments):
         got = f"{len(file.lengths)} entries"
         raise refusal(path, "lengths", got, f"{len(segments)}, one a segment", "add what is missing")
-    strange = next((end for ends in segments for end in ends if end not in file.points), None)
-    if strange is not None:
-        raise refusal(path, "segments", shown(strange), "names of points", nearest(strange, file.points))
     return ObjectResult(
         unit=file.unit,
         linkage=file.linkage,
