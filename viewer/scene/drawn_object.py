@@ -83,8 +83,11 @@ class DrawnObject:
         to_scale = result.unit is not None and LEAST_METRES <= extent <= MOST_METRES
         larger = 1.0 if to_scale or extent == 0 else 1.0 / extent
         names = list(result.points)
+        drawn = [ends for ends in result.segments if set(ends) <= set(names)]  # not between middles of points
         return DrawnObject(
-            segments=np.array([[names.index(a), names.index(b)] for a, b in result.segments], dtype=np.intp),
+            segments=np.array([[names.index(a), names.index(b)] for a, b in drawn], dtype=np.intp).reshape(
+                -1, 2
+            ),
             frames=[
                 Shown(points=larger * points, time=frame.time)
                 for points, frame in zip(placed, result.frames, strict=True)
