@@ -49,8 +49,9 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
     sighted = sighting(found, source)
     people = list_people(sighted.keypoints)
     figure, of_lengths, length_deviation = person(source, sighted.camera, found.layout, Path(path))
-    if source.person != "all":
-        chosen = [choose_person(sighted.keypoints, source.person or _of_camera(found, source) or "largest")]
+    who = _of_camera(found, source)
+    if who != "all":
+        chosen = [choose_person(sighted.keypoints, who or "largest")]
     else:
         chosen = [choose(sighted.keypoints, one.person) for one in people]
     opened = []
@@ -74,7 +75,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
         _warn_of_sides(one, source)
         says = (
             f"{found.source}: {found.format}, {found.layout.name}, {plural(len(found.pictures), 'picture')}",
-            f"{_who(one, source.person or 'largest', len(people))}: in "
+            f"{_who(one, who or 'largest', len(people))}: in "
             f"{plural(len(one), 'picture')}{_mean_confidence(one)}",
             sighted.says,
             of_lengths,
@@ -90,9 +91,9 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
 
 
 def _of_camera(found: KeyPoints, source: Source) -> str:
-    """Return the number of the camera whose pictures these are, of a file that has those of several; else nothing."""
-    if not found.by_camera:
-        return ""
+    """Return who is asked for; of a file of one person before several cameras the number of the camera, if none is."""
+    if not found.by_camera or source.person not in ("", "all"):
+        return source.person
     there = sorted({str(number) for number in found.person.tolist()}, key=int)
     number = re.search(r"(\d+)\Z", split_camera(source.camera)[1] if source.camera else "")
     if number is None or str(int(number[1])) not in there:

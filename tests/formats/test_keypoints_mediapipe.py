@@ -366,6 +366,10 @@ def test_what_cameras_saw_is_told_apart_by_the_camera(tmp_path: Path) -> None:
     (seen,) = open_views(path, Source(camera=f"{config}:cam_2", stature=1.7))
     expected = open_views(path, Source(camera=f"{config}:cam_2", stature=1.7, person="2"))[0].view.image
     np.testing.assert_array_equal(seen.view.image, expected)
-    for one in (Source(stature=1.7), Source(camera=f"{config}:cam_3", stature=1.7)):
+    for one in (
+        Source(stature=1.7),
+        Source(stature=1.7, person="all"),
+        Source(camera=f"{config}:cam_3", stature=1.7),
+    ):
         with pytest.raises(InputError, match=r"what cameras 0, 2 saw; expected one of them; .* --person 0"):
             open_views(path, one)
