@@ -325,6 +325,7 @@ def test_a_followed_result_says_how_far_its_path_is_off(command: Callable[..., A
     out = command("evaluate", "result.npz", "--truth", "view.json").out
     assert out in said
     assert "| best of N | first-ranked | path " in " ".join(out.split())
-    path = posekit.read_result("result.npz").paths.joints[0]
-    away = np.nanmedian(1000 * np.linalg.norm(path - truth, axis=-1).mean(axis=1))
+    paths = posekit.read_result("result.npz").paths
+    assert paths is not None
+    away = np.nanmedian(1000 * np.linalg.norm(paths.joints[0] - truth, axis=-1).mean(axis=1))
     assert f"{away:.0f} / " in next(line for line in out.splitlines() if "where it is" in line).split("|")[4]
