@@ -10,6 +10,7 @@ from posekit.errors import InputError
 from posekit.skeleton import JOINTS
 
 if TYPE_CHECKING:
+    from posekit.formats.held import HeldPostures
     from posekit.formats.own import Result, View
     from posekit.geometry import Array
 
@@ -30,12 +31,15 @@ def before_camera(result: Result, path: Path) -> tuple[Array, str]:
 
     from posekit.cameras import PinholeCamera
     from posekit.formats.format import Content
+    from posekit.formats.held_postures import held_postures
     from posekit.formats.recognising import recognise
     from posekit.views.truth import turned_before
 
     camera, times = result.camera, np.array([one.time for one in result.frames])
-    if recognise(path).holds is Content.VIEW:
-        return true_joints(path, None, None, times)[0], "its frames are the result's"
+    found = recognise(path)
+    if found.holds is Content.VIEW:
+        return _of_view(path, len(times)), "its frames are the result's"
+    held = held_postures(path, found)
     image = np.full((len(times), len(JOINTS), 2), np.nan)
     if camera is not None:
         sees = PinholeCamera(K=camera.K, distortion=camera.distortion)
@@ -44,9 +48,9 @@ def before_camera(result: Result, path: Path) -> tuple[Array, str]:
                 first = 0 if frame.answer is None else int(frame.answer.representatives[0])
                 image[k] = sees.project(frame.joints[first])
     readers: list[tuple[Callable[[], Array], str]] = [
-        (lambda: true_joints(path, None, None, times)[0], ""),
+        (lambda: _by_second(held, path, times), ""),
         (
-            lambda: _numbered(path, len(times)),
+            lambda: _by_number(held, len(times)),
             "; picture k is its frame k: at their seconds it is farther off",
         ),
     ]
@@ -61,20 +65,6 @@ def before_camera(result: Result, path: Path) -> tuple[Array, str]:
     turned, told, how = min(laid, key=lambda one: one[1].error)
     axes = f"its axes {told.turn} are the camera's world"
     return turned, f"{axes}; it is seen {told.error:.1f} px beside the postures (median){how}"
-
-
-def _numbered(path: Path, count: int) -> Array:
-    """Return the first frames of motion (count, 14, 3), one a picture; NaN where it has none."""
-    import numpy as np
-
-    from posekit.formats.held_postures import held_postures
-    from posekit.formats.recognising import recognise
-
-    held = held_postures(path, recognise(path))
-    own = held.frame < count
-    joints = np.full((count, len(JOINTS), 3), np.nan)
-    joints[held.frame[own]] = held.postures.joints[own]
-    return joints
 
 
 def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> tuple[Array, bool]:
@@ -101,35 +91,56 @@ def true_joints(path: Path, view: View | None, view_path: Path | None, times: Ar
     InputError
         Where the file has no truth of these frames.
     """
-    import numpy as np
-
     from posekit.formats.format import Content
     from posekit.formats.held_postures import held_postures
-    from posekit.formats.own import OpenCVModel, read_view
+    from posekit.formats.own import OpenCVModel
     from posekit.formats.recognising import recognise
 
     found = recognise(path)
     if found.holds is Content.VIEW:
-        given = read_view(path)
-        if len(given) != len(times) or not np.isfinite(given.truth).any():
-            raise InputError(
-                f"--truth {path}: a view of {len(given)} frames"
-                + ("" if np.isfinite(given.truth).any() else " without truth")
-                + f"; expected the truth of {len(times)} frames; give the view that was recovered"
-            )
-        return given.truth, True
+        return _of_view(path, len(times)), True
     placed = view is not None and isinstance(view.camera, OpenCVModel) and view.camera.R is not None
     if placed and view_path is not None and found.holds is Content.MOTION:
         from posekit.views.given_views import given_views
         from posekit.views.source import Source
 
         return given_views(view_path, Source(), path)[0].view.truth, True
-    held = held_postures(path, found)
-    joints = np.full((len(times), 14, 3), np.nan)
+    return _by_second(held_postures(path, found), path, times), False
+
+
+def _of_view(path: Path, count: int) -> Array:
+    """Read the truth of a view of so many frames (count, 14, 3)."""
+    import numpy as np
+
+    from posekit.formats.own import read_view
+
+    given = read_view(path)
+    if len(given) != count or not np.isfinite(given.truth).any():
+        raise InputError(
+            f"--truth {path}: a view of {len(given)} frames"
+            + ("" if np.isfinite(given.truth).any() else " without truth")
+            + f"; expected the truth of {count} frames; give the view that was recovered"
+        )
+    return given.truth
+
+
+def _by_number(held: HeldPostures, count: int) -> Array:
+    """Return the first frames of motion (count, 14, 3), one a picture; NaN where it has none."""
+    import numpy as np
+
+    own = held.frame < count
+    joints = np.full((count, len(JOINTS), 3), np.nan)
+    joints[held.frame[own]] = held.postures.joints[own]
+    return joints
+
+
+def _by_second(held: HeldPostures, path: Path, times: Array) -> Array:
+    """Return motion at the seconds of pictures (F, 14, 3); frame by frame where it has as many."""
+    import numpy as np
+
     last = int(held.frame.max(initial=-1))
     if last + 1 == len(times):
-        joints[held.frame] = held.postures.joints
-        return joints, False
+        return _by_number(held, len(times))
     since = held.time - held.time[:1]
     if not len(since) or not (np.isfinite(since).all() and np.isfinite(times).all()):
         raise InputError(
@@ -146,5 +157,6 @@ def true_joints(path: Path, view: View | None, view_path: Path | None, times: Ar
         raise InputError(
             f"--truth {path}: none of its frames is at the time of a picture; expected the same seconds"
         )
+    joints = np.full((len(times), len(JOINTS), 3), np.nan)
     joints[near] = held.postures.joints[nearest[near]]
-    return joints, False
+    return joints

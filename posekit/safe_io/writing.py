@@ -60,14 +60,17 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
         beside.replace(target)
         done = True
     except OSError as error:
-        reason = cut(error.strerror or str(error))
-        raise refusal(
-            path, "", reason, "a file that can be written", "check permissions and free space"
-        ) from None
+        raise _refused_by_disk(path, error, "a file") from None
     finally:
         if beside is not None and not done:
             with suppress(OSError):  # where nothing can be written, there is nothing to take away
                 beside.unlink()
+
+
+def _refused_by_disk(path: str | Path, error: OSError, what: str) -> InputError:
+    """Word that a file or a folder cannot be written."""
+    reason = cut(error.strerror or str(error))
+    return refusal(path, "", reason, f"{what} that can be written", "check permissions and free space")
 
 
 def _target(path: str | Path) -> Path:
@@ -162,10 +165,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     except InputError as error:
         raise InputError(str(error).replace(str(beside), str(path))) from None
     except OSError as error:
-        reason = cut(error.strerror or str(error))
-        raise refusal(
-            path, "", reason, "a folder that can be written", "check permissions and free space"
-        ) from None
+        raise _refused_by_disk(path, error, "a folder") from None
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 

@@ -373,3 +373,11 @@ def test_what_cameras_saw_is_told_apart_by_the_camera(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=r"what cameras 0, 2 saw; expected one of them; .* --person 0"):
             open_views(path, one)
+
+
+def test_a_port_of_another_table_is_no_camera(tmp_path: Path) -> None:
+    path = tmp_path / "long.csv"
+    rows = [f"0,7,{name},{x},{y}" for name, (x, y, *_) in zip(LANDMARK_NAMES, PLACES.tolist(), strict=True)]
+    path.write_text("\n".join(["frame,port,landmark,x,y", *rows]) + "\n")
+    found = read_keypoints(path)
+    assert not found.by_camera and found.person.tolist() == [-1]

@@ -17,6 +17,7 @@ from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.view import View
 from posekit.geometry import Array
 from posekit.skeleton import LIMB_JOINTS
+from tests.frame_answers import bare_answer
 
 
 def bodies_of(trunks: Array, limbs: Array, chosen: list[tuple[int, ...]]) -> Array:
@@ -128,17 +129,9 @@ def test_sets_that_are_none_are_refused(change: dict[str, object], message: str)
 
 @pytest.mark.parametrize("last", [126, 127, 128, 129, 32767, 32768, 40000])
 def test_numbers_of_an_npz_hold_the_largest_of_them(last: int) -> None:
-    answer = FrameAnswer(
-        representatives=np.array([0, last]),
-        probability=np.array([0.6, 0.4]),
-        near=np.full(11, np.nan),
-        far=np.full(11, np.nan),
-        region_mean=np.empty((0, 14, 3)),
-        region_covariance=np.empty((0, 14, 3, 3)),
-        region_probability=np.empty((0, 14)),
-        region_level=np.full(14, np.nan),
+    arrays = table_arrays(
+        FrameAnswer, [bare_answer([0, last]), None], "m", within="answer/", precision=[None, None]
     )
-    arrays = table_arrays(FrameAnswer, [answer, None], "m", within="answer/", precision=[None, None])
     rows = arrays["answer/representatives"].rows
     assert rows[0].tolist() == [0, last]
     assert rows[0].itemsize <= (1 if last < 128 else 2 if last < 32768 else 4)

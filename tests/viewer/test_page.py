@@ -15,7 +15,6 @@ from hypothesis.extra import numpy as hnp
 from posekit.answers.wording import percent
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures
-from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
@@ -25,6 +24,7 @@ from posekit.viewer.page.page import page_html, write_page
 from posekit.viewer.page.shown_survivors import most_of_each, survivors_shown
 from posekit.viewer.scene.world import World
 from posekit.views.builtin import builtin_view
+from tests.frame_answers import bare_answer
 from tests.viewer.driving import wait_until
 
 HOSTILE = (
@@ -406,17 +406,7 @@ def many_postures(frames, count):
 
 def with_answer(frame, rows):
     """Return a frame that says which postures stand for all."""
-    answer = FrameAnswer(
-        representatives=np.array(rows),
-        probability=np.full(len(rows), 0.95 / len(rows)),
-        near=np.full(11, np.nan),
-        far=np.full(11, np.nan),
-        region_mean=np.empty((0, 14, 3)),
-        region_covariance=np.empty((0, 14, 3, 3)),
-        region_probability=np.empty((0, 14)),
-        region_level=np.full(14, np.nan),
-    )
-    return dataclasses.replace(frame, answer=answer)
+    return dataclasses.replace(frame, answer=bare_answer(rows))
 
 
 def test_any_number_of_postures_makes_a_page_below_ten_megabytes():

@@ -48,9 +48,11 @@ VALUE_COLUMN_NAMES = {
     **dict.fromkeys(VISIBILITY_NAMES, "visibility"),
     **dict.fromkeys(PRESENCE_NAMES, "presence"),
 }
+PORT_NAME = "caliscopeport"
+"""What caliscope's ``port`` is called here: a port of another table is no camera."""
 CALISCOPE_COLUMN_NAMES = {
     "sync_index": "frame",
-    "port": "port",
+    "port": PORT_NAME,
     "frame_time": "time",
     "point_id": "landmark",
     "img_loc_x": "x",
@@ -124,7 +126,7 @@ def add_table(rows: DetectionRows, text: str) -> bool:
     header = _header(text)
     if _is_long(header):
         _add_long(rows, header, text)
-        return "port" in header
+        return PORT_NAME in header
     columns = _columns(header)
     if not columns:
         expected = "columns as nose_x, nose_y, nose_visibility, or frame, landmark, x, y, visibility"
@@ -217,7 +219,7 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
     which = header.index(one_of(header, LANDMARK_COLUMN_NAMES) or "")
     x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
     surest = _column(header, (*VISIBILITY_NAMES, *PRESENCE_NAMES))
-    port = _column(header, ("port",))
+    port = _column(header, (PORT_NAME,))
     who = _column(header, PERSON_COLUMN_NAMES) if port is None else port
     people: dict[tuple[str, str], tuple[Array, Array]] = {}
     labels: dict[str, float] = {}
