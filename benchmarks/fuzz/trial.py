@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -87,6 +88,9 @@ def in_fork(
     while time.monotonic() < ends:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
+            # Its processes end with it: what they say is not said of the next case.
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(child, signal.SIGKILL)
             return os.waitstatus_to_exitcode(status)
         if killer and time.monotonic() > started + kill[1]:
             os.kill(child, killer)

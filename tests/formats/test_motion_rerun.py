@@ -157,3 +157,16 @@ def test_the_photographs_are_behind_the_points(command, tmp_path: Path) -> None:
     )
     refused = command("convert", tmp_path / "found.npz", tmp_path / "out.trc", *words)
     assert refused.code == 2 and "trc holds no pictures" in refused.err
+
+
+@pytest.mark.parametrize("second", [1e10, -1e10, 1e12])
+def test_times_that_rerun_cannot_count_are_refused(tmp_path: Path, second: float) -> None:
+    frames = [RecordedFrame(time=second, postures=STANDING[None])]
+    with pytest.raises(InputError, match=r"frame 0: got .* s; expected at most 9.2e\+09 s"):
+        write_rerun_recording(tmp_path / "late.rrd", frames)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_latest_time_that_rerun_counts_is_written(tmp_path: Path) -> None:
+    write_rerun_recording(tmp_path / "late.rrd", [RecordedFrame(time=9.2e9, postures=STANDING[None])])
+    assert (tmp_path / "late.rrd").stat().st_size

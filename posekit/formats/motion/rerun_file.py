@@ -30,6 +30,8 @@ RRD_MAGIC: Final = b"RRF"
 MAX_OTHERS: Final = 60
 """Postures of a frame beside the likeliest: more cannot be told apart."""
 FRAME_TIMELINE, SECONDS_TIMELINE = "frame", "seconds"
+LATEST_SECONDS: Final = 9.2e9
+"""Rerun counts nanoseconds in 64 bits."""
 RIGHT_RGB, LEFT_RGB, MIDDLE_RGB = (230, 159, 0), (0, 114, 178), (154, 154, 154)
 """Okabe & Ito's, which the colour-blind tell apart."""
 LINE_METRES, FAINT_LINE_METRES, POINT_METRES = 0.012, 0.004, 0.015
@@ -82,7 +84,7 @@ def write_rerun(path: str | Path, motion: Motion) -> None:
     recording.log("world", _axes(rr, motion.up or "+z"), static=True)
     joints = [motion.names.index(name) for name in JOINTS] if set(JOINTS) <= set(motion.names) else None
     for k, (second, points) in enumerate(zip(motion.time.tolist(), motion.points, strict=True)):
-        _at(recording, k, second)
+        _at(recording, path, k, second)
         known = np.isfinite(points).all(axis=1)
         labels = [name for name, one in zip(motion.names, known.tolist(), strict=True) if one]
         recording.log(
@@ -123,7 +125,7 @@ def write_rerun_recording(
     recording.log("world", _axes(rr, "-y"), static=True)
     camera = None if view is None else _camera(rr, recording, view)
     for k, frame in enumerate(frames):
-        _at(recording, k, frame.time)
+        _at(recording, path, k, frame.time)
         recording.log("findings", rr.TextLog(frame.says))
         if frame.picture:
             photograph = rr.EncodedImage(contents=frame.picture, media_type="image/jpeg")
@@ -158,7 +160,10 @@ def _save(path: str | Path, recording: Any) -> None:
         file.write(stream.drain_as_bytes())
 
 
-def _at(recording: Any, frame: int, second: float) -> None:
+def _at(recording: Any, path: str | Path, frame: int, second: float) -> None:
+    if abs(second) > LATEST_SECONDS:
+        expected = f"at most {LATEST_SECONDS:g} s, as Rerun counts nanoseconds"
+        raise refusal(path, f"frame {frame}", f"{second:g} s", expected, "count its times from the first frame")
     recording.set_time(FRAME_TIMELINE, sequence=frame)
     recording.set_time(SECONDS_TIMELINE, duration=second)
 
