@@ -163,7 +163,9 @@ def _save(path: str | Path, recording: Any) -> None:
 def _at(recording: Any, path: str | Path, frame: int, second: float) -> None:
     if abs(second) > LATEST_SECONDS:
         expected = f"at most {LATEST_SECONDS:g} s, as Rerun counts nanoseconds"
-        raise refusal(path, f"frame {frame}", f"{second:g} s", expected, "count its times from the first frame")
+        raise refusal(
+            path, f"frame {frame}", f"{second:g} s", expected, "count its times from the first frame"
+        )
     recording.set_time(FRAME_TIMELINE, sequence=frame)
     recording.set_time(SECONDS_TIMELINE, duration=second)
 
