@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from posekit.cameras import PinholeCamera
+from posekit.cameras.pinhole import MAX_DISTORTION
 from posekit.cameras.rotation import rotation_from_rounded
 from posekit.display.short_repr import ShortRepr
 from posekit.errors import CameraError, InputError
@@ -87,12 +88,13 @@ class CalibratedCamera(ShortRepr):
             R = None if self.R is None else rotation_from_rounded(self.R)
         except CameraError as error:
             raise CameraError(f"camera {shown(self.name)}: {error}") from None
-        if len(distortion) not in counts or not np.isfinite(distortion).all():
+        usable = abs(distortion) <= MAX_DISTORTION
+        if len(distortion) not in counts or not usable.all():
             model = "the fisheye model" if self.fisheye else "OpenCV's models"
             raise CameraError(
                 f"camera {shown(self.name)}: distortion has {len(distortion)} coefficients, "
-                f"{int(np.isfinite(distortion).sum())} of them finite; expected "
-                f"{', '.join(map(str, counts))} finite numbers for {model}"
+                f"{int(usable.sum())} of them numbers of {MAX_DISTORTION:g} at most; expected "
+                f"{', '.join(map(str, counts))} such numbers for {model}"
             )
         t = None if self.t is None else np.array(self.t, dtype=np.float64).ravel()
         if t is not None and (t.shape != (3,) or not np.isfinite(t).all()):

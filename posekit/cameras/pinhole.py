@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from posekit.errors import CameraError
 from posekit.geometry import Array
 
 UNDISTORTION_STEPS = 20
+
+MAX_DISTORTION: Final = 1e9
+"""Of a coefficient: no lens is near it, and products of five stay numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,9 +51,10 @@ class PinholeCamera:
         object.__setattr__(self, "K", K)
         if self.distortion is not None:
             distortion = np.array(self.distortion, dtype=np.float64)
-            if distortion.shape != (5,) or not np.isfinite(distortion).all():
+            if distortion.shape != (5,) or not (abs(distortion) <= MAX_DISTORTION).all():
                 raise CameraError(
-                    f"distortion must be five finite numbers k1, k2, p1, p2, k3; got {distortion.tolist()}"
+                    f"distortion must be five numbers k1, k2, p1, p2, k3 of {MAX_DISTORTION:g} at most; "
+                    f"got {distortion.tolist()}"
                 )
             distortion.flags.writeable = False
             object.__setattr__(self, "distortion", distortion)

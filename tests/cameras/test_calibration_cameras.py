@@ -94,7 +94,8 @@ def test_a_quaternion_of_another_length_is_refused(q: list[float]) -> None:
     [
         ({"distortion": [1.0, 2.0]}, "2 coefficients"),
         ({"distortion": [1.0] * 6}, "6 coefficients"),
-        ({"distortion": [np.nan] * 5}, "0 of them finite"),
+        ({"distortion": [np.nan] * 5}, "0 of them numbers of"),
+        ({"distortion": [1e308, 0, 0, 0, 0]}, r"4 of them numbers of 1e\+09"),
         ({"distortion": [0.1] * 5, "fisheye": True}, "fisheye"),
         ({"size": (0, 480)}, "size"),
         ({"size": (640.5, 480)}, "size"),
