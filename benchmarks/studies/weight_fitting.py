@@ -8,6 +8,10 @@ weights are those under which these choices were most likely,
     \max_{w \ge 0} \sum_f \log \frac{e^{w \cdot x_{f}}}{\sum_j e^{w \cdot x_j}} - r |w|^2,
 
 a concave problem in as many unknowns as there are terms.
+
+Some frames are of postures like none that the prior knows; fitted to these too, weights are too modest of all others.
+So frames may be `astray`: the choice is then any survivor's alike, for a share of the frames that is found together
+with the weights by expectation and maximisation (Dempster et al. 1977).
 """
 
 from __future__ import annotations
@@ -28,21 +32,36 @@ RIDGE_PENALTY: Final = 1e-3
 MAX_ITERATIONS: Final = 100
 """Newton steps: enough for any, where ten are usual."""
 
+ASTRAY_STEPS, FIRST_ASTRAY_SHARE = 12, 0.05
+"""Rounds in which frames are told astray or not, and their share in the first."""
+
 MIN_IMPROVEMENT: Final = 1e-9
 """A gain of the mean log-likelihood that is not worth another step."""
 
 
 class Choices(NamedTuple):
-    """Terms (N, K) of survivors in the order of frames (N,), where frames start, and which survivor is the truth."""
+    """Terms (N, K) of survivors in the order of frames (N,), where frames start, and which survivor is the truth.
+
+    Frames count as much as `counts` (F,) says.
+    """
 
     terms: Array
     frame: NDArray[np.intp]
     starts: NDArray[np.intp]
     chosen: NDArray[np.intp]
+    counts: Array
+
+    def chances(self, weights: Array) -> Array:
+        """Return the probability of what was chosen (F,)."""
+        return np.asarray(softmax(self.terms @ weights, self.frame)[self.chosen])
 
 
 def fit_weights(
-    rankings: Sequence[Ranking], nearest: Sequence[ArrayLike], *, names: Sequence[str] | None = None
+    rankings: Sequence[Ranking],
+    nearest: Sequence[ArrayLike],
+    *,
+    names: Sequence[str] | None = None,
+    astray: bool = False,
 ) -> dict[str, float]:
     """Fit one weight a term; each ranking counts the same, however many frames it has.
 
@@ -54,6 +73,8 @@ def fit_weights(
         For each ranking the survivor that is nearest to the truth, frame by frame; -1 for frames that do not count.
     names : sequence of str, optional
         The terms; by default all that some ranking has. A term that a ranking has not is 0 there.
+    astray : bool
+        Whether a share of the frames, which is fitted too, says nothing of the weights.
 
     Returns
     -------
@@ -74,11 +95,26 @@ def fit_weights(
     sets = [one for one in sets if len(one.chosen)]
     if not wanted or not sets:
         raise InputError("no terms or no frames to fit weights to")
-    weights = np.full(len(wanted), 0.5)
+    weights = _most_likely(sets, np.full(len(wanted), 0.5))
+    share = FIRST_ASTRAY_SHARE
+    for _ in range(ASTRAY_STEPS if astray else 0):
+        straight = []
+        for one in sets:
+            among = np.diff(one.starts, append=len(one.frame))
+            follows = (1 - share) * one.chances(weights)
+            straight.append(follows / (follows + share / among))
+        share = float(1 - np.mean([part.mean() for part in straight]))
+        sets = [one._replace(counts=part) for one, part in zip(sets, straight, strict=True)]
+        weights = _most_likely(sets, weights)
+    return dict(zip(wanted, weights.tolist(), strict=True))
+
+
+def _most_likely(sets: Sequence[Choices], weights: Array) -> Array:
+    """Return the weights under which the choices are most likely, from some on."""
     value, slope, curve = _objective(sets, weights)
     for _ in range(MAX_ITERATIONS):
         free = (weights > 0) | (slope > 0)
-        step = np.zeros(len(wanted))
+        step = np.zeros(len(weights))
         step[free] = np.linalg.solve(-curve[np.ix_(free, free)], slope[free])
         # The step is halved until it is no worse: weights that are held at zero bend the parabola.
         size = 1.0
@@ -91,7 +127,7 @@ def fit_weights(
         gain, weights, value, slope, curve = better - value, tried, better, next_slope, next_curve
         if gain < MIN_IMPROVEMENT:
             break
-    return dict(zip(wanted, weights.tolist(), strict=True))
+    return weights
 
 
 def _choices(ranking: Ranking, nearest: NDArray[np.intp], names: Sequence[str]) -> Choices:
@@ -107,7 +143,8 @@ def _choices(ranking: Ranking, nearest: NDArray[np.intp], names: Sequence[str]) 
     absent = np.zeros(len(ranking))
     terms = np.stack([ranking.terms.get(name, absent)[kept] for name in names], axis=1)
     frame = ranking.frame[kept]
-    return Choices(terms, frame, np.flatnonzero(np.diff(frame, prepend=-1)), place[rows])
+    starts = np.flatnonzero(np.diff(frame, prepend=-1))
+    return Choices(terms, frame, starts, place[rows], np.ones(len(rows)))
 
 
 def _objective(sets: Sequence[Choices], weights: Array) -> tuple[float, Array, Array]:
@@ -116,10 +153,11 @@ def _objective(sets: Sequence[Choices], weights: Array) -> tuple[float, Array, A
     slope, curve = -2 * RIDGE_PENALTY * weights, -2 * RIDGE_PENALTY * np.eye(len(weights))
     for one in sets:
         p = softmax(one.terms @ weights, one.frame)
-        count = len(one.chosen)
+        count = one.counts.sum()
+        counted = np.repeat(one.counts, np.diff(one.starts, append=len(p)))
         weighted = p[:, None] * one.terms
         mean = np.add.reduceat(weighted, one.starts)
-        value += float(np.log(np.maximum(p[one.chosen], 1e-300)).sum()) / count
-        slope = slope + (one.terms[one.chosen].sum(axis=0) - mean.sum(axis=0)) / count
-        curve = curve - (one.terms.T @ weighted - mean.T @ mean) / count
+        value += float(one.counts @ np.log(np.maximum(p[one.chosen], 1e-300))) / count
+        slope = slope + one.counts @ (one.terms[one.chosen] - mean) / count
+        curve = curve - (one.terms.T @ (counted[:, None] * weighted) - (mean.T * one.counts) @ mean) / count
     return value, slope, curve

@@ -351,7 +351,7 @@ class Refiner:
     def spread(self, lifted: Lifted) -> float:
         """Say how far off survivors are, metres."""
         depth = np.median(self.fit.root[lifted.chosen, 2] / lifted.seen.focal)
-        return float(deviation_of_noise(self.noise.deviation, depth))
+        return float(deviation_of_noise(self.noise.deviation, depth, self.noise.limb))
 
     def allowed(self, chosen: NDArray[np.intp], camera: Camera, seen: ObservedHypotheses) -> NoiseTolerance:
         """Return what the tree of the limbs is allowed, on trunks that were found."""

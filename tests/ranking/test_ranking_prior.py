@@ -279,6 +279,20 @@ def test_fitted_weights_are_the_most_likely() -> None:
         assert loss(best) <= loss(best + step) + 1e-12
 
 
+def test_frames_that_went_astray_do_not_blunt_the_weights() -> None:
+    wanted = np.array([1.5, 3.0])
+    ranking, chosen = drawn(wanted, 6)
+    rng = np.random.default_rng(7)
+    lost = rng.random(len(chosen)) < 0.1
+    others = np.array([rng.choice(np.flatnonzero(ranking.frame == k)) for k in np.flatnonzero(lost)])
+    chosen[lost] = others
+    blunt, sharp = (
+        np.array(list(fit_weights([ranking], [chosen], astray=astray).values())) for astray in (False, True)
+    )
+    assert (blunt < 0.75 * wanted).all()
+    assert sharp == pytest.approx(wanted, rel=0.1)
+
+
 def test_frames_without_a_truth_do_not_count() -> None:
     ranking, chosen = drawn(np.array([1.0]), 4, frames=200)
     half = chosen.copy()

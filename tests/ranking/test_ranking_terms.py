@@ -455,6 +455,8 @@ def test_the_deviation_of_survivors() -> None:
     np.testing.assert_allclose(
         deviation_of_noise([2.0, 4.0], 0.002), np.hypot(MIN_DEVIATION_METRES, [0.008, 0.016]), rtol=1e-12
     )
+    # 2 px of 2 mm, 6 mm of a torso, and 5 % of 60 cm.
+    assert deviation_of_noise(2.0, 0.002, 0.05) == pytest.approx(np.sqrt(0.008**2 + 0.006**2 + 0.03**2))
     np.testing.assert_allclose(
         deviation_of_tolerance([0.0, 1e-8, 0.22]),
         [MIN_DEVIATION_METRES, MIN_DEVIATION_METRES, 0.1],
@@ -465,5 +467,7 @@ def test_the_deviation_of_survivors() -> None:
             deviation_of_noise(wrong, 0.002)
         with pytest.raises(InputError):
             deviation_of_noise(2.0, wrong)
+        with pytest.raises(InputError, match="deviations of lengths"):
+            deviation_of_noise(2.0, 0.002, wrong)
         with pytest.raises(InputError):
             deviation_of_tolerance(wrong)
