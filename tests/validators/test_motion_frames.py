@@ -1,0 +1,85 @@
+"""What is found of single frames: their order, repeats and jumps, by laws that hold whatever the motion is."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posekit.skeleton import FEET_POINTS, SIDES
+from posekit.validators.motion import MotionClip
+from posekit.validators.motion.displaced_body import displaced_by
+from posekit.validators.motion.explained import explained
+from posekit.validators.motion.ground import ground_of
+from posekit.validators.motion.jumps import jumps_of
+from posekit.validators.motion.order import _length, _shortest, _with_moves
+from posekit.validators.motion.sliding import FOOT_POINTS
+from tests.validators.test_ground_laws import moved, standing
+from tests.validators.test_motion_laws import WALK, jumped, named, swapped, with_joints
+
+
+def test_backward_in_time_every_jump_is_as_large(rng: np.random.Generator) -> None:
+    for count in (7, 8, 9, 12, 40):
+        joints = rng.normal(0, 1e-3, (count, 14, 3)).cumsum(axis=0)
+        joints[rng.integers(count, size=3), rng.integers(14, size=3)] += 0.2
+        there, back = jumps_of(joints, 1 / 30), jumps_of(joints[::-1], 1 / 30)
+        np.testing.assert_allclose(back.joint[::-1], there.joint, atol=1e-12)
+        np.testing.assert_allclose(back.body[::-1], there.body, atol=1e-12)
+        np.testing.assert_allclose(displaced_by(joints[::-1], 1 / 30)[::-1], displaced_by(joints, 1 / 30), atol=1e-12)
+
+
+def test_no_move_of_one_frame_makes_an_order_shorter(rng: np.random.Generator) -> None:
+    for count in (6, 9, 14):
+        points = rng.normal(size=(count, 4))
+        ways = np.linalg.norm(points[:, None] - points, axis=-1)
+        found = _with_moves(np.arange(count), ways)
+        assert sorted(found) == list(range(count)) and (found[0], found[-1]) == (0, count - 1)
+        for at, to in itertools.permutations(range(1, count - 1), 2):
+            other = np.insert(np.delete(found, at), to, found[at])
+            assert _length(other, ways) > _length(found, ways) - 1e-9
+
+
+def test_frames_on_a_line_are_put_into_its_order(rng: np.random.Generator) -> None:
+    for count in (6, 10, 30):
+        line = np.arange(count) + rng.uniform(-0.3, 0.3, count)
+        given = np.array([0, *(1 + rng.permutation(count - 2)), count - 1])
+        assert given[_shortest(line[given][:, None])].tolist() == list(range(count))
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_a_frame_that_comes_again_is_named_beside_what_else_is_wrong(frames: int) -> None:
+    running = replace(WALK, joints=WALK.joints + np.arange(90)[:, None, None] * np.array([0.15, 0.0, 0.0]))
+    again = with_joints(
+        running, slice(30, 31 + frames), lambda joints: np.repeat(joints[:1], len(joints), axis=0)
+    )
+    repeated = {"repeated": (31, 30 + frames)}
+    assert named(again) == repeated
+    assert named(with_joints(again, 60, jumped(0.15))) == {**repeated, "teleport": (60, 60)}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_right_and_left_are_exchanged_from_two_postures_on(count: int) -> None:
+    right = WALK.joints[40 : 40 + count]
+    clip = MotionClip(joints=swapped(right), time=WALK.time[:count], rate=30.0, up=WALK.up)
+    found = explained(clip)
+    assert found.exchanged.all() == found.exchanged.any() == (count > 1)
+    assert np.array_equal(found.joints, right if count > 1 else swapped(right))
+
+
+def test_points_of_a_foot_are_of_one_side() -> None:
+    names = [*FEET_POINTS, "right_ankle", "left_ankle"]
+    parts = ("toe", "heel", "ankle")
+    assert [[names[k] for k in foot] for foot in FOOT_POINTS] == [
+        [f"{side}_{part}" for part in parts] for side in SIDES
+    ]
+
+
+def test_a_body_rests_while_it_is_lifted_as_a_whole() -> None:
+    clip = standing(90)
+    up = np.array([0.0, 0.0, 1.0])
+    lifted = moved(clip, np.where((np.arange(90) >= 30) & (np.arange(90) < 45), 0.1, 0.0)[:, None] * up)
+    ground = ground_of(lifted)
+    assert ground.lifted[30:45] == pytest.approx(0.1, abs=1e-3)
+    assert ground.resting.tolist() == ground_of(clip).resting.tolist()
