@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from posekit.cameras import PinholeCamera
 from posekit.cameras.head import (
     TABLE_A2,
     HeadPoints,
+    HeadWarning,
+    solve_pose,
 )
 from posekit.errors import HeadError
 
@@ -56,3 +59,19 @@ def test_names_and_points_must_agree():
 def test_unknown_point_names_the_nearest():
     with pytest.raises(HeadError, match=r"no point 'right_eyes', only neck.*; did you mean right_eye\?"):
         TABLE_A2.index("right_eyes")
+
+
+def test_the_misfit_is_left_out_as_if_it_were_not_seen(rng):
+    head = TABLE_A2.with_points({"chin": [-0.302, 0.565, 0.0], "crown": [-0.33, 0.75, 0.02]})
+    camera = PinholeCamera(K=np.array([[1000.0, 0.0, 320.0], [0.0, 1000.0, 240.0], [0.0, 0.0, 1.0]]))
+    turn = np.array([[0.0, 0, -1], [0, -1, 0], [-1, 0, 0]])
+    image = camera.project(head.points @ turn.T + [0.0, 0.5, 3.0]) + rng.normal(0, 0.2, (8, 2))
+    image[2] += 30.0
+    with pytest.warns(HeadWarning):
+        pose = solve_pose(head, image, camera)
+    image[2] = np.nan
+    left = solve_pose(head, image, camera)
+    assert pose.misfit == (head.names[2],)
+    assert pose.rms == pytest.approx(np.sqrt((pose.residuals**2).mean()))
+    assert pose.rms_without == pytest.approx(left.rms, rel=1e-4)
+    assert left.rms == pytest.approx(np.sqrt(np.nanmean(left.residuals**2)))

@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
+from posekit.cameras.head.perspective import HeadPlacement
 from posekit.cameras.neck.allowance import RIGID_JOINTS, allowances
 from posekit.cameras.neck.body import NEAREST_DEPTH, sight
 from posekit.cameras.neck.closure import RigidClosure
 from posekit.cameras.neck.cover import cover, meet
 from posekit.cameras.neck.given import NeckSettings, PlacementInput, with_own_head
-from posekit.cameras.neck.pose import PartPoses, poses
+from posekit.cameras.neck.pose import PartPoses, _origin, poses
 from posekit.cameras.neck.search import _distinct, _gaps, _joined, search
 from posekit.cameras.neck.suggestion import suggest
 from posekit.errors import InputError
@@ -249,6 +250,21 @@ def test_poses_of_exact_points_are_the_truth_with_the_deviation_of_its_jacobian(
     few = image.copy()
     few[:, 3] = np.nan
     assert not poses(CAMERA, TORSO, few, np.full((6, 4), 2.0), np.zeros(4)).found.any()
+
+
+def test_an_origin_moves_with_each_unknown_as_its_covariance_says() -> None:
+    """Turns are about the camera's axes, before the pose."""
+    rng = np.random.default_rng(3)
+    R, size, centre = rotation_from_vector(rng.normal(size=(5, 3))), np.full(5, 0.4), rng.normal(size=(5, 3))
+    shift, scale, jacobian = rng.normal(size=(5, 2)), rng.uniform(0.1, 0.5, 5), rng.normal(size=(5, 8, 6))
+
+    def moved(step: Array) -> tuple[Array, Array]:
+        end = HeadPlacement(rotation_from_vector(step[:3]) @ R, shift + step[3:5], scale + step[5], scale)
+        return _origin(end, jacobian, centre, size)[1:]
+
+    by = np.stack([(moved(step)[0] - moved(-step)[0]) / 2e-6 for step in 1e-6 * np.eye(6)], axis=-1)
+    expected = by @ np.linalg.inv(np.swapaxes(jacobian, 1, 2) @ jacobian) @ np.swapaxes(by, 1, 2)
+    np.testing.assert_allclose(moved(np.zeros(6))[1], expected, rtol=1e-6, atol=1e-6)
 
 
 def part_poses(

@@ -319,3 +319,13 @@ def test_intervals_meet_where_both_are(a: np.ndarray, b: np.ndarray) -> None:
 
     np.testing.assert_array_equal(holds(both), holds(a) & holds(b))
     assert (both[1:, 0] > both[:-1, 1]).all()
+
+
+def test_of_a_neck_that_nothing_tells_all_is_empty_or_unknown() -> None:
+    (found,) = place(VIEWS.camera, FIGURE, np.full((1, 14, 2), np.nan), np.full((1, 5, 2), np.nan))
+    assert found.method == "none" and found.reason
+    assert (found.necks.shape, found.misfit.shape, found.depths.shape) == ((0, 3), (0,), (0,))
+    assert found.intervals.shape == found.minima.shape == found.curve.shape == (0, 2)
+    numbers = (found.estimate, found.residual, found.deviation, found.lower, found.upper, found.tolerance)
+    assert np.isnan([*numbers, found.tangent]).all()
+    assert (found.step, found.closing, found.segment, found.notes, found.unit) == (0.0, 0, "", (), "m")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import pkgutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import CameraError, InputError
+from posekit.formats import own
 from posekit.formats.own import schema
 from posekit.formats.own.camera_model import (
     LeeChenModel,
@@ -357,3 +361,20 @@ def test_cameras_are_spelt_in_the_unit_of_the_file(unit: Any, metres: float) -> 
         "size": [640, 480],
         "up": "-y",
     }
+
+
+def test_every_module_that_names_a_schema_names_one_that_is_published() -> None:
+    kept = {
+        path.stem.replace(".", "/").replace("/", ".", 1)
+        for path in (Path(__file__).parent / "schemas").iterdir()
+    }
+    named = {}
+    for each in pkgutil.iter_modules(own.__path__):
+        module = importlib.import_module(f"posekit.formats.own.{each.name}")
+        named |= {
+            (each.name, name): value
+            for name, value in vars(module).items()
+            if name.endswith("_SCHEMA") and isinstance(value, str)
+        }
+    assert len(named) > 10
+    assert set(named.values()) == kept

@@ -236,3 +236,21 @@ def test_what_passes_the_screen_by_the_tolerance_alone_passes_with_directions() 
         more += int((~clear & ~violated).sum())
         assert (check.rule is None) == (passing.kind == OF_LIMB)
     assert more
+
+
+@pytest.mark.parametrize("angle", ["flexion", "rotation"])
+@pytest.mark.parametrize("limb", ["shoulder", "hip"])
+def test_with_directions_an_angle_near_a_pole_may_be_off_by_what_its_direction_may(
+    limb: str, angle: str
+) -> None:
+    """At an angle of sine s from its axis a direction may turn by t: then that angle by the tangent of asin(t / s)."""
+    tolerance, checks = 3.0, joint_range(FIGURE, tolerance=3.0, directions=True)
+    hinge = {"shoulder": "elbow", "hip": "knee"}[limb]
+    end = FIGURE.limits.upper[DOFS.index(f"right_{limb}.{angle}")]
+    # How far the upper segment is from the first angle's axis, and the lower one from the last.
+    turned = {f"right_{limb}.abduction": 0.7, f"right_{hinge}.flexion": 0.6}
+    sine = np.cos(0.7) if angle == "flexion" else np.sin(0.6)
+    allowed = np.tan(np.arcsin(np.radians(tolerance) / sine))
+    for share, passes in ((0.97, True), (1.03, False)):
+        whole = posture({**turned, f"right_{limb}.{angle}": end + share * allowed})
+        assert judged(whole, checks)[f"right_{limb}.{angle}"][0] != passes

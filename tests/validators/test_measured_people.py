@@ -176,3 +176,17 @@ def test_hips_that_are_wide_apart_let_thighs_lean_inward() -> None:
         one.motions["hip.abduction"].end("lower")[0] for one in (anatomy, anatomy.with_hips(13.5, 10.0))
     )
     assert own == usual - 10.0
+
+
+def test_each_robot_judges_with_the_noise_of_its_own_person() -> None:
+    validator = Validator("human", noise=None)
+    people = [measured_person(standing(40, noise)) for noise in (0.004, 0.008, 0.004)]
+    kept = [validator._robot_for(person) for person in people]
+    for person, found in zip(people, kept, strict=True):
+        allowed = Allowance(settings=validator.settings, person=person)
+        own = allowed.of_robot(
+            validator._robot.settings, made_up=validator._robot.models.bodies == "capsules"
+        )
+        assert found.settings == own
+        assert validator._robot_for(people[2]) is kept[2]
+    assert kept[0].settings != kept[1].settings

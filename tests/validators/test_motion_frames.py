@@ -15,6 +15,7 @@ from posekit.validators.motion.explained import explained
 from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.jumps import jumps_of
 from posekit.validators.motion.order import _length, _shortest, _with_moves
+from posekit.validators.motion.sides import _continuity
 from posekit.validators.motion.sliding import FOOT_POINTS
 from tests.validators.test_ground_laws import moved, standing
 from tests.validators.test_motion_laws import WALK, jumped, named, swapped, with_joints
@@ -27,7 +28,9 @@ def test_backward_in_time_every_jump_is_as_large(rng: np.random.Generator) -> No
         there, back = jumps_of(joints, 1 / 30), jumps_of(joints[::-1], 1 / 30)
         np.testing.assert_allclose(back.joint[::-1], there.joint, atol=1e-12)
         np.testing.assert_allclose(back.body[::-1], there.body, atol=1e-12)
-        np.testing.assert_allclose(displaced_by(joints[::-1], 1 / 30)[::-1], displaced_by(joints, 1 / 30), atol=1e-12)
+        np.testing.assert_allclose(
+            displaced_by(joints[::-1], 1 / 30)[::-1], displaced_by(joints, 1 / 30), atol=1e-12
+        )
 
 
 def test_no_move_of_one_frame_makes_an_order_shorter(rng: np.random.Generator) -> None:
@@ -83,3 +86,15 @@ def test_a_body_rests_while_it_is_lifted_as_a_whole() -> None:
     ground = ground_of(lifted)
     assert ground.lifted[30:45] == pytest.approx(0.1, abs=1e-3)
     assert ground.resting.tolist() == ground_of(clip).resting.tolist()
+
+
+def test_what_a_body_does_as_a_whole_says_nothing_of_its_sides(rng: np.random.Generator) -> None:
+    joints = WALK.joints[:20].copy()
+    joints[10:] = swapped(joints[10:])
+    across = rng.normal(size=(20, 6, 3))
+    along = rng.normal(0, 0.2, (20, 1, 3)).cumsum(axis=0)
+    still = joints - joints[:, :4].mean(axis=1, keepdims=True)
+    expected = _continuity(still, across)
+    np.testing.assert_allclose(_continuity(still + along, across), expected, atol=1e-9)
+    turned_over = np.abs(expected).max(axis=1) > 0.1
+    assert turned_over[9] and (expected[9] > 0).any()

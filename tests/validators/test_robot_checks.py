@@ -280,3 +280,27 @@ def test_soles_are_the_robots_own_where_it_has_some() -> None:
     kinematics = own._robot.models.kinematics
     assert len(find_soles(kinematics, robot("talos").geometry)) > 8
     assert len(find_soles(kinematics, None)) == 8
+
+
+def test_soles_are_made_as_a_persons_that_stands() -> None:
+    """Forward is across hips and shanks: a quarter of the foot behind the ankle, symmetric about it."""
+    for name in ("human", "talos"):
+        kinematics = Validator(robot(name), checks=("balance",))._robot.models.kinematics
+        data = kinematics.model.createData()
+        pin.forwardKinematics(kinematics.model, data, pin.neutral(kinematics.model))
+        at = dict(zip(kinematics.names, kinematics.positions(kinematics.neutral[None])[0], strict=True))
+        places = np.array(
+            [data.oMi[corner.joint].act(corner.place) for corner in find_soles(kinematics, None)]
+        )
+        for side, sole in zip(("right", "left"), places.reshape(2, 4, 3), strict=True):
+            hip, knee, ankle = (at[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
+            stature = (np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle)) / 0.491
+            up = (knee - ankle) / np.linalg.norm(knee - ankle)
+            forward = np.cross(at["left_hip"] - at["right_hip"], up)
+            forward /= np.linalg.norm(forward)
+            frame = (sole - ankle) @ np.stack([forward, np.cross(up, forward), up], axis=1) / stature
+            heel, toe = -0.25 * 0.152, 0.75 * 0.152
+            half = 0.055 / 2
+            assert sorted(frame.round(9).tolist()) == pytest.approx(
+                np.array(sorted([x, y, -0.039] for x in (heel, toe) for y in (-half, half)))
+            )

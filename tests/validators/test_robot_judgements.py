@@ -530,6 +530,18 @@ def test_files_of_a_robot_are_no_options_of_what_needs_none(
         assert str(caught.value).startswith(f"{name}: ") and words in str(caught.value)
 
 
+@pytest.mark.parametrize("untrusted", [None, True, False])
+def test_the_file_of_a_figure_is_trusted_where_that_is_said(
+    untrusted: bool | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "figure.urdf"
+    load_figure().write(path)
+    probed: list[object] = []
+    monkeypatch.setattr("posekit.body.loading.probe", lambda *given, **_: probed.append(given))
+    load_subject(path, untrusted=untrusted)
+    assert bool(probed) == (untrusted is not False)
+
+
 @pytest.mark.parametrize(("rigid", "reach"), [(0.0, 0.001), (0.0009, 0.001), (0.002, 0.002), (None, 0.03)])
 def test_no_fit_is_asked_to_be_nearer_than_a_millimetre(rigid: float | None, reach: float) -> None:
     assert reach_tolerance(ValidateSettings(rigid_tolerance=rigid)) == reach

@@ -1,6 +1,9 @@
 """The walking rules: each passes, fails and abstains, by postures made by hand."""
 
+import re
 from collections.abc import Iterable
+from dataclasses import astuple
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -338,3 +341,14 @@ def test_the_mirror_image_has_the_mirrored_verdicts() -> None:
         np.testing.assert_array_equal(ours.violated, theirs.violated)
         np.testing.assert_allclose(ours.value, theirs.value, rtol=0, atol=1e-9)
         assert ours.violated.any()
+
+
+def test_people_have_the_thresholds_that_are_published() -> None:
+    page = Path(__file__).parents[2] / "docs/explanation/walking-rules.md"
+    told = (
+        page.read_text(encoding="utf-8")
+        .split("`--walkers people` has thresholds", 1)[1]
+        .split("With these", 1)[0]
+    )
+    elbow, knee, girdle, *degrees = (float(number) for number in re.findall(r"\d+", told))
+    assert astuple(PEOPLE_THRESHOLDS) == (elbow / 100, knee / 100, girdle / 100, *degrees, False)

@@ -184,9 +184,9 @@ def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None, thr
         f_deviation=estimated.f_deviation,
         points_cam=head_points_cam(estimated.R, estimated.t, head),
         residuals=np.where(sighting.seen, estimated.residuals, np.nan),
-        rms=np.sqrt(estimated.cost / np.maximum(seen, 1)),
+        rms=np.sqrt(estimated.cost / seen),
         misfit=tuple(head.names[point] if point >= 0 else None for point in estimated.misfit),
-        rms_without=np.sqrt(estimated.cost_without / np.maximum(seen - 1, 1)),
+        rms_without=np.sqrt(estimated.cost_without / (seen - 1)),
     )
     if np.ndim(image) == 2:
         pose.require()
