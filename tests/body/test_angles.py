@@ -131,6 +131,28 @@ def test_an_arm_held_sideways_is_found_inside(rng: np.random.Generator, side: st
     assert_reproduced(angles, limits)
 
 
+@pytest.mark.parametrize("pole", [-1.0, 1.0])
+def test_an_arm_along_its_second_axis_is_found_inside_whatever_its_limits_are(
+    rng: np.random.Generator, pole: float
+) -> None:
+    """Also where neither zero nor an end of the first angle leaves the third inside its own limits, or the other way round."""
+    sign = limits_of("right_shoulder").sign
+    for k in range(200):
+        narrow, wide = rng.uniform(-2.5, 2.5) + np.array([0.0, 0.05]), np.sort(rng.uniform(-2.5, 2.5, 2))
+        first, third = (narrow, wide) if k % 2 else (wide, narrow)
+        limits = Limits(
+            sign=sign,
+            lower=np.array([first[0], -1.8, third[0], 0.1]),
+            upper=np.array([first[1], 1.8, third[1], 2.5]),
+        )
+        angles = limits.lower + rng.random((20, 4)) * (limits.upper - limits.lower)
+        angles[:, 1] = pole * np.pi / 2
+        upper, lower = limb(angles, sign)
+        found = limb_angles(upper.round(9), lower, limits)  # rounding would tell the first angle
+        assert limits.violation(found).max() <= NEGLIGIBLE_VIOLATION_RADIANS
+        np.testing.assert_allclose(limb(found, sign), (upper, lower), rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("side", SIDES)
 def test_noise_on_an_arm_held_sideways_does_not_put_it_outside(rng: np.random.Generator, side: str) -> None:
     # A ray tangent to a segment leaves some 1e-7 of noise in its direction: the first angle is noise then.
