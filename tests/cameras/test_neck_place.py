@@ -190,7 +190,10 @@ def test_a_given_root_is_kept_and_compared() -> None:
     np.testing.assert_array_equal(found[0].necks, root[:1])
     assert found[0].residual < 1e-8
     assert found[0].notes == ()
-    assert "outside of the depths at which the rigid parts close" in found[1].notes[0]
+    ranges = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in found[1].intervals)
+    assert found[1].notes == (
+        f"the given neck, {root[1, 2]:.4g} m away, is outside of the depths at which the rigid parts close ({ranges} m)",
+    )
     assert np.isnan(found[3].misfit).all()
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posekit.geometry import rotation_from_vector
 from posekit.linkages.robot_linkage import Carried
 from posekit.robots import Robot
 from posekit.tree import Findings
 from posekit.validators.attainable import Attainable, six_volumes
-from posekit.validators.axis_points import find_axis_points, place_axis_point
+from posekit.validators.axis_points import _axis_point, find_axis_points, place_axis_point
 from posekit.validators.robot_limits import RobotLimits
 
 # Two hinges askew and a slide, each link with three points that are not on one line.
@@ -225,3 +227,20 @@ def test_tolerances_may_differ_from_joint_to_joint() -> None:
         tolerance = np.asarray(check.tolerance)  # type: ignore[attr-defined]
         assert (tolerance >= 0.002).all() and (tolerance <= 0.001 * 12 * 400).all()
     assert asked and all(max(each) < len(NAMES) for each in asked)
+
+
+def test_a_point_on_an_axis_is_as_far_off_as_corners_that_are_off_can_put_it(
+    rng: np.random.Generator,
+) -> None:
+    """Its looseness, by moving corners: within it to first order, and not far within."""
+    for loose in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, 0.5]):
+        standing = np.array([[0.2, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.3, 0.0], [0.3, 0.1, 0.4]])
+        *corners, place = np.array(standing @ rotation_from_vector(rng.normal(size=3)))
+        found = _axis_point(SimpleNamespace(place=np.array([corners])), 0, place, (0, 1, 2), loose)
+        alpha, beta, gamma = found.numbers
+        way = rng.normal(size=(20000, 3, 3))
+        way *= 1e-6 * np.array(loose)[:, None] / np.linalg.norm(way, axis=-1, keepdims=True)
+        a, b, c = np.moveaxis(corners + way, 1, 0)
+        put = a + alpha * (b - a) + beta * (c - a) + gamma * np.cross(b - a, c - a)
+        off = np.linalg.norm(put - place, axis=1).max() / 1e-6
+        assert 0.6 * found.looseness < off < found.looseness * (1 + 1e-4)
