@@ -135,7 +135,7 @@ def test_an_arm_held_sideways_is_found_inside(rng: np.random.Generator, side: st
 def test_an_arm_along_its_second_axis_is_found_inside_whatever_its_limits_are(
     rng: np.random.Generator, pole: float
 ) -> None:
-    """Also where neither zero nor an end of the first angle leaves the third inside its own limits, or the other way round."""
+    """Also where neither zero nor an end of the first angle leaves the third inside its limits, or the other way."""
     sign = limits_of("right_shoulder").sign
     for k in range(200):
         narrow, wide = rng.uniform(-2.5, 2.5) + np.array([0.0, 0.05]), np.sort(rng.uniform(-2.5, 2.5, 2))

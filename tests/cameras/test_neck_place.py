@@ -191,9 +191,8 @@ def test_a_given_root_is_kept_and_compared() -> None:
     assert found[0].residual < 1e-8
     assert found[0].notes == ()
     ranges = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in found[1].intervals)
-    assert found[1].notes == (
-        f"the given neck, {root[1, 2]:.4g} m away, is outside of the depths at which the rigid parts close ({ranges} m)",
-    )
+    outside = f"outside of the depths at which the rigid parts close ({ranges} m)"
+    assert found[1].notes == (f"the given neck, {root[1, 2]:.4g} m away, is {outside}",)
     assert np.isnan(found[3].misfit).all()
 
 
