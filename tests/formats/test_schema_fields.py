@@ -368,7 +368,7 @@ def test_every_module_that_names_a_schema_names_one_that_is_published() -> None:
         path.stem.replace(".", "/").replace("/", ".", 1)
         for path in (Path(__file__).parent / "schemas").iterdir()
     }
-    named = {}
+    named: dict[tuple[str, str], str] = {}
     for each in pkgutil.iter_modules(own.__path__):
         module = importlib.import_module(f"posekit.formats.own.{each.name}")
         named |= {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from itertools import combinations
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -236,7 +237,8 @@ def test_a_point_on_an_axis_is_as_far_off_as_corners_that_are_off_can_put_it(
     for loose in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, 0.5]):
         standing = np.array([[0.2, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.3, 0.0], [0.3, 0.1, 0.4]])
         *corners, place = np.array(standing @ rotation_from_vector(rng.normal(size=3)))
-        found = _axis_point(SimpleNamespace(place=np.array([corners])), 0, place, (0, 1, 2), loose)
+        carried: Any = SimpleNamespace(place=np.array([corners]))
+        found = _axis_point(carried, 0, place, (0, 1, 2), loose)
         alpha, beta, gamma = found.numbers
         way = rng.normal(size=(20000, 3, 3))
         way *= 1e-6 * np.array(loose)[:, None] / np.linalg.norm(way, axis=-1, keepdims=True)
