@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from posekit.body import load_figure as load_figure
     from posekit.conversion.from_python import convert as convert
     from posekit.conversion.from_python import render as render
+    from posekit.conversion.result_output import write_result as write_result
     from posekit.errors import CameraError as CameraError
     from posekit.errors import FigureError as FigureError
     from posekit.errors import HeadError as HeadError
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from posekit.formats.own import read_result as read_result
     from posekit.formats.own import read_view as read_view
     from posekit.formats.own import write_postures as write_postures
-    from posekit.formats.own import write_result as write_result
     from posekit.formats.own import write_view as write_view
     from posekit.live import TrackedPosture as TrackedPosture
     from posekit.live import Tracker as Tracker
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "posekit.conversion.from_python": ("convert", "render"),
+    "posekit.conversion.result_output": ("write_result",),
     "posekit.formats.cameras": ("read_cameras",),
     "posekit.errors": ("CameraError", "FigureError", "HeadError", "InputError", "PosekitError"),
     "posekit.body": ("Figure", "load_figure"),
@@ -57,7 +58,6 @@ _HOMES = {
         "read_result",
         "read_view",
         "write_postures",
-        "write_result",
         "write_view",
     ),
     "posekit.formats.keypoints": ("read_keypoints",),

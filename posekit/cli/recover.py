@@ -71,7 +71,7 @@ def recover(
             help="A posekit.view/1 file, or a detector's file or folder of key points, in any format that is read.",
         ),
     ],
-    output: Annotated[Path, option("--output", "RESULT", "The result: .json, .json.gz or .npz.", short="-o")],
+    output: Annotated[Path, option("--output", "RESULT", "The result: .json, .json.gz, .npz or .parquet.", short="-o")],
     judging: Judging,
     group: Annotated[str, option("--group", "LENGTH", "Group survivors nearer than this, as 5cm.")] = "",
     tolerances: Tolerances,
@@ -224,16 +224,16 @@ def _write(
 
 
 def _written(path: Path, result: Result) -> tuple[Path, list[str]]:
-    """Write a result, as NPZ beside it where JSON could not be read again; return where, and what is to be said."""
-    from posekit.formats import own as files
+    """Write a result, as NPZ beside it where the file could not be read again; return where, and what is to be said."""
+    from posekit.conversion.result_output import write_result
 
     try:
-        files.write_result(path, result)
+        write_result(path, result)
     except TooLargeError as error:
         instead = path.with_name(path.name.removesuffix(".gz")).with_suffix(".npz")
         if instead.exists():
             raise
-        files.write_result(instead, result)
+        write_result(instead, result)
         return instead, [f"{error}; it is in {instead}"]
     return path, []
 

@@ -141,10 +141,14 @@ class GivenFile:
 
     @cached_property
     def schema(self) -> str:
-        """The schema that a JSON, NPZ or TOML file names, as ``posekit.view/1``; empty where it names none."""
+        """The schema that a JSON, NPZ, TOML or Parquet file names, as ``posekit.view/1``; empty where it names none."""
         if self.suffix == ".npz" and "schema" in self.arrays:
             with open_npz(self.path, limit=MAX_DECLARED) as archive:
                 return str(archive.array("schema", "U", ()))
+        if self.suffix == ".parquet" and self.start.startswith(b"PAR1"):
+            from posekit.formats.own.result_parquet import packed_schema
+
+            return packed_schema(self.path)
         if self.suffix == ".toml":
             return str(read_toml(self.path, limit=MAX_TOML_BYTES).get("schema", ""))
         if self.suffix == ".json":

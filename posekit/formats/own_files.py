@@ -101,7 +101,7 @@ OWN_FORMATS: Final = (
         "the survivors of a view",
         Content.RESULT,
         "posekit.formats.own.result_file:read_result",
-        _JSON_OR_NPZ,
+        (*_JSON_OR_NPZ, ".parquet"),
     ),
     _own(
         "postures",

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
-from typing import IO, Any, Final
+from typing import IO, Any, BinaryIO, Final
 
 import numpy as np
 from numpy.lib import format as npy
@@ -165,32 +165,38 @@ def open_npz(path: str | Path, *, limit: int = MAX_ARRAYS) -> Iterator[Archive]:
     InputError
         Where it is no such archive, or damaged (also while it is read), or declares more than `limit`.
     """
-    with open_file(path, limit=limit) as file:
-        try:
-            declared = directory_size(file)
-            if declared > MAX_DIRECTORY:
-                got = f"a directory of {declared / 1e6:,.0f} MB"
-                raise refusal(path, "", got, f"at most {MAX_DIRECTORY / 1e6:,.0f} MB", "split it")
-            archive = zipfile.ZipFile(file)
-        except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError, struct.error) as error:
-            raise _damaged(path, error) from None
-        except OSError as error:
-            raise unreadable(path, error) from None
-        try:
-            with archive:
-                _check_directory(path, archive, limit)
-                yield Archive(path=path, zip=archive)
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            NotImplementedError,
-            RuntimeError,
-            struct.error,
-        ) as error:
-            raise _damaged(path, error) from None
-        except OSError as error:
-            raise unreadable(path, error) from None
+    with open_file(path, limit=limit) as file, archive_in(path, file, limit=limit) as archive:
+        yield archive
+
+
+@contextmanager
+def archive_in(path: str | Path, file: BinaryIO, *, limit: int) -> Iterator[Archive]:
+    """Open an NPZ that an open file is, as `open_npz` does; errors call it by the path."""
+    try:
+        declared = directory_size(file)
+        if declared > MAX_DIRECTORY:
+            got = f"a directory of {declared / 1e6:,.0f} MB"
+            raise refusal(path, "", got, f"at most {MAX_DIRECTORY / 1e6:,.0f} MB", "split it")
+        archive = zipfile.ZipFile(file)
+    except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError, struct.error) as error:
+        raise _damaged(path, error) from None
+    except OSError as error:
+        raise unreadable(path, error) from None
+    try:
+        with archive:
+            _check_directory(path, archive, limit)
+            yield Archive(path=path, zip=archive)
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        struct.error,
+    ) as error:
+        raise _damaged(path, error) from None
+    except OSError as error:
+        raise unreadable(path, error) from None
 
 
 def read_npy(path: str | Path, kinds: str, *, limit: int = MAX_ARRAYS) -> NDArray[Any]:

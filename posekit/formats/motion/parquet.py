@@ -110,8 +110,15 @@ def write_parquet_pieces(path: str | Path, motions: Iterable[Motion], *, long: b
     write_tables(path, tables)
 
 
-def write_tables(path: str | Path, tables: Iterable[tuple[Mapping[str, Column], Mapping[str, str]]]) -> None:
-    """Write tables of the same columns one after the other, each with the file's metadata."""
+def write_tables(
+    path: str | Path,
+    tables: Iterable[tuple[Mapping[str, Column], Mapping[str, str]]],
+    told: Mapping[str, str] | None = None,
+) -> None:
+    """Write tables of the same columns one after the other, each with the schema's metadata.
+
+    What is `told` stands in the file's alone, once: pyarrow writes the schema's a second time.
+    """
     pa = extra("pyarrow", "parquet", "writing Parquet")
     pq = extra("pyarrow.parquet", "parquet", "writing Parquet")
     with replacing(path) as file:
@@ -121,12 +128,14 @@ def write_tables(path: str | Path, tables: Iterable[tuple[Mapping[str, Column], 
                 arrays = {name: _arrow(pa, name, values) for name, values in columns.items()}
                 table = pa.table(arrays).replace_schema_metadata(dict(metadata))
                 if writer is None:
-                    writer = pq.ParquetWriter(file, table.schema)
+                    writer = pq.ParquetWriter(file, table.schema, write_page_checksum=True)
                 if table.schema != writer.schema:
                     raise refusal(
                         path, "", "pieces of different columns", "the same in all", "write two files"
                     )
                 writer.write_table(table, row_group_size=ROWS_A_PIECE)
+            if writer is not None and told:
+                writer.add_key_value_metadata(told)
         except (pa.ArrowException, OverflowError) as error:
             raise refusal(
                 path, "", f"pyarrow: {cut(one_line(str(error)))}", "a table", "choose another format"

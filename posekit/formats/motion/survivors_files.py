@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -96,9 +96,14 @@ def read_survivors(path: str | Path) -> SurvivorTable:
         )
 
 
-def write_survivor_pieces(path: str | Path, tables: Iterable[SurvivorTable]) -> None:
-    """Write tables of the same columns one after the other into one Parquet file: a batch need not be held whole."""
-    write_tables(path, ((table.columns, {}) for table in tables))
+def write_survivor_pieces(
+    path: str | Path, tables: Iterable[SurvivorTable], told: Mapping[str, str] | None = None
+) -> None:
+    """Write tables of the same columns one after the other into one Parquet file: a batch need not be held whole.
+
+    What else is `told` stands in the file's metadata.
+    """
+    write_tables(path, ((table.columns, {}) for table in tables), told)
 
 
 def read_survivor_pieces(path: str | Path) -> Iterator[SurvivorTable]:

@@ -1,4 +1,4 @@
-"""Read ``posekit.result/2`` and ``/1``, write ``/2``; the suffix decides between JSON and NPZ."""
+"""Read ``posekit.result/2`` and ``/1``, write ``/2``; the suffix decides between JSON, NPZ and Parquet."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Final
 
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.result import Result
+from posekit.safe_io.extras import extra
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.regular_file import plain_suffix
 from posekit.safe_io.writing import check_target
 
-TABLE_SUFFIXES: Final = (".parquet", ".csv")
-"""Of tables of survivors, which are made of results."""
+RESULT_SUFFIXES: Final = (".json", ".npz", ".parquet")
 
 
 def read_result(path: str | Path) -> Result:
@@ -21,7 +21,7 @@ def read_result(path: str | Path) -> Result:
     Parameters
     ----------
     path : path
-        ``.json``, ``.json.gz`` or ``.npz``.
+        ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``.
 
     Returns
     -------
@@ -36,10 +36,15 @@ def read_result(path: str | Path) -> Result:
     -----
     In JSON margins and groups are written with each posture; where no frame has a survivor, none are read.
     """
-    if suffix(path, ".json", ".npz") == ".json":
+    kind = suffix(path, *RESULT_SUFFIXES)
+    if kind == ".json":
         from posekit.formats.own.result_json import read_result_json
 
         return read_result_json(path)
+    if kind == ".parquet":
+        from posekit.formats.own.result_parquet import read_result_parquet
+
+        return read_result_parquet(path)
     from posekit.formats.own.result_npz import read_result_npz
 
     return read_result_npz(path)
@@ -47,10 +52,11 @@ def read_result(path: str | Path) -> Result:
 
 def check_result_path(path: str | Path) -> None:
     """Refuse a result's name before the work that it is for is done."""
-    if plain_suffix(path) in TABLE_SUFFIXES:
-        says = "write .npz, and then: posekit convert RESULT.npz TABLE --posture all"
-        raise refusal(path, "", f'the suffix "{plain_suffix(path)}"', "a result: .json or .npz", says)
-    suffix(path, ".json", ".npz")
+    if plain_suffix(path) == ".csv":
+        says = "write .npz, and then: posekit convert RESULT.npz TABLE.csv --posture all"
+        raise refusal(path, "", 'the suffix ".csv"', f"a result: {' or '.join(RESULT_SUFFIXES)}", says)
+    if suffix(path, *RESULT_SUFFIXES) == ".parquet":
+        extra("pyarrow.parquet", "parquet", "writing Parquet")
     check_target(path)
 
 

@@ -22,7 +22,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,12 @@ _PATHS = "paths/"
 
 def write_result_npz(path: str | Path, result: Result) -> None:
     """Write a result as NPZ; see `posekit.formats.own.write_result`."""
+    with replacing(path) as file:
+        pack_result(file, result)
+
+
+def pack_result(file: BinaryIO, result: Result) -> None:
+    """Write a result as NPZ into an open file."""
     frames, unit = result.frames, result.unit
     precision = [
         None if frame.precision is None else replace(frame.precision, binary=True) for frame in frames
@@ -112,8 +118,7 @@ def write_result_npz(path: str | Path, result: Result) -> None:
     if result.paths is not None:
         arrays |= {_PATHS + name: values for name, values in result.paths.in_unit(unit).items()}
         arrays[_PATHS + "told"] = np.array(json.dumps(result.paths.told(unit), allow_nan=False))
-    with replacing(path) as file:
-        write_npz(file, arrays, level=COMPACT_LEVEL if any(precision) else COMPRESSION_LEVEL)
+    write_npz(file, arrays, level=COMPACT_LEVEL if any(precision) else COMPRESSION_LEVEL)
 
 
 def read_result_npz(path: str | Path) -> Result:
