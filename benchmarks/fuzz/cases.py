@@ -224,8 +224,9 @@ def write_seeds(folder: Path, run: Callable[[list[str]], int]) -> dict[str, list
     seeds["postures"] = [folder / "postures.json", folder / "person" / "configurations.npz"]
     write_view_table(folder / "table.parquet", read_view(folder / "walk.json"))
     seeds["view table"] = [folder / "table.parquet"]
-    run(["recover", str(folder / "walk.json"), "-o", str(folder / "result.json.gz")])
-    seeds["result"].append(folder / "result.json.gz")
+    for ending in ("json.gz", "parquet"):
+        run(["recover", str(folder / "walk.json"), "-o", str(folder / f"result.{ending}")])
+        seeds["result"].append(folder / f"result.{ending}")
     gripper = ["recover", str(folder / "gripper.json"), "-o", str(folder / "object.json")]
     run([*gripper, "--linkage", "panda", "--scale", "closure"])
     seeds["object"] = [folder / "object.json"]

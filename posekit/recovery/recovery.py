@@ -470,12 +470,12 @@ class Recovery(Pictured):
         Parameters
         ----------
         path : path
-            ``.json`` or ``.npz``.
+            ``.json``, ``.json.gz`` or ``.npz``; ``.parquet`` is written by `posekit.write_result`.
 
         Raises
         ------
         InputError
-            Where the name is neither, or the file cannot be written.
+            Where the name is none of these, or the file cannot be written.
         """
         from posekit.formats.own import write_result
         from posekit.recovery.result import result_of

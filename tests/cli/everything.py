@@ -67,7 +67,7 @@ def make_results(folder: Path, command: Command) -> dict[str, Path]:
     stature = ("--stature", "175cm")
     recover("walk.json", "-o", folder / "exact.json")
     recover("walk.json", "-o", folder / "explained.npz", "--explain")
-    recover("noisy.json", "-o", folder / "noisy.npz")
+    recover("noisy.json", "-o", folder / "noisy.parquet")
     recover("noisy.json", "-o", folder / "followed.json", "--follow", 2)
     recover(hidden, "-o", folder / "completed.json")
     recover(hidden, "-o", folder / "partial.npz", "--no-infer")
@@ -75,19 +75,19 @@ def make_results(folder: Path, command: Command) -> dict[str, Path]:
     recover("samples/photo.json", "-o", folder / "photo.json")
     recover("person", "-o", folder / "taylor.json", *stature, "--proportions", "taylor", "--size", "1280x720")
     calibration = ("--camera", samples / "calibration.toml", "--person", "all")
-    recover("people", "-o", folder / "people.json", *stature, *calibration)
+    recover("people", "-o", folder / "people.parquet", *stature, *calibration)
     recover("samples/gripper.json", "-o", folder / "gripper.json", "--linkage", "panda", "--scale", "closure")
     return {
         "exact, JSON": folder / "exact.json",
         "exact, NPZ, `--explain`": folder / "explained.npz",
-        "noisy": folder / "noisy.npz",
+        "noisy, Parquet": folder / "noisy.parquet",
         "followed, `--follow`": folder / "followed.json",
         "joints hidden, completed": folder / "completed.json",
         "joints hidden, `--no-infer`": folder / "partial.npz",
         "a frame without a posture": folder / "broken_r.json",
         "a photograph, no camera": folder / "photo.json",
         "`--proportions taylor`": folder / "taylor.json",
-        "one of several people": folder / "people.person0.json",
+        "one of several people, Parquet": folder / "people.person0.parquet",
         "an object, `--linkage`": folder / "gripper.json",
     }
 

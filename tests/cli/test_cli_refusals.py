@@ -233,11 +233,8 @@ def test_a_nesting_bomb_is_refused_by_validate_too(run, write, files_here, asser
     [
         ("nowhere/r.json", ("nowhere/r.json: got a directory that does not exist",)),
         ("folder.json", ("folder.json: got a directory", "the name of a file")),
-        ("r.txt", ('r.txt: got the suffix ".txt"', ".json or .npz")),
-        (
-            "r.parquet",
-            ('r.parquet: got the suffix ".parquet"', "posekit convert RESULT.npz TABLE --posture all"),
-        ),
+        ("r.txt", ('r.txt: got the suffix ".txt"', ".json or .npz or .parquet")),
+        ("r.csv", ('r.csv: got the suffix ".csv"', "posekit convert RESULT.npz TABLE.csv --posture all")),
         ("/proc/r.json", ("/proc/r.json", "can be written")),
         ("/dev/null", ("/dev/null",)),
     ],
