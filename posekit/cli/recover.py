@@ -71,7 +71,9 @@ def recover(
             help="A posekit.view/1 file, or a detector's file or folder of key points, in any format that is read.",
         ),
     ],
-    output: Annotated[Path, option("--output", "RESULT", "The result: .json, .json.gz, .npz or .parquet.", short="-o")],
+    output: Annotated[
+        Path, option("--output", "RESULT", "The result: .json, .json.gz, .npz or .parquet.", short="-o")
+    ],
     judging: Judging,
     group: Annotated[str, option("--group", "LENGTH", "Group survivors nearer than this, as 5cm.")] = "",
     tolerances: Tolerances,

@@ -38,7 +38,9 @@ def results() -> dict[str, Result]:
     image = view.image.copy()
     image[1, 8:] = image[1, :1]
     photograph = View(
-        camera=ScaledOrthographicModel(scale=None), time=view.time[:2], image=200 * scene.joints_cam[:2, :, :2]
+        camera=ScaledOrthographicModel(scale=None),
+        time=view.time[:2],
+        image=200 * scene.joints_cam[:2, :, :2],
     )
     exact, lost, refined, scaled = (
         posekit.recover(one) for one in (view, replace(view, image=image), noisy, photograph)

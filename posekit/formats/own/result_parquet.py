@@ -1,7 +1,7 @@
 """A result as Parquet: its survivors as a table, a row a body, with the whole result packed in the file's metadata.
 
-Under the key ``posekit.result/2`` stand the bytes of the result's NPZ in base64, since what metadata holds is text. They
-are what is read as a result; the table is for pandas and its like, and is not looked at.
+Under the key ``posekit.result/2`` stand the bytes of the result's NPZ in base64, since metadata is text. They are what
+is read as a result; the table is for pandas and its like, and is not looked at.
 """
 
 from __future__ import annotations
