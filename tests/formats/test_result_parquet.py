@@ -19,6 +19,7 @@ import posekit
 from posekit.body import load_figure
 from posekit.conversion import result_output
 from posekit.errors import InputError, TooLargeError
+from posekit.formats.motion.survivors_files import read_survivors
 from posekit.formats.own import Result, ScaledOrthographicModel, View, read_result, result_parquet
 from posekit.formats.own.result import RESULT_SCHEMA
 from posekit.formats.own.result_npz import pack_result
@@ -94,6 +95,18 @@ def test_what_is_packed_counts_and_not_the_table(results: dict[str, Result], tmp
         path, results["exact"], result_output.table_of(results["uncalibrated"])
     )
     assert packed(posekit.open(path)) == packed(results["exact"])
+
+
+def test_every_changed_byte_of_a_column_is_noticed(results: dict[str, Result], tmp_path: Path) -> None:
+    path = tmp_path / "r.parquet"
+    posekit.write_result(path, results["exact"])
+    data = path.read_bytes()
+    column = pq.read_metadata(path).row_group(0).column(3)
+    end = (column.dictionary_page_offset or column.data_page_offset) + column.total_compressed_size
+    for place in range(end - 20, end):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+        with pytest.raises(InputError, match="CRC"):
+            read_survivors(path)
 
 
 def told(path: Path, value: bytes) -> Path:
