@@ -227,6 +227,16 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     return Recovered(frames=frames, evidence=evidence)
 
 
+def survivors_of(frames: list[SurvivorFrame], path: np.ndarray) -> np.ndarray:
+    """Return the joints (T, 14, 3) of the survivors along a path; NaN where it is bridged."""
+    return np.stack(
+        [
+            frame.joints[chosen] if chosen >= 0 else np.full((len(JOINTS), 3), np.nan)
+            for frame, chosen in zip(frames, path.tolist(), strict=True)
+        ]
+    )
+
+
 class Priors:
     """Priors on postures that were fitted to what is not judged by them; the built-in one where there is no capture."""
 
@@ -249,5 +259,7 @@ class Priors:
             ]
             weight = np.concatenate([np.full(len(part), 1 / len(part)) for part in rows])
             fitted = fit_prior(np.concatenate(rows), self.capture.up, weight)
-            self.known[key] = replace(fitted, weights=load_prior().weights)
+            self.known[key] = replace(
+                load_prior(), blocks=fitted.blocks, balance=fitted.balance, contact=fitted.contact
+            )
         return self.known[key]

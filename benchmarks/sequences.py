@@ -33,6 +33,7 @@ from sequence_views import (  # type: ignore[import-not-found]  # the script bes
     exact,
     noisy,
     scenes,
+    survivors_of,
     view_of,
     walker_scene,
 )
@@ -112,16 +113,6 @@ def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict
         "rate": len(frames) / seconds,
         "live rate": len(frames) / live_seconds,
     }
-
-
-def survivors_of(frames: list[SurvivorFrame], path: np.ndarray) -> np.ndarray:
-    """Return the joints (T, 14, 3) of the survivors along a path; NaN where it is bridged."""
-    return np.stack(
-        [
-            frame.joints[chosen] if chosen >= 0 else np.full((len(JOINTS), 3), np.nan)
-            for frame, chosen in zip(frames, path.tolist(), strict=True)
-        ]
-    )
 
 
 def follow(frames: list[SurvivorFrame], lag: int, beam: Beam | None = None) -> Iterator[LiveEstimate]:

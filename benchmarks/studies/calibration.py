@@ -1,6 +1,6 @@
 """Whether probabilities come true of people that nothing was fitted to, and the weights under which they do.
 
-    python -m benchmarks.studies.calibration CAPTURE.npz PYBULLET.whl [--views 1000] [--fit PRIOR.toml]
+    python -m benchmarks.studies.calibration CAPTURE.npz PYBULLET.whl [--views 1000] [--fit PRIOR.toml] [--paths]
 
 Files are motion as `benchmarks/people.py` reads it, one a source. Of each source as many frames are drawn evenly over
 its clips, each seen by a camera of its own as in `benchmarks/answers.py` (2 px, neck given), by `anatomical` ranges, in
@@ -10,7 +10,9 @@ size and each of them, drawn anew every five frames, of which that is said.
 Clips are held out in six groups: some clips, some actions (of both sources), or a whole source. What is held out is
 ranked by a prior that was fitted to the others, with weights that were fitted to the others too, each of them ranked by
 a prior that knew neither its own group nor the one that is held out. Tables are those of `benchmarks/answers.py`, and
-of how far from what is stated a perfect ranking would come.
+of how far from what is stated a perfect ranking would come. ``--paths`` asks
+instead how often the first of two paths is the nearer one where they differ: two seconds of every clip from four sides,
+ranked by a prior that does not know the clip.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -28,11 +31,13 @@ from numpy.typing import NDArray
 
 from benchmarks.answers import HEAD, Frame, HalfHeld, measured, row
 from benchmarks.people import people
+from benchmarks.sequence_views import clip_scene, noisy, survivors_of
 from benchmarks.studies.people_prior import action_of, prior_of_people
 from benchmarks.studies.weight_fitting import fit_weights
 from posekit.answers import ListedBodies
 from posekit.answers.answer import answers_of
 from posekit.evaluate.scores import reliability
+from posekit.following import best_paths
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import View
 from posekit.geometry import Array
@@ -51,6 +56,8 @@ PERSON_FRAMES, GROUPS = 5, 6
 """Frames of one draw of lengths, and groups of what is held out."""
 PER_FRAME: Final = ("time", "image", "root", "head_image", "truth", "confidence")
 PERFECT_DRAWS: Final = 50
+SIDES_DEGREES, APART_METRES = (10, 100, 190, 280), 0.25
+STATED_EDGES: Final = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
 
 Held = tuple[NDArray[np.intp], ...]
 """The group of each clip, a source each."""
@@ -207,6 +214,38 @@ def table(name: str, frames: Sequence[tuple[Seen, Frame]]) -> list[str]:
     return [*row(name, told), f"{stated:.2f}", f"{true:.2f}", f"{chance:.3f}"]
 
 
+def paths_table(captures: Sequence[Capture]) -> list[str]:
+    """Return how often the first of two paths that are 25 cm apart somewhere is the nearer one, by what is stated."""
+    stated, true = [], []
+    for source, capture in enumerate(captures):
+        for clip, name in enumerate(capture.names):
+            kept = [np.ones(len(one.names), dtype=bool) for one in captures]
+            kept[source][clip] = False
+            prior = prior_of_people(captures, kept)
+            for yaw in SIDES_DEGREES:
+                scene = clip_scene(capture, name, yaw)
+                rng = np.random.default_rng(1000 * source + 10 * clip + yaw)
+                frames = noisy(scene.with_noise(NOISE_PIXELS, rng), NOISE_PIXELS, real=True).ranked(prior)
+                paths = best_paths(frames, k=2, apart=APART_METRES)
+                if len(paths) == 2:
+                    one, other = (survivors_of(frames, path) for path in paths.survivor)
+                    differ = np.linalg.norm(one - other, axis=-1).max(axis=1) > APART_METRES
+                    off = [
+                        np.linalg.norm(each - scene.joints_cam, axis=-1)[differ].mean()
+                        for each in (one, other)
+                    ]
+                    stated.append(1 / (1 + np.exp(paths.cost[0] - paths.cost[1])))
+                    true.append(off[0] < off[1])
+    said, came = np.array(stated), np.array(true)
+    rows = []
+    for low, high in pairwise(STATED_EDGES):
+        within = (said >= low) & (said < high)
+        if within.any():
+            shares = f"{said[within].mean():.2f}", f"{came[within].mean():.2f}"
+            rows.append([f"{low:g} to {min(high, 1):g}", str(int(within.sum())), *shares])
+    return table_lines(["stated", "pairs", "mean", "nearer"], rows)
+
+
 def fit(captures: Sequence[Capture], frames: Sequence[Seen], path: Path) -> None:
     """Write the built-in prior with weights that are fitted to frames whose action the prior did not know."""
     held = groups(captures, "action")
@@ -229,12 +268,16 @@ def main() -> None:
     parser.add_argument("sources", type=Path, nargs="*")
     parser.add_argument("--views", type=int, default=1000)
     parser.add_argument("--fit", type=Path)
+    parser.add_argument("--paths", action="store_true")
     given = parser.parse_args()
     if len(given.sources) < 2:
         print("no motion given: python -m benchmarks.studies.calibration FILE FILE [--fit PRIOR.toml]")
         return
     warnings.simplefilter("ignore", UserWarning)
     captures = [people(path) for path in given.sources]
+    if given.paths:
+        print("\n".join(paths_table(captures)))
+        return
     frames = [one for lengths in LENGTHS for one in seen(captures, given.views, lengths)]
     if given.fit is not None:
         fit(captures, frames, given.fit)
