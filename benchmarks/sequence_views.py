@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.studies.prior_fitting import fit_prior
+from benchmarks.studies.people_prior import action_of, prior_of_people
 from posekit.body import Figure
 from posekit.errors import PosekitError
 from posekit.following import SurvivorFrame
@@ -238,28 +238,29 @@ def survivors_of(frames: list[SurvivorFrame], path: np.ndarray) -> np.ndarray:
 
 
 class Priors:
-    """Priors on postures that were fitted to what is not judged by them; the built-in one where there is no capture."""
+    """Priors on postures that were fitted to what is not judged by them; the built-in one where there is no capture.
 
-    def __init__(self, capture: Capture | None) -> None:
-        self.capture = capture
+    Parameters
+    ----------
+    capture : Capture or None
+        What is judged.
+    beside : sequence of Capture
+        Other sources that priors know too, but for the action that is held out.
+    """
+
+    def __init__(self, capture: Capture | None, beside: Sequence[Capture] = ()) -> None:
+        self.capture, self.beside = capture, beside
         self.known: dict[tuple[str, str], Prior] = {}
 
     def without(self, kind: str, name: str) -> Prior:
         """Fit a prior without a clip, or without all clips of its action."""
         if self.capture is None or name not in self.capture.names:
             return load_prior()
-        action = self.capture.actions[self.capture.clip_index(name)]
+        action = action_of(self.capture.actions[self.capture.clip_index(name)])
         key = (kind, action if kind == "action" else name)
         if key not in self.known:
-            clips = zip(self.capture.names, self.capture.actions, strict=True)
-            rows = [
-                self.capture.points[self.capture.frames_of(k, complete=True)][1:, :14]
-                for k, (clip, label) in enumerate(clips)
-                if key[1] not in (clip, label)
-            ]
-            weight = np.concatenate([np.full(len(part), 1 / len(part)) for part in rows])
-            fitted = fit_prior(np.concatenate(rows), self.capture.up, weight)
-            self.known[key] = replace(
-                load_prior(), blocks=fitted.blocks, balance=fitted.balance, contact=fitted.contact
-            )
+            every = [self.capture, *self.beside]
+            labels = [list(zip(one.names, map(action_of, one.actions), strict=True)) for one in every]
+            known = [np.array([key[1] not in label for label in part]) for part in labels]
+            self.known[key] = prior_of_people(every, known)
         return self.known[key]

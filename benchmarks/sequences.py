@@ -1,13 +1,14 @@
 """Sequences: how far the cheapest path is from the truth, from all sides, how sure it is, and how fast it is found.
 
-    OMP_NUM_THREADS=1 python benchmarks/sequences.py [CAPTURE.npz] [--yaws 8] [--only accuracy,sure,speed,scale,depth]
+    python benchmarks/sequences.py [CAPTURE.npz] [--beside FILE] [--yaws 8] [--only accuracy,sure,speed,scale,depth]
 
 A synthetic walker from six sides, and real motion capture (an NPZ as `posekit synth mocap` reads it): the first two
 seconds of every clip of walking and running seen from `--yaws` sides, and of six clips of other actions from two; a
 standing camera 1.4 m high, f = 1500 px, so far away that the whole way is in the picture; 30 frames a second; the neck
 is given. Exact points, recovered as `posekit recover` does; and 2 px of noise, recovered on trunks that the noise
 allows, refined and merged. Survivors cost nothing, or minus the log of their probability by a prior that was fitted to
-the other actions, or to the other clips, with a camera that is taken to be level.
+the other actions, or to the other clips, and to other sources' other actions (``--beside``, as `benchmarks/people.py`
+reads them), with a camera that is taken to be level.
 
 A limb-frame is right where both segments of an arm or a leg are on their true side, near or far; `told apart` leaves
 out segments within 15 degrees of the plane across their ray, whose sides 2 px do not tell apart. Prints Markdown.
@@ -38,6 +39,7 @@ from sequence_views import (  # type: ignore[import-not-found]  # the script bes
     walker_scene,
 )
 
+from benchmarks.people import people
 from posekit.cameras.neck import place
 from posekit.following import (
     Beam,
@@ -146,8 +148,7 @@ TABLE_HEAD = (
 )
 
 
-def accuracy(capture: Capture | None, yaws: int, seed: int) -> None:
-    priors = Priors(capture)
+def accuracy(capture: Capture | None, priors: Priors, yaws: int, seed: int) -> None:
     table, sides, far = [], [], []
     for pixels, near in ((0.0, 10.0), (2.0, 35.0)):
         found: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
@@ -207,9 +208,8 @@ def accuracy(capture: Capture | None, yaws: int, seed: int) -> None:
     )
 
 
-def sure(capture: Capture | None, seed: int) -> None:
+def sure(capture: Capture | None, priors: Priors, seed: int) -> None:
     """Compare the odds between the two cheapest paths with which of them was nearer, where they differ."""
-    priors = Priors(capture)
     stated, true = [], []
     for number, (_, clip, _, scene) in enumerate(scenes(capture, 4)):
         found = noisy(scene.with_noise(2.0, np.random.default_rng(seed + number)), 2.0, real=bool(clip))
@@ -307,7 +307,7 @@ def speed(capture: Capture | None) -> None:
     )
 
 
-def scale(capture: Capture | None, seed: int) -> None:
+def scale(capture: Capture | None, priors: Priors, seed: int) -> None:
     rows = []
     for pixels in (1.0, 2.0, 5.0):
         for name, chosen in (
@@ -369,8 +369,7 @@ def of_clips(
     ]
 
 
-def depth(capture: Capture | None) -> None:
-    priors = Priors(capture)
+def depth(capture: Capture | None, priors: Priors) -> None:
     chosen = [("synthetic walking", walker_scene(yaw, 40)) for yaw in range(15, 360, 60)]
     chosen += [("walking", scene) for scene in of_clips(capture, ("walking",), (40, 130, 220, 310))]
     found: dict[tuple[str, str], list[list[float]]] = defaultdict(list)
@@ -420,23 +419,25 @@ def show(title: str, head: list[str], rows: list[list[str]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("capture", type=Path, nargs="?")
+    parser.add_argument("--beside", type=Path, nargs="*", default=[], help="motion that priors know too")
     parser.add_argument("--yaws", type=int, default=8)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="accuracy,sure,speed,scale,depth")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     capture = None if given.capture is None else read_capture(given.capture)
+    priors = Priors(capture, [people(path) for path in given.beside])
     parts = given.only.split(",")
     if "accuracy" in parts:
-        accuracy(capture, given.yaws, given.seed)
+        accuracy(capture, priors, given.yaws, given.seed)
     if "sure" in parts:
-        sure(capture, given.seed)
+        sure(capture, priors, given.seed)
     if "speed" in parts:
         speed(capture)
     if "scale" in parts:
-        scale(capture, given.seed)
+        scale(capture, priors, given.seed)
     if "depth" in parts:
-        depth(capture)
+        depth(capture, priors)
 
 
 if __name__ == "__main__":
