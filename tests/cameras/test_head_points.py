@@ -75,3 +75,19 @@ def test_the_misfit_is_left_out_as_if_it_were_not_seen(rng):
     assert pose.rms == pytest.approx(np.sqrt((pose.residuals**2).mean()))
     assert pose.rms_without == pytest.approx(left.rms, rel=1e-4)
     assert left.rms == pytest.approx(np.sqrt(np.nanmean(left.residuals**2)))
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.99, True), (1.01, False)])
+@pytest.mark.parametrize("count", [6, 12])
+def test_points_are_one_nearer_than_a_thousandth_of_the_heads_size(rng, share, refused, count):
+    """Its size is the standard deviation along its longest axis."""
+    points = rng.normal(0.0, 0.1, (count, 3))
+    for _ in range(20):
+        size = np.sqrt(np.linalg.eigvalsh(np.cov(points.T, bias=True)).max())
+        points[1] = points[0] + share * 1e-3 * size * np.array([0.6, 0.0, 0.8])
+    names = tuple(f"p{k}" for k in range(count))
+    if not refused:
+        assert HeadPoints(names=names, points=points).names == names
+        return
+    with pytest.raises(HeadError, match="head points p0 and p1 coincide"):
+        HeadPoints(names=names, points=points)

@@ -14,10 +14,13 @@ from posekit.body import load_figure
 from posekit.formats.own import ResultFrame, schema, write_result
 from posekit.formats.own.column import column, columns_in
 from posekit.formats.own.digits import Precision
+from posekit.formats.own.frame_answer import FrameAnswer
+from posekit.formats.own.inferred import Inferred
 from posekit.formats.own.npz import write_npz
+from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
-from posekit.formats.own.survivor_models import model_of
+from posekit.formats.own.survivor_models import model_of, table_model_of
 from posekit.formats.own.survivor_npz import survivor_arrays, survivors_in
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
@@ -27,6 +30,7 @@ from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
 NQ, COUNT = 5, 3
+TABLES = (SurvivorColumns, Likelihoods, FrameAnswer, Inferred, PostureSet)
 EXTENTS = {"q": NQ, "margins": ["collision"]}
 
 
@@ -140,3 +144,19 @@ def test_a_covariance_in_a_file_stays_one(precision: Precision | None, unit: Uni
     again = covariance.in_file(read, unit, precision)
     np.testing.assert_array_equal(again, covariance.in_file(known, unit, precision))
     assert not covariance.in_file(0.0 * known, unit, precision).any()
+
+
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("table", [WiderColumns, *TABLES], ids=lambda table: table.__name__)
+def test_a_field_says_what_its_column_means_and_only_details_may_be_left_out(table: Any, whole: bool) -> None:
+    model = model_of.__wrapped__(table, whole=whole)
+    assert (model.__name__, model.__doc__) == table.schema_title
+    for each in columns_in(table).values():
+        field = model.model_fields[each.key]
+        assert field.description == each.meaning
+        assert field.is_required() != (each.optional or (each.detail and not whole))
+        assert field.is_required() or field.default is None
+    whole_table = table_model_of.__wrapped__(table)
+    assert {key: field.description for key, field in whole_table.model_fields.items()} == {
+        each.key: each.meaning for each in columns_in(table).values()
+    }

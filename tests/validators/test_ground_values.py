@@ -480,3 +480,15 @@ def test_feet_without_toes_touch_by_their_ankles() -> None:
     assert (found == float(abs(ankle) <= 0.025)).all()
     high = moved(bare, np.repeat((0.1 * UP)[None], 60, axis=0))
     assert not ContactShare().judge(high).value.any()
+
+
+def test_levels_of_the_ground_are_percentiles_of_what_rests_or_of_all_where_little_does() -> None:
+    rising = moved(standing(), np.linspace(0.0, 0.03, 60)[:, None] * UP)
+    flying = moved(standing(), np.arange(60)[:, None] * np.array([0.05, 0.0, 0.015]))
+    for one, most in ((rising, 98), (flying, 50)):
+        found = ground_of(one)
+        heights = found.lowest + found.low
+        held = heights[found.resting] if most == 98 else heights
+        assert found.resting.any() == (most == 98)
+        assert found.low == pytest.approx(np.percentile(held, 5))
+        assert found.low + found.high == pytest.approx(np.percentile(held, most))

@@ -190,3 +190,10 @@ def test_each_robot_judges_with_the_noise_of_its_own_person() -> None:
         assert found.settings == own
         assert validator._robot_for(people[2]) is kept[2]
     assert kept[0].settings != kept[1].settings
+
+
+def test_reports_say_noise_to_a_micrometre() -> None:
+    validator = Validator("human")
+    person = measured_person(standing(40, 0.004))
+    said = validator.told_of(person)["noise"]
+    assert said == float(f"{person.noise:.6f}") != person.noise

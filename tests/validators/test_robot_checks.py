@@ -206,6 +206,10 @@ def test_capsules_lie_on_the_segments_at_neutral(name: str) -> None:
         assert np.linalg.norm(off - (off @ along) * along) < 1e-9
         assert 2 * capsule.halfLength < length
     assert not pin.computeCollisions(model, data, geometry, geometry.createData(), pin.neutral(model), True)
+    checked = {frozenset(FIGURE.capsules[k].link for k in pair) for pair in FIGURE.collision_pairs}
+    names = [re.sub(r"_\d+$", "", body.name) for body in geometry.geometryObjects]
+    pairs = [frozenset((names[pair.first], names[pair.second])) for pair in geometry.collisionPairs]
+    assert set(pairs) <= checked and len(pairs) > len(checked) / 2
 
 
 def test_capsules_move_with_their_segments() -> None:

@@ -72,6 +72,20 @@ def test_an_arm_is_judged_without_a_joint_map() -> None:
         validator.check(STANDING)
 
 
+def test_a_joint_map_that_is_given_must_fit_even_where_none_is_needed() -> None:
+    panda = load_robot("panda", free_flyer=False, geometry=False)
+    assert Validator(panda, checks=("joint-range",)).kinematics is None
+    with pytest.raises(InputError, match="human"):
+        _ = Validator(panda, checks=("joint-range",), joint_map="human").kinematics
+
+
+def test_a_report_says_which_bodies_were_taken() -> None:
+    told = {"urdf": "the URDF's collision bodies", "capsules": "made up: capsules along the segments"}
+    for bodies, words in {**told, "visual": "the URDF's visual bodies"}.items():
+        robot = load_robot("talos", visuals=bodies == "visual")
+        assert Validator(robot, checks=("collision",), bodies=bodies).describe()["bodies"].startswith(words)
+
+
 def test_quaternions_that_are_nearly_of_unit_length_are_normalised_with_a_warning() -> None:
     q = NEUTRAL.copy()
     q[0, 6] = 1.001
