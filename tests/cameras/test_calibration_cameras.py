@@ -172,6 +172,7 @@ def test_an_angle_of_view_spans_its_extent(axis: str, extent: float) -> None:
     assert 2 * math.degrees(math.atan(extent / 2 / one.K[0, 0])) == pytest.approx(70.0)
     assert one.K[0, 2] == 319.5 and one.K[1, 2] == 239.5
     assert one.guessed and "guess" in one.how
+    assert one.name == "camera"
 
 
 def test_a_focal_length_on_film_gives_the_films_angles() -> None:

@@ -8,15 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from posekit.geometry import Array
 from posekit.skeleton import FEET_POINTS, SIDES
 from posekit.validators.motion import MotionClip
 from posekit.validators.motion.displaced_body import displaced_by
+from posekit.validators.motion.duplicates import MOVED_METRES, SAME_METRES, duplicates
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.jumps import jumps_of
+from posekit.validators.motion.lifted import steps_of
 from posekit.validators.motion.order import _length, _shortest, _with_moves
 from posekit.validators.motion.sides import _continuity
 from posekit.validators.motion.sliding import FOOT_POINTS
+from posekit.validators.motion.speed import _over_gaps
 from tests.validators.test_ground_laws import moved, standing
 from tests.validators.test_motion_laws import WALK, jumped, named, swapped, with_joints
 
@@ -98,3 +102,41 @@ def test_what_a_body_does_as_a_whole_says_nothing_of_its_sides(rng: np.random.Ge
     np.testing.assert_allclose(_continuity(still + along, across), expected, atol=1e-9)
     turned_over = np.abs(expected).max(axis=1) > 0.1
     assert turned_over[9] and (expected[9] > 0).any()
+
+
+def along_x(*places: float) -> Array:
+    joints = np.zeros((len(places), 14, 3))
+    joints[:, 3, 0] = places
+    return joints
+
+
+def test_bounds_of_a_repeated_frame_are_outside_of_it() -> None:
+    """A way of just so much is no repetition, and no motion beside one."""
+    for way, moved_metres, again in (
+        (SAME_METRES, 0.01, False),
+        (np.nextafter(SAME_METRES, 0), 0.01, True),
+        (0.0, MOVED_METRES, False),
+        (0.0, np.nextafter(MOVED_METRES, 1), True),
+    ):
+        found = duplicates(along_x(-moved_metres, 0.0, way, moved_metres + way))
+        assert found.tolist() == ([0, 0, 1, 0] if again else [0] * 4)
+
+
+def test_points_that_stay_do_not_step_with_the_others() -> None:
+    for still in range(4):
+        height = np.zeros((12, 11))
+        height[6:, still:] = 0.1
+        assert steps_of(height).max() == pytest.approx(0.1 if still < 2 else 0.0)
+        assert steps_of(-height).min() == pytest.approx(-0.1 if still < 2 else 0.0)
+
+
+def test_a_way_over_a_gap_is_divided_by_its_slots() -> None:
+    for known in itertools.product((False, True), repeat=6):
+        places = np.arange(6.0) ** 2
+        joints = np.where(np.array(known)[:, None, None], along_x(*places), np.nan)
+        expected = np.full((6, 14), np.nan)
+        for start, end in itertools.pairwise(np.flatnonzero(known)):
+            if end > start + 1:
+                expected[end] = 0.0
+                expected[end, 3] = (places[end] - places[start]) / (end - start)
+        np.testing.assert_allclose(_over_gaps(joints), expected)

@@ -58,6 +58,8 @@ def test_a_file_names_some_of_the_figures_angles(tmp_path: Path) -> None:
     assert table.kind == "configuration"
     assert table.name.endswith("mine.toml")
     assert (table.shortest_projection, table.knee_flexed) == (0.1, 5.0)
+    made = Ranges(name="mine", kind="projected")
+    assert (made.shortest_projection, made.knee_flexed, made.limits, made.anatomy) == (0.1, 5.0, {}, None)
 
 
 def test_a_file_may_name_all_of_them_or_none(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from posekit.settings import RigidTolerance
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Findings
 from posekit.validators import Validator, load_ranges, make_checks, rigid_parts
-from posekit.validators.rigid_parts import Mode
+from posekit.validators.rigid_parts import TORSO_POINTS, Mode, TorsoSide
 
 FIGURE = load_figure()
 NAMES = tuple(segment_name(segment) for segment in RIGID_SEGMENTS)
@@ -119,6 +119,14 @@ def test_the_side_tells_a_mirror_image_within_any_tolerance_that_is_less_than_it
 def test_a_side_that_the_tolerance_covers_is_undecided() -> None:
     for sign in (1, -1):
         assert side(FIGURE, postures(5) * [sign, 1, 1], tolerance=2 * OFFSET + 1e-9).undecided.all()
+
+
+def test_a_mirror_image_is_told_apart_by_more_than_the_tolerance() -> None:
+    points = postures(3)[:, list(TORSO_POINTS)]
+    for tolerance, told in ((0.02, False), (np.nextafter(0.02, 0), True)):
+        check = TorsoSide(offset=0.01, tolerance=tolerance)
+        assert check.judge(points).undecided.all() != told
+        assert np.isinf(check.rule.numbers[1]) != told
 
 
 @pytest.mark.parametrize("mode", ["side", "placement"])
