@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from itertools import chain, islice, zip_longest
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,7 +31,7 @@ def drawn(files: list[str], seed: int) -> Iterator[Mutant]:
     return (one for one in chain.from_iterable(zip_longest(*piles)) if one is not None)
 
 
-def table(outcomes: list[dict[str, str]], explained: dict[str, str]) -> Iterator[str]:
+def table(outcomes: list[dict[str, Any]], explained: dict[str, str]) -> Iterator[str]:
     """Yield the table of rooms: drawn, found, left, and of these which change nothing that can be seen."""
     yield "| room | files | faults | found | share | explained |"
     yield "|---|---|---|---|---|---|"
@@ -43,9 +44,10 @@ def table(outcomes: list[dict[str, str]], explained: dict[str, str]) -> Iterator
         yield f"| {room} | {len(files)} | {len(own)} | {found} | {found / max(len(own), 1):.1%} | {known} |"
 
 
-def name_of(outcome: dict[str, str]) -> str:
-    """Return a fault's name as explanations have it: by its text, as places move."""
-    return f"{outcome['file']}: {outcome['before']} -> {outcome['after']}"
+def name_of(outcome: Mapping[str, Any]) -> str:
+    """Return a fault's name as explanations have it: by its text and that of its line, as places move."""
+    line = (ROOT / outcome["file"]).read_text(encoding="utf-8").splitlines()[outcome["line"] - 1].strip()
+    return f"{outcome['file']}: {line}: {outcome['before']} -> {outcome['after']}"
 
 
 def main() -> None:
@@ -70,7 +72,7 @@ def main() -> None:
         map_lines(maps / f"more_{len(list(maps.iterdir()))}.json", files, given.map)
         return
     explained = json.loads((Path(__file__).parent / "explained.json").read_text(encoding="utf-8"))
-    before: list[dict[str, str]] = []
+    before: list[dict[str, Any]] = []
     if results.exists():
         before = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
     last = {each["name"]: "explained" if name_of(each) in explained else each["outcome"] for each in before}

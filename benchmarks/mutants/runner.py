@@ -204,7 +204,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _waited(child: int, reading: int, tests: list[str], patience: float) -> str | None:
-    """Wait for a fork, and end it when its time is over."""
+    """Wait for a fork, and end it when its time is over by the clock, which says nothing: the machine may be busy."""
     ends = time.monotonic() + BUSY_MACHINE * patience
     status = None
     while status is None and time.monotonic() < ends:
@@ -220,7 +220,7 @@ def _waited(child: int, reading: int, tests: list[str], patience: float) -> str 
             with contextlib.suppress(ProcessLookupError):
                 os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-            return None
+            return ""
         os.set_blocking(pipe.fileno(), False)
         said = (pipe.read() or b"").decode()
     if os.WIFSIGNALED(status):

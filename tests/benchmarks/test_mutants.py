@@ -1,6 +1,7 @@
 """The runner of faults: faults are faults, draws are even, and a fault is found by a test that runs it."""
 
 import ast
+import json
 import subprocess
 import sys
 
@@ -36,6 +37,17 @@ def test_every_beginning_of_a_draw_is_even_over_the_files() -> None:
     assert max(first.count(file) for file in FILES) <= 3
     assert names == [each.name for each in command_line.drawn(FILES, 7)]
     assert names != [each.name for each in command_line.drawn(FILES, 8)]
+
+
+def test_what_is_explained_is_a_fault() -> None:
+    explained = json.loads((ROOT / "benchmarks/mutants/explained.json").read_text(encoding="utf-8"))
+    of_files = {name.split(": ")[0] for name in explained}
+    faults = [
+        each._asdict()
+        for file in of_files
+        for each in mutants(file, (ROOT / file).read_text(encoding="utf-8"))
+    ]
+    assert set(explained) <= {command_line.name_of(each) for each in faults}
 
 
 def test_tests_of_the_line_come_first_and_the_nearest_of_them() -> None:

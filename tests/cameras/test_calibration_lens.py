@@ -61,6 +61,12 @@ def test_undistorted_points_are_an_ideal_cameras(camera: CalibratedCamera, rng: 
     )
 
 
+def test_whole_pixels_are_pixels() -> None:
+    camera = lens(LENSES["rational"])
+    pixels = np.array([[300, 200], [320, 241]])
+    np.testing.assert_array_equal(undistorted(pixels, camera), undistorted(pixels.astype(np.float64), camera))
+
+
 def test_skew_is_kept(rng: np.random.Generator) -> None:
     camera = lens(LENSES["rational"], skew=7.0)
     points = cloud(rng)
