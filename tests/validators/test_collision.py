@@ -206,6 +206,9 @@ def test_the_exact_flag_changes_no_verdict_and_never_lowers_a_value(contact_marg
         verdicts(points, contact_margin=contact_margin, exact=True),
     )
     quick = distances(points, contact_margin=contact_margin, exact=False)
+    assert not any(
+        check.exact or check.contact_margin for check in collision(FIGURE) if isinstance(check, PairCollision)
+    )
     exact = distances(points, contact_margin=contact_margin)
     assert (quick <= exact + 1e-12).all()
     rejected = verdicts(points, contact_margin=contact_margin)

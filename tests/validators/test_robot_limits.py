@@ -277,3 +277,17 @@ class TestVerdicts:
         robot = load_robot("panda", geometry=False)
         with pytest.raises(InputError, match="no frame 'elbow'"):
             RobotLimits(robot=robot, names=("panda_joint1", "elbow"))
+
+
+def test_a_share_is_of_the_widest_that_a_volume_could_be_but_of_a_thousandth_of_a_cube_at_least(known):
+    robot, _, limits = known("ur5")
+    floors = 0
+    for each in limits.volumes:
+        joints = tuple(robot.model.getJointId(name) for name in each.joints)
+        free = float(limits._attainable.free(joints, np.array([each.points]))[0])
+        widest = max(free, 0.001 * each.length**3)
+        floors += widest > free
+        low, high = np.clip(np.array([each.lower, each.upper]) * each.length**2, -widest, widest)
+        assert each.share == pytest.approx((high - low) / (2 * widest), abs=1e-9)
+        assert each.share < 0.999
+    assert floors
