@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
 from posekit.batch import digests
 from posekit.batch.durable import PARTS_FOLDER, whole, write_document
@@ -184,10 +185,9 @@ def _known(index: Path, digest: str) -> Staged | None:
         return None
     try:
         document: Any = read_json(index)
-        tables = tuple(StagedTable(**table) for table in document.pop("tables"))
         schema = document.pop("schema")
-        found = Staged(**{**document, "tables": tables, "warnings": tuple(document["warnings"])})
-    except (InputError, TypeError, KeyError, AttributeError):
+        found = TypeAdapter(Staged).validate_python(document)
+    except (InputError, ValidationError, TypeError, KeyError, AttributeError):
         return None
     return found if schema == STAGED_SCHEMA and found.digest == digest else None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -91,3 +92,12 @@ def test_shards_of_another_run_do_not_double_the_frames(run: Path) -> None:
         run_batch([run.parent / "a.parquet"], run, other, ONE)
     run_batch([run.parent / "a.parquet"], run, other, ONE, overwrite=True)
     assert sum(table.num_rows for table in read_frames(run)) == 12
+
+
+@pytest.mark.parametrize("change", [{"name": {"": "a"}}, {"tables": [5]}, {"warnings": 3}, {"digest": None}])
+def test_a_damaged_note_of_what_was_opened_is_opened_anew(run: Path, change: dict[str, Any]) -> None:
+    (note,) = (run / ".staged").glob("*.json")
+    whole = note.read_bytes()
+    note.write_text(json.dumps({**json.loads(whole), **change}))
+    run_batch([run.parent / "a.parquet"], run, RECIPE, ONE)
+    assert note.read_bytes() == whole
