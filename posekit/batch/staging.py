@@ -15,7 +15,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter, ValidationError
 
 from posekit.batch import digests
 from posekit.batch.durable import PARTS_FOLDER, whole, write_document
@@ -185,9 +184,20 @@ def _known(index: Path, digest: str) -> Staged | None:
         return None
     try:
         document: Any = read_json(index)
+        tables = tuple(StagedTable(**table) for table in document.pop("tables"))
         schema = document.pop("schema")
-        found = TypeAdapter(Staged).validate_python(document)
-    except (InputError, ValidationError, TypeError, KeyError, AttributeError):
+        found = Staged(**{**document, "tables": tables, "warnings": tuple(document["warnings"])})
+    except (InputError, TypeError, KeyError, AttributeError):
+        return None
+    texts = [
+        found.name,
+        found.kind,
+        *found.warnings,
+        *(text for one in tables for text in (one.path, one.head)),
+    ]
+    if not all(isinstance(text, str) for text in texts):
+        return None
+    if not all(isinstance(number, int) for one in tables for number in (one.person, one.frames)):
         return None
     return found if schema == STAGED_SCHEMA and found.digest == digest else None
 

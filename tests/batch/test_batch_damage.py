@@ -94,7 +94,22 @@ def test_shards_of_another_run_do_not_double_the_frames(run: Path) -> None:
     assert sum(table.num_rows for table in read_frames(run)) == 12
 
 
-@pytest.mark.parametrize("change", [{"name": {"": "a"}}, {"tables": [5]}, {"warnings": 3}, {"digest": None}])
+TABLE = {"person": 0, "path": "a.parquet", "frames": 12, "head": "{}"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": {"": "a"}},
+        {"kind": 5},
+        {"warnings": 3},
+        {"warnings": [3]},
+        {"digest": None},
+        {"tables": [5]},
+        {"tables": [{**TABLE, "frames": "12"}]},
+        {"tables": [{**TABLE, "head": {}}]},
+    ],
+)
 def test_a_damaged_note_of_what_was_opened_is_opened_anew(run: Path, change: dict[str, Any]) -> None:
     (note,) = (run / ".staged").glob("*.json")
     whole = note.read_bytes()
