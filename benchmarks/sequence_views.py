@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from benchmarks.studies.people_prior import action_of, prior_of_people
 from posekit.body import Figure
 from posekit.errors import PosekitError
-from posekit.following import SurvivorFrame
+from posekit.following import SurvivorFrame, best_paths
 from posekit.formats.own import OpenCVModel, View
 from posekit.ranking import Prior, RankingEvidence, Up, load_prior, rank
 from posekit.recovery import recover
@@ -36,6 +37,7 @@ CAMERA_HEIGHT_METRES = 1.4
 FRAMES_PER_SECOND = 30.0
 N_FRAMES = 60
 CAMERA_DISTANCES_METRES = (4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
+STATED_EDGES = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
 OTHER_CLIPS = ("basketball_1", "basketball_signal_1", "jumping_1", "jumping_2", "soccer_1", "soccer_2")
 FIRST_FRAMES = {"basketball_signal_1": 200}
 """Frame that a clip is taken from; else the second, since the first is the rest posture."""
@@ -235,6 +237,28 @@ def survivors_of(frames: list[SurvivorFrame], path: np.ndarray) -> np.ndarray:
             for frame, chosen in zip(frames, path.tolist(), strict=True)
         ]
     )
+
+
+def odds_of_two(frames: list[SurvivorFrame], truth: np.ndarray, apart: float) -> Iterator[tuple[float, bool]]:
+    """Yield how sure the first of two paths is that are so far apart (m), and whether it is the nearer; or nothing."""
+    paths = best_paths(frames, k=2, apart=apart)
+    if len(paths) == 2:
+        # Where their survivors differ: what is expected along both is smooth, and differs less.
+        one, other = (survivors_of(frames, path) for path in paths.survivor)
+        differ = np.linalg.norm(one - other, axis=-1).max(axis=1) > apart
+        off = [np.linalg.norm(joints - truth, axis=-1)[differ].mean() for joints in (one, other)]
+        yield 1 / (1 + math.exp(paths.cost[0] - paths.cost[1])), bool(off[0] < off[1])
+
+
+def odds_table(odds: Sequence[tuple[float, bool]]) -> tuple[list[str], list[list[str]]]:
+    """Return the head and the rows of a table: how often the first of two paths is the nearer, by what is stated."""
+    rows = []
+    for low, high in pairwise(STATED_EDGES):
+        part = [pair for pair in odds if low <= pair[0] < high]
+        if part:
+            said, came = np.mean(part, axis=0)
+            rows.append([f"{low:g} to {min(high, 1):g}", str(len(part)), f"{said:.2f}", f"{came:.2f}"])
+    return ["stated", "pairs", "mean", "nearer"], rows
 
 
 class Priors:

@@ -17,7 +17,6 @@ out segments within 15 degrees of the plane across their ray, whose sides 2 px d
 from __future__ import annotations
 
 import argparse
-import itertools
 import math
 import time
 import warnings
@@ -33,6 +32,8 @@ from sequence_views import (  # type: ignore[import-not-found]  # the script bes
     clip_scene,
     exact,
     noisy,
+    odds_of_two,
+    odds_table,
     scenes,
     survivors_of,
     view_of,
@@ -210,30 +211,13 @@ def accuracy(capture: Capture | None, priors: Priors, yaws: int, seed: int) -> N
 
 def sure(capture: Capture | None, priors: Priors, seed: int) -> None:
     """Compare the odds between the two cheapest paths with which of them was nearer, where they differ."""
-    stated, true = [], []
+    odds: list[tuple[float, bool]] = []
     for number, (_, clip, _, scene) in enumerate(scenes(capture, 4)):
         found = noisy(scene.with_noise(2.0, np.random.default_rng(seed + number)), 2.0, real=bool(clip))
         frames = costed(found, priors, clip, PRIOR_KINDS[2])
         for apart in (0.25, 0.5):
-            paths = best_paths(frames, k=2, apart=apart)
-            if len(paths) < 2:
-                continue
-            # Where their survivors differ: what is expected along both is smooth, and differs less.
-            one, other = (survivors_of(frames, path) for path in paths.survivor)
-            differ = np.linalg.norm(one - other, axis=-1).max(axis=1) > apart
-            away = [error(joints[differ], scene.joints_cam[differ]).mean() for joints in (one, other)]
-            stated.append(1 / (1 + math.exp(paths.cost[0] - paths.cost[1])))
-            true.append(away[0] < away[1])
-    edges = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
-    rows = []
-    for low, high in itertools.pairwise(edges):
-        pick = [k for k, value in enumerate(stated) if low <= value < high]
-        if pick:
-            said, came = (np.mean([values[k] for k in pick]) for values in (stated, true))
-            rows.append([f"{low:g} to {min(high, 1):g}", str(len(pick)), f"{said:.2f}", f"{came:.2f}"])
-    show(
-        "How sure: the first of two paths, 2 px, ranked by clip", ["stated", "pairs", "mean", "nearer"], rows
-    )
+            odds += odds_of_two(frames, scene.joints_cam, apart)
+    show("How sure: the first of two paths, 2 px, ranked by clip", *odds_table(odds))
 
 
 def crowd(count: int, frames: int, seed: int) -> list[SurvivorFrame]:

@@ -22,7 +22,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -31,13 +30,12 @@ from numpy.typing import NDArray
 
 from benchmarks.answers import HEAD, Frame, HalfHeld, measured, row
 from benchmarks.people import people
-from benchmarks.sequence_views import clip_scene, noisy, survivors_of
+from benchmarks.sequence_views import clip_scene, noisy, odds_of_two, odds_table
 from benchmarks.studies.people_prior import action_of, prior_of_people
 from benchmarks.studies.weight_fitting import fit_weights
 from posekit.answers import ListedBodies
 from posekit.answers.answer import answers_of
 from posekit.evaluate.scores import reliability
-from posekit.following import best_paths
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import View
 from posekit.geometry import Array
@@ -57,7 +55,6 @@ PERSON_FRAMES, GROUPS = 5, 6
 PER_FRAME: Final = ("time", "image", "root", "head_image", "truth", "confidence")
 PERFECT_DRAWS: Final = 50
 SIDES_DEGREES, APART_METRES = (10, 100, 190, 280), 0.25
-STATED_EDGES: Final = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
 
 Held = tuple[NDArray[np.intp], ...]
 """The group of each clip, a source each."""
@@ -216,7 +213,7 @@ def table(name: str, frames: Sequence[tuple[Seen, Frame]]) -> list[str]:
 
 def paths_table(captures: Sequence[Capture]) -> list[str]:
     """Return how often the first of two paths that are 25 cm apart somewhere is the nearer one, by what is stated."""
-    stated, true = [], []
+    odds: list[tuple[float, bool]] = []
     for source, capture in enumerate(captures):
         for clip, name in enumerate(capture.names):
             kept = [np.ones(len(one.names), dtype=bool) for one in captures]
@@ -225,25 +222,9 @@ def paths_table(captures: Sequence[Capture]) -> list[str]:
             for yaw in SIDES_DEGREES:
                 scene = clip_scene(capture, name, yaw)
                 rng = np.random.default_rng(1000 * source + 10 * clip + yaw)
-                frames = noisy(scene.with_noise(NOISE_PIXELS, rng), NOISE_PIXELS, real=True).ranked(prior)
-                paths = best_paths(frames, k=2, apart=APART_METRES)
-                if len(paths) == 2:
-                    one, other = (survivors_of(frames, path) for path in paths.survivor)
-                    differ = np.linalg.norm(one - other, axis=-1).max(axis=1) > APART_METRES
-                    off = [
-                        np.linalg.norm(each - scene.joints_cam, axis=-1)[differ].mean()
-                        for each in (one, other)
-                    ]
-                    stated.append(1 / (1 + np.exp(paths.cost[0] - paths.cost[1])))
-                    true.append(off[0] < off[1])
-    said, came = np.array(stated), np.array(true)
-    rows = []
-    for low, high in pairwise(STATED_EDGES):
-        within = (said >= low) & (said < high)
-        if within.any():
-            shares = f"{said[within].mean():.2f}", f"{came[within].mean():.2f}"
-            rows.append([f"{low:g} to {min(high, 1):g}", str(int(within.sum())), *shares])
-    return table_lines(["stated", "pairs", "mean", "nearer"], rows)
+                found = noisy(scene.with_noise(NOISE_PIXELS, rng), NOISE_PIXELS, real=True)
+                odds += odds_of_two(found.ranked(prior), scene.joints_cam, APART_METRES)
+    return table_lines(*odds_table(odds))
 
 
 def fit(captures: Sequence[Capture], frames: Sequence[Seen], path: Path) -> None:

@@ -59,7 +59,7 @@ def prior_of_people(
         count = np.bincount(action)
         joints.append(capture.points[rows, : len(JOINTS)])
         ups.append(np.broadcast_to(capture.up, (len(rows), 3)))
-        weights.append(1.0 / count[action] / max(len(count), 1))
+        weights.append(1.0 / count[action] / len(count))
     fitted = fit_prior(np.concatenate(joints), np.concatenate(ups), np.concatenate(weights))
     built_in = load_prior(name)
     return replace(built_in, blocks=fitted.blocks, balance=fitted.balance, contact=fitted.contact)

@@ -55,8 +55,7 @@ def write_result_parquet(path: str | Path, result: Result, table: SurvivorTable)
 
 def read_result_parquet(path: str | Path) -> Result:
     """Read the result that is packed in a Parquet file; see `posekit.formats.own.read_result`."""
-    with opened(path) as file:
-        told = (file.metadata.metadata or {}).get(RESULT_SCHEMA.encode())
+    told = _packed(path)
     if told is None:
         expected = f"a result under {RESULT_SCHEMA}, as posekit recover writes it"
         raise refusal(path, "metadata", "none of a result", expected, "name the result that the table is of")
@@ -70,5 +69,10 @@ def read_result_parquet(path: str | Path) -> Result:
 
 def packed_schema(path: Path) -> str:
     """Return the schema of the result that is packed in a Parquet file; empty where there is none."""
+    return "" if _packed(path) is None else RESULT_SCHEMA
+
+
+def _packed(path: str | Path) -> bytes | None:
     with opened(path) as file:
-        return RESULT_SCHEMA if RESULT_SCHEMA.encode() in (file.metadata.metadata or {}) else ""
+        found: bytes | None = (file.metadata.metadata or {}).get(RESULT_SCHEMA.encode())
+    return found
