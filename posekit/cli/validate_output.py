@@ -61,7 +61,7 @@ class ValidateOutput:
         from posekit.formats.own.npz import suffix
         from posekit.formats.own.report_file import REPORT_SUFFIXES
         from posekit.safe_io import extra
-        from posekit.safe_io.writing import check_target
+        from posekit.safe_io.writing import check_folder, check_target
 
         if self.report is not None:
             if suffix(self.report, *REPORT_SUFFIXES, PAGE_SUFFIX) == ".parquet":
@@ -78,6 +78,8 @@ class ValidateOutput:
             if self.timeline.suffix:
                 suffix(self.timeline, *PLOT_FORMATS)
                 check_target(self.timeline)
+            else:
+                check_folder(self.timeline)
         if self.keep is not None:
             from posekit.validation.keep import check_keep_folder
 

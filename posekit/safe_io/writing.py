@@ -136,8 +136,22 @@ def make_folder(path: str | Path) -> None:
     InputError
         Where it cannot be made.
     """
-    try:
+    with _a_folder(path):
         Path(path).mkdir(parents=True, exist_ok=True)
+
+
+def check_folder(path: str | Path) -> None:
+    """Refuse a folder for results that cannot be made: what is there of its path is no folder."""
+    place = Path(path).absolute()
+    with _a_folder(path):
+        os.scandir(next(one for one in (place, *place.parents) if one.is_symlink() or one.exists())).close()
+
+
+@contextmanager
+def _a_folder(path: str | Path) -> Iterator[None]:
+    """Word that a folder for results cannot be made."""
+    try:
+        yield
     except OSError as error:
         raise refusal(
             path, "", error.strerror or str(error), "a folder for results", "choose another name"

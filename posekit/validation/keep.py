@@ -21,7 +21,7 @@ from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_rows import csv_line
 from posekit.formats.own.report_table import said_of_span
 from posekit.safe_io import refusal, write_lines
-from posekit.safe_io.writing import make_folder, replacing_folder
+from posekit.safe_io.writing import check_folder, make_folder, replacing_folder
 
 ROUNDING_SECONDS: Final = 1e-6
 """Seconds that the difference of two times may be off."""
@@ -72,6 +72,7 @@ def check_keep_folder(folder: Path, *written: Path) -> None:
         raise refusal(
             folder, "", "something that is there already", "a folder that is new or empty", "name another"
         )
+    check_folder(folder)
 
 
 def keep_clips(

@@ -8,7 +8,14 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.safe_io import writing
-from posekit.safe_io.writing import json_pieces, replacing, replacing_folder, write_text
+from posekit.safe_io.writing import (
+    check_folder,
+    json_pieces,
+    make_folder,
+    replacing,
+    replacing_folder,
+    write_text,
+)
 
 
 def test_content_replaces_content(tmp_path):
@@ -70,6 +77,22 @@ def test_a_rename_that_fails_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="Operation not permitted"):
         write_text(tmp_path / "out", ["x"])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["new", "new/below", "old", "file", "file/below", "link", "x" * 300])
+def test_a_folder_is_refused_before_it_is_made_where_it_cannot_be_made(tmp_path, name):
+    (tmp_path / "old").mkdir()
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    said = []
+    for make in (check_folder, make_folder):
+        try:
+            make(tmp_path / name)
+        except InputError as error:
+            said.append("expected a folder for results" in str(error))
+        if make is check_folder:
+            assert len(list(tmp_path.rglob("*"))) == 3
+    assert said == ([] if name in ("new", "new/below", "old") else [True, True])
 
 
 def test_targets_that_cannot_be_are_refused(tmp_path):
