@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from posekit.body import load_figure as load_figure
     from posekit.conversion.from_python import convert as convert
     from posekit.conversion.from_python import render as render
-    from posekit.conversion.result_output import write_result as write_result
     from posekit.errors import CameraError as CameraError
     from posekit.errors import FigureError as FigureError
     from posekit.errors import HeadError as HeadError
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from posekit.recovery.answered import result_answers as result_answers
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
+    from posekit.recovery.result_output import write_result as write_result
     from posekit.recovery.sequences import follow as follow
     from posekit.remedy import repair as repair
     from posekit.settings import RecoverSettings as RecoverSettings
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "posekit.conversion.from_python": ("convert", "render"),
-    "posekit.conversion.result_output": ("write_result",),
     "posekit.formats.cameras": ("read_cameras",),
     "posekit.errors": ("CameraError", "FigureError", "HeadError", "InputError", "PosekitError"),
     "posekit.body": ("Figure", "load_figure"),
@@ -66,6 +65,7 @@ _HOMES = {
     "posekit.live": ("TrackedPosture", "Tracker"),
     "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
     "posekit.recovery.answered": ("result_answers",),
+    "posekit.recovery.result_output": ("write_result",),
     "posekit.remedy": ("repair",),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),

@@ -227,7 +227,7 @@ def _write(
 
 def _written(path: Path, result: Result) -> tuple[Path, list[str]]:
     """Write a result, as NPZ beside it where the file could not be read again; return where, and what is to be said."""
-    from posekit.conversion.result_output import write_result
+    from posekit.recovery.result_output import write_result
 
     try:
         write_result(path, result)

@@ -16,8 +16,8 @@ from posekit.conversion.motion_output import (
     write_moving,
     write_points,
 )
+from posekit.conversion.moving import one_clip, sequence_of
 from posekit.conversion.object_points import write_object_points
-from posekit.conversion.posture_sequence import one_clip, sequence_of
 from posekit.conversion.rerun_recording import write_rerun_result
 from posekit.display.plural import plural
 from posekit.errors import InputError

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from posekit.conversion.posture_sequence import PostureSequence
 from posekit.display.plural import plural
 from posekit.following import bridge
+from posekit.recovery.result_sequence import PostureSequence
 from posekit.skeleton import JOINTS
 
 GAP_FILLINGS: Final = ("interpolate", "hold", "leave-out")

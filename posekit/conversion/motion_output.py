@@ -12,7 +12,6 @@ import numpy as np
 from posekit.body import Figure
 from posekit.body.steady_angles import steady_angles
 from posekit.conversion.gaps import fill_gaps
-from posekit.conversion.posture_sequence import PostureSequence
 from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats import own as files
@@ -33,6 +32,7 @@ from posekit.formats.motion.urdf_folder import write_urdf_folder
 from posekit.formats.own import Postures
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.geometry import Array
+from posekit.recovery.result_sequence import PostureSequence
 from posekit.safe_io import refusal
 from posekit.safe_io.extras import extra
 from posekit.safe_io.writing import check_target

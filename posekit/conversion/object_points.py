@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from posekit.conversion.motion_output import MotionOutput, carries_points, write_points
-from posekit.conversion.posture_sequence import ASSUMED_RATE, CAMERA_UP, LIKELIEST_WORDS
 from posekit.display.plural import plural
 from posekit.formats.motion import Motion, motion_formats
 from posekit.formats.own import ObjectResult
+from posekit.recovery.result_sequence import ASSUMED_RATE, CAMERA_UP, LIKELIEST_WORDS
 from posekit.safe_io import refusal, shown
 
 

@@ -23,7 +23,6 @@ from posekit.conversion.motion_output import (
     write_moving,
     write_points,
 )
-from posekit.conversion.posture_sequence import ASSUMED_RATE, PostureSequence
 from posekit.display.plural import plural
 from posekit.errors import InputError, PosekitError
 from posekit.formats import own as files
@@ -34,6 +33,7 @@ from posekit.formats.own import Postures
 from posekit.formats.own.postures_q import NamedConfigurations, write_configurations
 from posekit.formats.recognising import recognise
 from posekit.geometry import Array
+from posekit.recovery.result_sequence import ASSUMED_RATE, PostureSequence
 from posekit.remedy import Repaired, repair, repair_configurations
 from posekit.safe_io import refusal
 from posekit.safe_io.writing import check_target, make_folder, safe_stem

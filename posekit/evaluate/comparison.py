@@ -15,9 +15,9 @@ from posekit.formats.own.frame_answer import likeliest_order
 from posekit.geometry import Array
 from posekit.measures import mpjpe, pa_mpjpe
 from posekit.recovery.ranked import probabilities
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.skeleton import JOINT
-from posekit.validation import recovered_with
 
 MEASURE_LABELS: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
 

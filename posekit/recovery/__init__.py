@@ -13,11 +13,11 @@
 4. Certify: `certified`, the checks that every refined posture passes; `judged`, what a result says of that.
 5. Rank: `ranked`, the probability of every survivor; `grouping`, those that are alike.
 6. Answer: `recovery` (what is returned), `answered` (what is said of each frame), `camera_record`, `result` (what is
-   written), `summary` and `advice` (what is printed), `least_violation` and `length_diagnosis` (what is wrong where no
-   posture was found).
+   written) and `result_output` (where), `summary` and `advice` (what is printed), `least_violation` and
+   `length_diagnosis` (what is wrong where no posture was found).
 
-`sequences` and `scaled_sequences` follow a person through what was recovered. `taylor_figure` is another body: the
-twelve points of Taylor (2000).
+`sequences` and `scaled_sequences` follow a person through what was recovered. Of a result `recovered` says what it was
+recovered with, and `result_sequence` how it moves. `taylor_figure` is another body: the twelve points of Taylor (2000).
 """
 
 from typing import TYPE_CHECKING

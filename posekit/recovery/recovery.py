@@ -470,15 +470,15 @@ class Recovery(Pictured):
         Parameters
         ----------
         path : path
-            ``.json``, ``.json.gz`` or ``.npz``; ``.parquet`` is written by `posekit.write_result`.
+            ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``.
 
         Raises
         ------
         InputError
             Where the name is none of these, or the file cannot be written.
         """
-        from posekit.formats.own import write_result
         from posekit.recovery.result import result_of
+        from posekit.recovery.result_output import write_result
 
         write_result(path, result_of(self))
 

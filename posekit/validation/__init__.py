@@ -8,6 +8,4 @@ from posekit.validation.judging import WantedDetail as WantedDetail
 from posekit.validation.judging import validate_postures as validate_postures
 from posekit.validation.reading import StatedMotion as StatedMotion
 from posekit.validation.reading import files_of as files_of
-from posekit.validation.recovered import RecoveredWith as RecoveredWith
-from posekit.validation.recovered import recovered_with as recovered_with
 from posekit.validation.validate import validate as validate

@@ -15,11 +15,11 @@ from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own import ValidationReport
 from posekit.formats.recognising import recognise
 from posekit.geometry import Array
+from posekit.recovery.recovered import recovered_with
 from posekit.robots import Robot
 from posekit.settings import DEFAULT_RANGES, ValidateSettings
 from posekit.validation.judging import ReportBuilder, WantedDetail
 from posekit.validation.reading import ReadPostures, StatedMotion, read_postures_of
-from posekit.validation.recovered import recovered_with
 from posekit.validators import Validator
 
 STICK_FIGURE_NAME = "stick_figure"

@@ -17,12 +17,12 @@ import pytest
 
 import posekit
 from posekit.body import load_figure
-from posekit.conversion import result_output
 from posekit.errors import InputError, TooLargeError
 from posekit.formats.motion.survivors_files import read_survivors
 from posekit.formats.own import Result, ScaledOrthographicModel, View, read_result, result_parquet
 from posekit.formats.own.result import RESULT_SCHEMA
 from posekit.formats.own.result_npz import pack_result
+from posekit.recovery import result_output
 from posekit.recovery.result import result_of
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
@@ -74,6 +74,13 @@ def test_it_holds_what_npz_does(results: dict[str, Result], kind: str, tmp_path:
     assert isinstance(read, Result)
     assert (read.paths is None) == (kind != "refined, followed")
     assert packed(read) == packed(read_result(tmp_path / "r.npz"))
+
+
+def test_a_recovery_saves_what_is_written_of_its_result(tmp_path: Path) -> None:
+    recovery = posekit.recover(posekit.builtin_view("seq1"))
+    recovery.save(tmp_path / "saved.parquet")
+    posekit.write_result(tmp_path / "r.parquet", result_of(recovery))
+    assert (tmp_path / "saved.parquet").read_bytes() == (tmp_path / "r.parquet").read_bytes()
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -17,9 +17,9 @@ from posekit.formats.own.digits import FEWEST_DECIMALS
 from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.formats.own.units import UNIT_NAMES
 from posekit.inspection.results import result_lines
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import MAX_DETAILED, result_of
-from posekit.validation import recovered_with
 from posekit.validators import Validator
 
 EARLIER = Path(__file__).parent / "earlier"

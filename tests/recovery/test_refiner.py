@@ -22,12 +22,12 @@ from posekit.formats.own.survivor_columns import Likelihoods
 from posekit.recovery import leaf_search, recover
 from posekit.recovery.certified import certified_within
 from posekit.recovery.noise import Noise, contact_under_noise
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, random_views
-from posekit.validation import recovered_with
 from posekit.validators import Validator
 from posekit.views.builtin import forget_camera, view_of
 

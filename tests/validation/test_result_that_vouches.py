@@ -14,7 +14,7 @@ import pytest
 import posekit
 from posekit.body.measured import LEAST_FRAMES, hips_forward
 from posekit.geometry import Array
-from posekit.validation import recovered_with
+from posekit.recovery.recovered import recovered_with
 from posekit.validators import Validator
 
 

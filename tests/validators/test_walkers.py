@@ -18,11 +18,11 @@ from posekit.evaluate import Method
 from posekit.formats import own as files
 from posekit.formats.own import View
 from posekit.recovery import recover
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.result import result_of
 from posekit.settings import RecoverSettings, ValidateSettings
 from posekit.skeleton import DOFS
 from posekit.synthesis import SyntheticScene, random_views
-from posekit.validation import recovered_with
 from posekit.validators import PHYSICAL_CHECKS, Validator, make_checks
 from posekit.validators.joint_range import joint_range
 from posekit.validators.ranges import URDF_RANGES

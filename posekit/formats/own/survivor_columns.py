@@ -2,7 +2,7 @@
 
 Each field is one. From this table follow JSON (`posekit.formats.own.result_json`), NPZ
 (`posekit.formats.own.result_npz`), the published schema (`posekit.formats.own.result_schema`), the Parquet of batches
-(`posekit.batch.columns`) and flat tables of survivors (`posekit.conversion.posture_sequence`): a new column is one
+(`posekit.batch.columns`) and flat tables of survivors (`posekit.recovery.result_sequence`): a new column is one
 field here, and a property of the same name where it is calculated (`posekit.recovery.recovery.FrameRecovery`).
 """
 

@@ -1,8 +1,8 @@
-"""What moves: postures over time in a world with an up, and the figure's angles where they are asked for."""
+"""What moves: postures over time in a world with an up, as a result holds them, and the figure's angles of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -10,23 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.answers.wording import percent, words_of_paths
-from posekit.body import Figure, load_figure
-from posekit.body.anthropometry import lengths_from_postures
+from posekit.body import Figure
 from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.following import bridge
-from posekit.formats.held_postures import HeldPostures
-from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of
+from posekit.formats.motion import Motion, SurvivorTable, guess_up
 from posekit.formats.motion.motion_axes import up_rotation
-from posekit.formats.own import CameraModel, OpenCVModel, Postures, Result, View
+from posekit.formats.own import CameraModel, OpenCVModel, Result, View
 from posekit.formats.own.frame_answer import likeliest_order
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
-from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
-from posekit.robots.stretching import shoulders_are_behind
+from posekit.recovery.recovered import recovered_with
 from posekit.skeleton import JOINTS, POINTS
-from posekit.validation import recovered_with
 
 EVEN_STEP_SHARE: Final = 0.25
 """Share of a step by which the time of a picture may be off its place."""
@@ -155,73 +151,32 @@ class PostureSequence:
         )
 
 
-def one_clip(motion: Motion) -> Motion:
-    """Refuse several clips, where one is needed.
-
-    Raises
-    ------
-    InputError
-        Where there are several: they are named.
-    """
-    if len(motion.clips) > 1:
-        names = ", ".join(motion.clips[:8]) + (", …" if len(motion.clips) > 8 else "")
-        raise InputError(
-            f"{motion.source}: {len(motion.clips)} clips ({names}); expected one; choose with --clip"
-        )
-    return motion
-
-
-def sequence_of(
-    held: Result | View | Motion | Postures | HeldPostures,
-    source: str,
-    *,
-    posture: str = "",
-    view: View | None = None,
-    skeleton: str = "",
-    up: str = "",
+def sequence_of_result(
+    result: Result, *, posture: str = "", view: View | None = None, up: str = ""
 ) -> PostureSequence:
-    """Make a sequence of what moves: of a result, the truth of a view, motion, or postures one after another.
+    """Make a sequence of a result.
 
     Parameters
     ----------
-    held : Result, View, Motion, Postures or HeldPostures
-        What moves.
-    source : str
-        How errors call it.
+    result : Result
+        What was recovered.
     posture : str
-        Of a result: ``likeliest``, the number of a survivor from 0, ``path``, or ``all``; if empty the path where the
-        frames were followed, else the likeliest.
+        ``likeliest``, the number of a survivor from 0, ``path``, or ``all``; if empty the path where the frames were
+        followed, else the likeliest.
     view : View, optional
-        What a result was recovered from: its camera's place in the world turns and moves the postures there. By default
-        the camera that the result holds does, unless `up` is given.
-    skeleton : str
-        Of motion capture: a skeleton map by name or file.
+        What it was recovered from: its camera's place in the world turns and moves the postures there. By default the
+        camera that the result holds does, unless `up` is given.
     up : str
-        The axis that points up, where it is not known or is wrong; of a result, that of the camera's frame, or of its
-        world where there is a view. Motion says it itself.
+        The axis that points up in the camera's frame, or in its world where there is a view.
 
     Raises
     ------
     InputError
-        Where nothing in it moves.
+        Where no frame has a posture, or not the one that is asked for.
     """
-    if isinstance(held, Result):
-        return _of_result(held, posture, view, up)
-    if isinstance(held, View):
-        return _of_truth(held, source, up)
-    if isinstance(held, Motion):
-        return _of_motion(one_clip(held), load_skeleton_map(skeleton) if skeleton else None)
-    known, given = ("", held) if isinstance(held, Postures) else (held.up, held.postures)
-    head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
-    points = np.concatenate([given.joints, head], axis=1)
-    up = up or known or _guessed(given.joints, source)
-    return _recorded(points, np.arange(len(points)) / ASSUMED_RATE, up)
-
-
-def _of_result(result: Result, posture: str, view: View | None, stated: str) -> PostureSequence:
     figure, _ = recovered_with(result)
     if posture == "path" or (not posture and result.paths is not None):
-        return _of_path(result, figure, view, stated)
+        return _of_path(result, figure, view, up)
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
     sure: list[float] = []
@@ -255,7 +210,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         jumps = result.paths is None and len(result.frames) > 1
         says.append(f"{single}; all: --posture all{'; without jumps: recover --follow 1' if jumps else ''}")
     points, up = _placed(
-        points, result.camera if view is None else view.camera, stated, says, told=view is not None
+        points, result.camera if view is None else view.camera, up, says, told=view is not None
     )
     values = {
         "probability": np.array([probability[k][row] for k, row in rows]),
@@ -356,11 +311,11 @@ def _placed(
     Where a view is `told`, its camera must have a place in a world. Else an axis that is stated is the camera's.
     """
     if told and camera is not None:
-        points = _in_world(points, camera)
-        up = stated or _up_of(camera) or _guessed(points[:, :14], "the camera's world")
+        points = in_world(points, camera)
+        up = stated or _up_of(camera) or guessed_up(points[:, :14], "the camera's world")
     elif not stated and isinstance(camera, OpenCVModel) and camera.R is not None:
         turned = replace(camera, t=np.zeros(3)) if camera.t is None else camera
-        moved = _in_world(points, turned)
+        moved = in_world(points, turned)
         try:
             points, up = moved, camera.up or guess_up(moved[:, :14])
         except InputError:
@@ -380,7 +335,7 @@ def _up_of(camera: CameraModel) -> str:
     return camera.up if isinstance(camera, OpenCVModel) and camera.R is not None else ""
 
 
-def _guessed(joints: Array, source: str) -> str:
+def guessed_up(joints: Array, source: str) -> str:
     """Guess which axis points up, or name the option that says it."""
     try:
         return guess_up(joints, source)
@@ -397,49 +352,8 @@ def _number(posture: str, count: int, frame: int) -> int:
     return int(posture)
 
 
-def _in_world(points: Array, model: CameraModel) -> Array:
+def in_world(points: Array, model: CameraModel) -> Array:
+    """Return points of a camera's frame in its world, or refuse a camera that has no place in one."""
     if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
         raise InputError("--view: its camera has no place in a world; expected R and t; leave the option out")
     return np.asarray((points - model.t) @ model.R)
-
-
-def _of_truth(view: View, source: str, stated: str) -> PostureSequence:
-    known = np.isfinite(view.truth).any(axis=(1, 2))
-    if not known.any():
-        raise InputError(
-            f"{source}: a view without truth: pictures do not move in space; expected a result; recover it first"
-        )
-    points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
-    up = stated or CAMERA_UP
-    if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
-        points = _in_world(points, view.camera)
-        up = stated or view.camera.up or _guessed(points[:, :14], source)
-    return _recorded(points, view.time[known], up)
-
-
-def _of_motion(motion: Motion, layout: SkeletonMap | None) -> PostureSequence:
-    found = postures_of(motion, layout)
-    points = np.concatenate([found.joints, found.head], axis=1)
-    says = [f"skeleton map {found.layout.name}"]
-    if found.derived:
-        says.append(f"{' and '.join(found.derived)} placed from shoulders and hips")
-    up = motion.up or _guessed(found.joints, motion.source)
-    if not motion.up:
-        says.append(f"{up} is taken as up, along which heads are above ankles")
-    return _recorded(points, motion.time, up, says)
-
-
-def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> PostureSequence:
-    """Make it of postures that were measured, with a figure of their own lengths."""
-    return PostureSequence(
-        points=points,
-        time=time,
-        frame=np.arange(len(points)),
-        survivor=np.zeros(len(points), dtype=np.intp),
-        up=up,
-        figure=load_figure().scaled(
-            lengths_from_postures(points[:, :14]).lengths.lengths, behind=shoulders_are_behind(points)
-        ),
-        says=tuple(says),
-        values={},
-    )

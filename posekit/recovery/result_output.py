@@ -47,11 +47,11 @@ def table_of(result: Result) -> SurvivorTable:
     result : Result
         The result; where no frame has a survivor, the table has no row.
     """
-    from posekit.conversion.posture_sequence import sequence_of
     from posekit.formats.motion import SurvivorTable
+    from posekit.recovery.result_sequence import sequence_of_result
 
     if any(len(frame.joints) for frame in result.frames):
-        return sequence_of(result, "result", posture="all").table()
+        return sequence_of_result(result, posture="all").table()
     none = np.zeros(0)
     return SurvivorTable(
         frame=none.astype(np.int64), time=none, survivor=none.astype(np.int64), joints=np.zeros((0, 14, 3))
