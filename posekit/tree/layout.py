@@ -89,9 +89,9 @@ class Programme(NamedTuple):
     stretches: tuple[Stretch, ...]
 
     @property
-    def arrays(self) -> tuple[Array, ...]:
+    def arrays(self) -> tuple[Table, Table, Table, Table, Array]:
         """What the loop takes, in its order; the numbers, beside which it writes, are its own."""
-        return (self.levels, self.checks, self.tips, self.places, self.numbers.copy())  # type: ignore[return-value]
+        return (self.levels, self.checks, self.tips, self.places, self.numbers.copy())
 
 
 @lru_cache(maxsize=1024)

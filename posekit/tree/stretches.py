@@ -101,8 +101,8 @@ class _Run:
         self.programme, self.span, self.frames = programme, stretch.span, frames
         self.codes = np.ascontiguousarray(stem[:, 1])
         self.starts = np.searchsorted(stem[:, 0], np.arange(frames[0], frames[1] + 1)).astype(np.int64)
-        self.alive = np.empty((max(LEAF_ROWS * n, 2 * len(stem)), 2), dtype=np.int32)
-        self.lost = np.empty((max(LOSS_ROWS * n, 4 * len(stem)), 4), dtype=np.int32)
+        self.alive = np.empty((LEAF_ROWS * n, 2), dtype=np.int32)
+        self.lost = np.empty((LOSS_ROWS * n, 4), dtype=np.int32)
         self.presumed = np.empty((QUESTION_ROWS * n, MAX_PRESUMED))
         self.asked = np.empty(QUESTION_ROWS * n, dtype=np.int64)
         self.unsure, self.used = np.empty(n, dtype=np.int64), np.zeros(4, dtype=np.int64)

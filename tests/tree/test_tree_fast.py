@@ -4,6 +4,7 @@ Where Numba is not installed the same loops run as Python does, over fewer views
 """
 
 import importlib.util
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -20,7 +21,7 @@ from posekit.compiled import tree_kernels as kernels
 from posekit.refinement import under_noise
 from posekit.settings import RigidTolerance
 from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, POINTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, Findings, InterpretationTree, Leaves, Place, fast, stretches
+from posekit.tree import Check, Findings, InterpretationTree, Leaves, Place, fast, interpretation_tree, stretches
 from posekit.tree.blocks import FrameBlock
 from posekit.tree.candidates import Candidates, lift_all, rays_of
 from posekit.tree.layout import programme_of
@@ -340,8 +341,18 @@ def test_frames_are_shared_out_evenly() -> None:
         sizes = {b - a for a, b in blocks[:-1]}
         assert len(sizes) <= 1
         assert max(b - a for a, b in blocks) <= fast.MAX_FRAMES
-        if frames > threads * fast.MIN_FRAMES:
-            assert len(blocks) >= threads
+        share = -(-frames // (threads * fast.BLOCKS_PER_THREAD)) if threads > 1 else frames
+        assert max(b - a for a, b in blocks) == min(frames, max(share, fast.MIN_FRAMES), fast.MAX_FRAMES)
+
+
+def test_threads_do_tasks_at_the_same_time() -> None:
+    """Each waits for the other."""
+    met = threading.Barrier(2, timeout=20.0)
+    compiled.use_threads(2)
+    try:
+        assert sorted(fast._spread(lambda _: met.wait(), [0, 1])) == [0, 1]
+    finally:
+        compiled.use_threads(None)
 
 
 def test_only_frames_of_which_a_rule_is_unsure_are_grown_by_numpy(
@@ -377,6 +388,7 @@ def test_ordinary_trees_are_grown_whole(monkeypatch: pytest.MonkeyPatch, ranges:
     points = postures(30, 20 if NUMBA else 3, beyond=0.0)
     monkeypatch.setattr(fast, "_grown_plainly", None)
     monkeypatch.setattr(stretches, "_first_violated", None)
+    monkeypatch.setattr(interpretation_tree, "plain", None)
     image = hide_some(seen(points), 31)
     suite = checks(0.05, 3.0, ranges)
     with compiled.path("fast"):

@@ -211,6 +211,13 @@ def test_leaves_say_where_they_are() -> None:
     assert (leaves.length_residual() < 1e-8).all()
 
 
+def test_a_tree_of_a_root_alone_is_the_root() -> None:
+    tree = InterpretationTree(joints=("root",), parents=(-1,), lengths=np.zeros(1))
+    root = np.array([[0.0, 0.0, 4.0], [0.0, 0.0, 5.0]])
+    leaves = tree.grow(CAMERA, root, CAMERA.project(root)[:, None], (Depth(points=(0,), most=4.5),))
+    np.testing.assert_array_equal(leaves.postures()[:, 0], root)
+
+
 def test_a_segment_may_not_be_too_short_unless_told_otherwise() -> None:
     joints, image, lengths = scene(2)
     ray = np.concatenate([(image[:, 1] - [320.0, 240.0]) / 1000.0, np.ones((2, 1))], axis=1)

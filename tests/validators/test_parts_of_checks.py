@@ -12,7 +12,7 @@ from posekit.body import load_figure
 from posekit.body.measured import MeasuredPerson
 from posekit.validators import Validator
 from posekit.validators.projected_angles import projected_plane
-from posekit.validators.robot.balance import inside_hull
+from posekit.validators.robot.balance import _plane, inside_hull
 from posekit.validators.robot.robot_validator import RobotValidator
 
 FIGURE = load_figure()
@@ -30,6 +30,14 @@ def test_a_place_is_as_far_inside_a_hull_as_its_nearest_side(count: int, rng: np
     assert inside_hull(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([1.3, 1.4])) == (
         pytest.approx(-0.5)
     )
+
+
+def test_a_plane_across_up_is_a_right_handed_pair(rng: np.random.Generator) -> None:
+    for up in [*np.eye(3), *rng.normal(size=(20, 3))]:
+        up = up / np.linalg.norm(up)
+        axes = np.column_stack([_plane(up), up])
+        np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+        assert np.linalg.det(axes) > 0
 
 
 def test_the_printed_angles_of_a_plane_are_those_of_two_directions(rng: np.random.Generator) -> None:

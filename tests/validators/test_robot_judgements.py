@@ -319,6 +319,14 @@ def test_a_length_that_is_off_by_twice_the_tolerance_is_proof(off: float, proof:
     assert not near.violated.any() and np.isfinite(near.margin).all()
 
 
+def test_a_proof_of_one_posture_says_nothing_of_another() -> None:
+    targets = points_of(at((0.0, 0.5, 1.0), (0.0, 0.5, 1.0)))
+    targets[0, 0] -= 0.5
+    found = judge_reach(kinematics(), targets, np.full((2, 3), 0.02), tolerance=0.01)
+    assert found.violated.any(axis=1).tolist() == [True, False]
+    assert np.isnan(found.margin).all(axis=1).tolist() == [False, True]
+
+
 def test_a_fit_inside_its_limits_places_the_points() -> None:
     fitter = Fitter(kinematics=kinematics(), subject=subject_of(), tolerance=0.001)
     q = at((0.1, 0.4, 1.2), (-0.3, 1.5, 0.3), (0.0, -0.5, 2.0))

@@ -62,4 +62,4 @@ def meet(a: Array, b: Array) -> Array:
 
 
 def _count(width: Array, reach: float) -> Array:
-    return np.maximum(np.ceil(width / (2 * reach) - 1e-9), 1).astype(np.intp)
+    return np.maximum(np.ceil(width / (2 * reach) - 1e-9), 1)
