@@ -1,4 +1,4 @@
-"""Steps inside cameras and heads, each by a law of its own: how fast searches close in, and what they are asked about."""
+"""Steps inside cameras and heads, each by a law of its own: how fast searches close in, and what they are told."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.cameras import PinholeCamera, pinhole, undistortion
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.camera import meet_sphere
@@ -16,10 +17,14 @@ from posekit.cameras.head.estimate import BETTER_BEHIND
 from posekit.cameras.head.misfit import spread
 from posekit.cameras.head.perspective import Heads
 from posekit.cameras.head.points import HeadPoints
+from posekit.cameras.head.starts import reversed_start
 from posekit.cameras.lens import distort, from_pixels, to_pixels
+from posekit.cameras.neck import place
 from posekit.cameras.neck.minima import _brackets
 from posekit.cameras.neck.place import _feasible
+from posekit.errors import HeadError
 from posekit.geometry import Array, rotation_from_vector
+from posekit.synthesis import random_views
 
 CAMERA = PinholeCamera(K=np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, 360.0], [0.0, 0.0, 1.0]]))
 LENS = np.array([0.3, -0.2, 0.05, -0.04, 0.1])
@@ -29,7 +34,7 @@ def heads(count: int, seed: int = 3) -> Array:
     """Return the points (F, 6, 3) of heads that look at a camera two metres away, more or less."""
     rng = np.random.default_rng(seed)
     turned = rotation_from_vector(rng.normal(0.0, 0.3, (count, 3))) @ np.diag([1.0, -1.0, -1.0])
-    return np.einsum("fij,pj->fpi", turned, TABLE_A2.points) + [0.0, 0.0, 2.0]
+    return np.asarray(np.einsum("fij,pj->fpi", turned, TABLE_A2.points) + np.array([0.0, 0.0, 2.0]))
 
 
 @pytest.mark.parametrize("model", ["pinhole", "lens", "fisheye"])
@@ -39,7 +44,10 @@ def test_one_step_squares_what_is_off(
     """Newton's steps, whose slopes are the lens's own."""
     ideal = rng.uniform(-0.4, 0.4, (50, 2))
     camera = CalibratedCamera(
-        name="lens", K=np.eye(3), distortion=LENS[:4] if model == "fisheye" else LENS, fisheye=model == "fisheye"
+        name="lens",
+        K=np.eye(3),
+        distortion=LENS[:4] if model == "fisheye" else LENS,
+        fisheye=model == "fisheye",
     )
     monkeypatch.setattr(pinhole, "UNDISTORTION_STEPS", 1)
     monkeypatch.setattr(undistortion, "MAX_STEPS", 1)
@@ -57,7 +65,7 @@ def test_one_step_squares_what_is_off(
 def test_a_ray_is_found_to_a_millionth_of_a_pixel(off: float, good: bool) -> None:
     camera = CalibratedCamera(name="lens", K=CAMERA.K, distortion=LENS)
     found = np.array([[0.1, -0.2]])
-    target = to_pixels(camera.K, distort(camera, found)) + [off, 0.0]
+    target = to_pixels(camera.K, distort(camera, found)) + np.array([off, 0.0])
     ray = undistortion._checked(found, from_pixels(camera.K, target), camera)
     assert np.isfinite(ray).all() == good
 
@@ -80,7 +88,6 @@ def test_the_spread_of_a_head_is_that_of_the_points_that_are_seen(rng: np.random
 
 def test_a_third_start_is_tried_where_two_are_coarse_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    reversed_start = estimate.reversed_start
 
     def spy(points: Array, placement: Any) -> Any:
         asked.append(len(points))
@@ -148,5 +155,29 @@ def test_of_several_frames_it_is_said_in_how_many_a_point_does_not_fit(count: in
     image = CAMERA.project(heads(count))
     image[0, 2] += 80.0
     where = "" if count == 1 else r" in 1 of 2 frames, most in frames\[0\]"
-    with pytest.warns(HeadWarning, match=rf"^head point {TABLE_A2.names[2]} does not fit the others{where}: "):
+    with pytest.warns(
+        HeadWarning, match=rf"^head point {TABLE_A2.names[2]} does not fit the others{where}: "
+    ):
         solve_pose(TABLE_A2, image, CAMERA)
+
+
+@pytest.mark.parametrize("away", [0.0, 300.0])
+def test_points_on_a_line_are_no_head_wherever_it_runs(away: float) -> None:
+    image = away * np.array([-0.5, 1.0]) + np.linspace(0.0, 80.0, 6)[:, None] * [1.0, 0.5]
+    along = np.std(np.linspace(0.0, 80.0, 6)) * np.hypot(1.0, 0.5)
+    with pytest.raises(HeadError, match=rf"lie on one line or in one point \(spread {along:.3g} by"):
+        solve_pose(TABLE_A2, image, CAMERA)
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_torso_is_placed_whichever_way_its_shoulders_are_off(behind: bool) -> None:
+    figure = load_figure()
+    views = random_views(figure.scaled(figure.lengths, behind=behind), 12, np.random.default_rng(7))
+    assert (views.figure.shoulder_offset < 0) == behind
+    found = place(views.camera, views.figure, views.image, None, method="torso")
+    for one, neck in zip(found, views.joints_cam[:, 0], strict=True):
+        assert one.method == "torso" and np.linalg.norm(one.necks - neck, axis=1).min() < 1e-6
+
+
+def test_a_focal_length_without_a_deviation_is_no_guess() -> None:
+    assert [CalibratedCamera(name="c", K=CAMERA.K, deviation=d).guessed for d in (0.0, 1e-9)] == [False, True]

@@ -1,18 +1,21 @@
 """The one table of a survivor's columns: what is in files follows from it, and a new column is one row of it."""
 
 import json
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from posekit.batch.columns import BATCH_COLUMNS, value_columns
 from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
 from posekit.formats.own import ResultFrame, schema, write_result
-from posekit.formats.own.column import column, columns_in
+from posekit.formats.own.column import Column, column, columns_in
 from posekit.formats.own.digits import Precision
 from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.formats.own.inferred import Inferred
@@ -20,7 +23,7 @@ from posekit.formats.own.npz import write_npz
 from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
-from posekit.formats.own.survivor_models import model_of, table_model_of
+from posekit.formats.own.survivor_models import annotation_of, model_of, table_model_of
 from posekit.formats.own.survivor_npz import survivor_arrays, survivors_in
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
@@ -160,3 +163,34 @@ def test_a_field_says_what_its_column_means_and_only_details_may_be_left_out(tab
     assert {key: field.description for key, field in whole_table.model_fields.items()} == {
         each.key: each.meaning for each in columns_in(table).values()
     }
+
+
+NUMBERS = [
+    each
+    for table in TABLES
+    for each in columns_in(table).values()
+    if each.kind in ("float", "int") and not each.by_check
+]
+
+
+def nested(shape: Sequence[int], leaf: object) -> object:
+    return [nested(shape[1:], leaf) for _ in range(shape[0])] if shape else leaf
+
+
+@pytest.mark.parametrize("each", NUMBERS, ids=lambda each: each.key)
+def test_numbers_have_their_columns_extents_and_nothing_stands_where_it_says(each: Column) -> None:
+    kind = TypeAdapter(annotation_of(each))
+    shape, number = [extent or 2 for extent in each.shape], each.lower or 0
+    kind.validate_python(nested(shape, number))
+    places = {"number": len(shape), "row": len(shape) - 1}
+    for depth in range(len(shape) + 1):
+        with_nothing = nested(shape[:depth], None)
+        if places.get(each.null or "") == depth:
+            kind.validate_python(with_nothing)
+        else:
+            with pytest.raises(ValidationError):
+                kind.validate_python(with_nothing)
+    for depth, extent in enumerate(each.shape):
+        more = [*shape[:depth], shape[depth] + 1, *shape[depth + 1 :]]
+        with nullcontext() if extent is None else pytest.raises(ValidationError):
+            kind.validate_python(nested(more, number))

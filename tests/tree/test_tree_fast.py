@@ -21,7 +21,16 @@ from posekit.compiled import tree_kernels as kernels
 from posekit.refinement import under_noise
 from posekit.settings import RigidTolerance
 from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, POINTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, Findings, InterpretationTree, Leaves, Place, fast, interpretation_tree, stretches
+from posekit.tree import (
+    Check,
+    Findings,
+    InterpretationTree,
+    Leaves,
+    Place,
+    fast,
+    interpretation_tree,
+    stretches,
+)
 from posekit.tree.blocks import FrameBlock
 from posekit.tree.candidates import Candidates, lift_all, rays_of
 from posekit.tree.layout import programme_of

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from posekit.skeleton import PARENTS
 from posekit.tree import Leaves, enumerate_leaves
 from posekit.tree.factors import factor_postures
 from tests.annotated import watched
@@ -31,7 +32,13 @@ def test_trees_are_what_annotations_say(
     monkeypatch.setattr(scenes, "VIEWS", 8)
     with watched("posekit.tree") as wrong:
         for leaves in case():
-            for ask in (leaves.counts, leaves.offsets, leaves.branches, leaves.rejected, leaves.length_residual):
+            for ask in (
+                leaves.counts,
+                leaves.offsets,
+                leaves.branches,
+                leaves.rejected,
+                leaves.length_residual,
+            ):
                 ask()
             leaves.alike((2,))
             assert all(len(one.value) == len(one.lower) == len(one.upper) for one in leaves.pruned)
@@ -47,7 +54,7 @@ def test_enumerated_leaves_are_what_annotations_say() -> None:
             scenes.CAMERA,
             points[0],
             scenes.CAMERA.project(points[:6]),
-            parents=scenes.PARENTS[:6],
+            parents=PARENTS[:6],
             lengths=scenes.LENGTHS[:6],
             tolerance=1e-9,
         )

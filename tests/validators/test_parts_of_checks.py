@@ -33,8 +33,8 @@ def test_a_place_is_as_far_inside_a_hull_as_its_nearest_side(count: int, rng: np
 
 
 def test_a_plane_across_up_is_a_right_handed_pair(rng: np.random.Generator) -> None:
-    for up in [*np.eye(3), *rng.normal(size=(20, 3))]:
-        up = up / np.linalg.norm(up)
+    across = rng.normal(size=(20, 3))
+    for up in [*np.eye(3), *across / np.linalg.norm(across, axis=1, keepdims=True)]:
         axes = np.column_stack([_plane(up), up])
         np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
         assert np.linalg.det(axes) > 0

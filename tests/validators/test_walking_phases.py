@@ -115,6 +115,19 @@ def test_what_is_missing_is_not_judged_and_a_gap_is_passed_over() -> None:
     assert judged(points[:5]) == (set(), set())
 
 
+@pytest.mark.parametrize(("slowest", "walks"), [(0.5, True), (np.nextafter(0.5, 1.0), False)])
+def test_who_goes_as_fast_as_the_slowest_walker_walks(slowest: float, walks: bool) -> None:
+    """At half a metre a second, in times and places that are exact."""
+    joints = np.zeros((90, len(JOINTS), 3))
+    joints[:, JOINTS.index("neck"), 2] = 1.0
+    joints[..., 0] = np.arange(90)[:, None] / 64.0
+    joints[:, -8:, 0] += (
+        np.round(8 * np.sin(np.arange(90) / 5.0))[:, None] / 64.0 * [1, -1, 1, -1, 1, -1, 1, -1]
+    )
+    clip = MotionClip(joints=joints, time=np.arange(90) / 32.0, rate=32.0)
+    assert np.isfinite(WalkingPhases(slowest=slowest).judge(clip).value).any() == walks
+
+
 def test_rules_are_chosen_one_by_one() -> None:
     points = moving(striding(phase=0.0))
     assert judged(points, WalkingPhases(rules="1"))[1] == {"rule1.arms", "rule1.legs"}

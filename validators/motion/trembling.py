@@ -98,7 +98,7 @@ def _windows(rough: Array) -> Array:
     half = TREMBLING_FRAMES // 2
     padded = np.pad(np.nan_to_num(rough), ((half, half + 2), (0, 0)))
     windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
-    medians = np.partition(windows, half, axis=-1)[..., half]
+    medians = np.partition(windows, half)[..., half]
     return np.repeat(medians, 3, axis=0)[: len(rough)]
 
 
