@@ -13,7 +13,6 @@ import argparse
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -46,10 +45,8 @@ def main(arguments: list[str] | None = None) -> None:
     frame = spent(lambda: posekit.recover(exact, whole)) / len(exact)
     tracker = posekit.Tracker(settings, camera=noisy.camera, lengths=noisy.lengths, deviation=noisy.deviation)
     calls: dict[str, Callable[[int], object]] = {
-        "exact, one a call": lambda k: posekit.recover(picture(exact, k), whole),
-        f"{asked.pixels:g} px, one a call": lambda k: (
-            posekit.recover(picture(noisy, k), settings).probability
-        ),
+        "exact, one a call": lambda k: posekit.recover(exact.take([k]), whole),
+        f"{asked.pixels:g} px, one a call": lambda k: posekit.recover(noisy.take([k]), settings).probability,
         f"{asked.pixels:g} px, live": lambda k: tracker.update(
             noisy.image[k], noisy.time[k], root=noisy.root[k]
         ),
@@ -77,13 +74,6 @@ def seen(count: int, pixels: float) -> View:
         lengths=figure.lengths,
         deviation=pixels or None,
     )
-
-
-def picture(view: View, k: int) -> View:
-    """Return one picture of a view."""
-    part, none = slice(k, k + 1), np.empty((0,))
-    arrays = {name: getattr(view, name)[part] for name in ("time", "image", "root")}
-    return replace(view, head_image=none, confidence=none, truth=none, **arrays)
 
 
 def spent(call: Callable[[], object]) -> float:

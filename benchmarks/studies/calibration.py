@@ -37,7 +37,6 @@ from posekit.answers import ListedBodies
 from posekit.answers.answer import answers_of
 from posekit.evaluate.scores import reliability
 from posekit.formats.markdown import table_lines
-from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.ranking import Prior, Ranking, RankingEvidence, Up, load_prior, rank, write_prior
 from posekit.ranking.posture_prior import TERM_NAMES
@@ -52,7 +51,6 @@ NOISE_PIXELS: Final = 2.0
 LENGTHS: Final = {"as they are": None, "off by 1 %": 0.01, "off by 5 %": 0.05}
 PERSON_FRAMES, GROUPS = 5, 6
 """Frames of one draw of lengths, and groups of what is held out."""
-PER_FRAME: Final = ("time", "image", "root", "head_image", "truth", "confidence")
 PERFECT_DRAWS: Final = 50
 SIDES_DEGREES, APART_METRES = (10, 100, 190, 280), 0.25
 
@@ -90,7 +88,7 @@ def seen(captures: Sequence[Capture], views: int, lengths: str, seed: int = 101)
             view = replace(view, image=image, deviation=NOISE_PIXELS)
             step = len(scene) if off is None else PERSON_FRAMES
             for start in range(0, len(scene), step):
-                part = _frames(view, slice(start, start + step))
+                part = view.take(slice(start, start + step))
                 if off is not None:
                     factors = np.exp(drawing.normal(0, off) + drawing.normal(0, off, len(SEGMENT_NAMES)))
                     named = dict(zip(SEGMENT_NAMES, factors.tolist(), strict=True))
@@ -113,11 +111,6 @@ def seen(captures: Sequence[Capture], views: int, lengths: str, seed: int = 101)
                             truth=scene.joints_cam[start + k],
                             up=scene.R_cam_world[start + k] @ capture.up,
                         )
-
-
-def _frames(view: View, part: slice) -> View:
-    given = {name: getattr(view, name) for name in PER_FRAME}
-    return replace(view, **{name: values[part] for name, values in given.items() if values is not None})
 
 
 def groups(captures: Sequence[Capture], by: str) -> Held:
