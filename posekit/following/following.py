@@ -105,5 +105,7 @@ class Following(ShortRepr):
         return np.asarray(self.joints[path])
 
     def switches(self, path: int = 0) -> tuple[Switch, ...]:
-        """List where segments of a path change between near and far, and how fast they had to turn for it."""
-        return switches_of(self.time, self.joints[path], perspective=self.scale is None)
+        """List where segments that are seen change between near and far, and how fast they had to turn for it."""
+        return switches_of(
+            self.time, self.joints[path], ~self.interpolated[path], perspective=self.scale is None
+        )

@@ -77,8 +77,8 @@ class Paths:
         return np.asarray(self.survivor < 0)
 
     def switches(self, path: int = 0, *, perspective: bool = True) -> tuple[Switch, ...]:
-        """List where segments of a path change between near and far, and how fast they had to turn for it."""
-        return switches_of(self.time, self.joints[path], perspective=perspective)
+        """List where segments that are seen change between near and far, and how fast they had to turn for it."""
+        return switches_of(self.time, self.joints[path], ~self.interpolated[path], perspective=perspective)
 
 
 def joints_of(frames: Sequence[SurvivorFrame], chosen: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:

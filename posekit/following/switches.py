@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from posekit.following.channels import SEGMENT_ENDS, directions
+from posekit.following.channels import SEGMENT_ENDS, SEGMENT_STARTS, directions
 from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES
 
@@ -66,21 +67,30 @@ def elevations(joints: Array, *, perspective: bool = True) -> Array:
     return np.asarray(np.arcsin(np.clip((unit * ray).sum(axis=-1), -1, 1)))
 
 
-def switches_of(time: Array, joints: Array, *, perspective: bool = True) -> tuple[Switch, ...]:
-    """List the changes of sides along a path (T, 14, 3), frame by frame."""
+def switches_of(
+    time: Array, joints: Array, seen: NDArray[np.bool_], *, perspective: bool = True
+) -> tuple[Switch, ...]:
+    """List the changes of sides along a path (T, 14, 3), frame by frame.
+
+    A segment changes from one frame that shows both its ends to the next that does: `seen` (T, 14) says which do.
+    """
     level = elevations(joints, perspective=perspective)
-    with np.errstate(invalid="ignore"):
-        changed = level[1:] * level[:-1] < 0
+    shown = seen[:, SEGMENT_STARTS] & seen[:, SEGMENT_ENDS]
     found = []
-    for k, segment in zip(*np.nonzero(changed), strict=True):
-        angle = float(abs(level[k, segment]) + abs(level[k + 1, segment]))
-        found.append(
-            Switch(
-                frame=int(k) + 1,
-                segment=SEGMENT_NAMES[segment],
-                far=bool(level[k + 1, segment] > 0),
-                angle=float(np.degrees(angle)),
-                speed=angle / float(time[k + 1] - time[k]),
+    for segment in range(level.shape[1]):
+        frames = np.flatnonzero(shown[:, segment])
+        side = level[frames, segment]
+        with np.errstate(invalid="ignore"):
+            changed = np.flatnonzero(side[1:] * side[:-1] < 0)
+        for k in changed.tolist():
+            angle = float(abs(side[k]) + abs(side[k + 1]))
+            found.append(
+                Switch(
+                    frame=int(frames[k + 1]),
+                    segment=SEGMENT_NAMES[segment],
+                    far=bool(side[k + 1] > 0),
+                    angle=float(np.degrees(angle)),
+                    speed=angle / float(time[frames[k + 1]] - time[frames[k]]),
+                )
             )
-        )
-    return tuple(found)
+    return tuple(sorted(found, key=lambda one: one.frame))

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from posekit.following import Beam, MotionModel, SurvivorFrame, best_paths
 from posekit.following.kalman import MIN_DEVIATION_METRES, START_SPEED, MovingJoints
 from posekit.following.transitions import step_costs
 from posekit.following.trellis import Trellis
+from posekit.skeleton import JOINTS, TREE_SEGMENTS
 
 ALL = Beam(coverage=1.0, survivors=10**6, width=10**4, slack=1e9)
 STANDING = np.array(
@@ -332,6 +334,27 @@ def test_a_limb_passes_through_the_image_plane_where_the_step_can(level):
     assert len(switch) == 1
     assert not switch[0].far
     assert switch[0].angle == pytest.approx(2 * level, abs=3.0)  # its own ray is not the elbow's
+
+
+def test_a_segment_changes_sides_from_one_frame_that_shows_it_to_the_next(rng):
+    hidden = rng.random((60, 1, 14, 1)) < 0.3
+    hidden[:, :, 0], hidden[:, :, 12] = False, True
+    frames = [
+        replace(frame, joints=np.where(one, np.nan, frame.joints))
+        for frame, one in zip(sequence(3, [1] * 60, move=0.3), hidden, strict=True)
+    ]
+    path = best_paths(frames, model=MotionModel(max_speed=np.full(14, np.inf)))
+    expected = []
+    for start, end in TREE_SEGMENTS:
+        taken = [(k, one.joints[0]) for k, one in enumerate(frames) if not path.bridged[0, k]]
+        away = [(k, float((joints[end] - joints[start]) @ joints[end])) for k, joints in taken]
+        shown = [(k, side > 0) for k, side in away if not math.isnan(side)]
+        name = f"{JOINTS[start]}-{JOINTS[end]}"
+        expected += [(k, name, far) for (_, before), (k, far) in itertools.pairwise(shown) if far != before]
+    found = path.switches()
+    assert len(expected) > 10
+    assert sorted(one[:3] for one in found) == sorted(expected)
+    assert [one.frame for one in found] == sorted(one.frame for one in found)
 
 
 def test_what_noise_says_of_a_direction_counts_in_that_direction():
