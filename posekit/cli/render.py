@@ -279,19 +279,13 @@ def _truth_of(
     rejected: bool,
 ) -> Array:
     """Read the truth of a result's frames in the camera's frame."""
-    import numpy as np
-
-    from posekit.cli.true_joints import before_camera, true_joints
+    from posekit.cli.true_joints import before_camera, joints_in_view
     from posekit.formats.own import Result
 
     if not isinstance(content, Result) or rejected:
         raise InputError("--truth: is drawn beside what was recovered; expected a result, without --rejected")
-    times = np.array([one.time for one in content.frames])
-    if view is not None:
-        joints, in_camera = true_joints(path, view, view_path, times)
-        if in_camera:
-            return joints
-    return before_camera(content, path)[0]
+    seen = None if view is None else joints_in_view(path, view, view_path, len(content.frames))
+    return before_camera(content, path)[0] if seen is None else seen
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -69,7 +69,7 @@ def render_angles(
     true = None
     if truth is not None:
         times = np.array([one.time for one in subject.frames])
-        true = true_joints(truth, view, seen[0] if seen else None, times)[0]
+        true = true_joints(truth, view, seen[0] if seen else None, times)
     limits = judged_limits(content)
     say(f"limits: {'as the result was judged' if limits else 'anatomical, the usual ones'}")
     plot = plot_angles(

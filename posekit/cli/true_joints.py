@@ -67,8 +67,8 @@ def before_camera(result: Result, path: Path) -> tuple[Array, str]:
     return turned, f"{axes}; it is seen {told.error:.1f} px beside the postures (median){how}"
 
 
-def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> tuple[Array, bool]:
-    """Read the truth of some frames.
+def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> Array:
+    """Read the truth of some frames (F, 14, 3), metres; NaN where not known.
 
     Parameters
     ----------
@@ -81,31 +81,37 @@ def true_joints(path: Path, view: View | None, view_path: Path | None, times: Ar
     times : array (F,)
         Of the frames, seconds.
 
-    Returns
-    -------
-    joints, in_camera
-        (F, 14, 3) metres, NaN where not known; and whether they are in the camera's frame.
-
     Raises
     ------
     InputError
         Where the file has no truth of these frames.
     """
-    from posekit.formats.format import Content
     from posekit.formats.held_postures import held_postures
+    from posekit.formats.recognising import recognise
+
+    seen = joints_in_view(path, view, view_path, len(times))
+    return _by_second(held_postures(path, recognise(path)), path, times) if seen is None else seen
+
+
+def joints_in_view(path: Path, view: View | None, view_path: Path | None, count: int) -> Array | None:
+    """Read the truth of so many frames in the frame of a view's camera; None where motion is not seen by it.
+
+    The parameters are those of `true_joints`.
+    """
+    from posekit.formats.format import Content
     from posekit.formats.own import OpenCVModel
     from posekit.formats.recognising import recognise
 
     found = recognise(path)
     if found.holds is Content.VIEW:
-        return _of_view(path, len(times)), True
+        return _of_view(path, count)
     placed = view is not None and isinstance(view.camera, OpenCVModel) and view.camera.R is not None
     if placed and view_path is not None and found.holds is Content.MOTION:
         from posekit.views.given_views import given_views
         from posekit.views.source import Source
 
-        return given_views(view_path, Source(), path)[0].view.truth, True
-    return _by_second(held_postures(path, found), path, times), False
+        return given_views(view_path, Source(), path)[0].view.truth
+    return None
 
 
 def _of_view(path: Path, count: int) -> Array:

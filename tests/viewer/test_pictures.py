@@ -15,7 +15,10 @@ import posekit
 from posekit.answers.wording import percent
 from posekit.conversion.chosen_postures import chosen_frames, chosen_postures
 from posekit.errors import InputError, ViewerError
+from posekit.formats.held_postures import HeldPostures, held_postures
 from posekit.formats.own import Postures, Result, View
+from posekit.formats.recognising import Recognised
+from posekit.skeleton import JOINTS
 from posekit.viewer.moving import real_time
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.beside_truth import BESIDE_METRES, beside_truth
@@ -264,6 +267,27 @@ def test_command_draws_truth_beside_and_refuses_what_is_none(
     ):
         capsys.readouterr()
         assert said in refused(monkeypatch, capsys, *words, "-o", tmp_path / "b.png", *small)
+
+
+def test_motion_that_a_view_does_not_place_is_read_once(
+    walk: View,
+    walk_files: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    read: list[Path] = []
+
+    def reading(path: Path, found: Recognised) -> HeldPostures:
+        read.append(path)
+        return held_postures(path, found)
+
+    monkeypatch.setattr("posekit.formats.held_postures.held_postures", reading)
+    (result, view), motion = walk_files, tmp_path / "truth.npz"
+    np.savez(motion, joints=walk.truth, joint_names=JOINTS, time=walk.time)
+    said = refused(monkeypatch, capsys, result, "--view", view, "--truth", motion, "-o", tmp_path / "a.png")
+    assert "the camera's place in the world is not known" in said
+    assert read == [motion]
 
 
 def test_render_refuses(
