@@ -27,7 +27,7 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     # Not a product of matrices: that adds up some rows in another order than others, so that equal rows would differ.
     mixture = (filled * _weights(table.shape[1])).sum(axis=1)
     _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
-    which = which.reshape(-1)
+    which = which.ravel()
     if (filled[one[which]] == filled).all():
         return one, which
     return np.arange(len(table)), np.arange(len(table))

@@ -106,7 +106,7 @@ def choices(leaves: Leaves, check: Check) -> tuple[Indices, Indices]:
     width = int(leaves.frame[-1] - first + 1) << len(support)
     if width > SPARSE_FROM * len(key):
         _, found, inverse = np.unique(key, return_index=True, return_inverse=True)
-        return found.astype(np.int32), inverse.reshape(-1).astype(np.int32)
+        return found.astype(np.int32), inverse.ravel().astype(np.int32)
     table: Indices = np.full(width, -1, dtype=np.int32)
     table[key] = np.arange(len(key), dtype=np.int32)
     asked = np.flatnonzero(table >= 0)

@@ -130,6 +130,21 @@ def test_a_head_is_behind_the_camera_where_it_fits_so_much_better_there(
     assert (behind == (chance < BETTER_BEHIND))[clear].mean() > 0.95
 
 
+def test_a_chance_is_at_most_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    chances: list[Array] = []
+    misfits = estimate.misfits
+
+    def spy(*given: Any) -> Any:
+        found = misfits(*given)
+        chances.append(found[2])
+        return found
+
+    monkeypatch.setattr(estimate, "misfits", spy)
+    image = CAMERA.project(heads(60))
+    solve_pose(TABLE_A2, image + np.random.default_rng(8).normal(size=image.shape), CAMERA)
+    assert chances[0].max() == 1.0 and chances[0].min() > 0.0
+
+
 def test_brackets_stand_at_samples_that_are_no_larger_than_their_neighbours(rng: np.random.Generator) -> None:
     psi = np.tile(np.arange(9.0), (4, 1))
     misfit = rng.integers(0, 3, (4, 9, 5)).astype(float)

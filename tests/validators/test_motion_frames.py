@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from posekit.geometry import Array
-from posekit.skeleton import FEET_POINTS, SIDES
+from posekit.skeleton import FEET_POINTS, JOINTS, SIDES
 from posekit.validators.motion import MotionClip
 from posekit.validators.motion.displaced_body import displaced_by
 from posekit.validators.motion.duplicates import MOVED_METRES, SAME_METRES, duplicates
@@ -140,3 +140,13 @@ def test_a_way_over_a_gap_is_divided_by_its_slots() -> None:
                 expected[end] = 0.0
                 expected[end, 3] = (places[end] - places[start]) / (end - start)
         np.testing.assert_allclose(_over_gaps(joints), expected)
+
+
+@pytest.mark.parametrize("step", [np.nan, 1.0 / 30.0])
+@pytest.mark.parametrize("frame", range(3, 12))
+def test_a_jump_is_found_in_its_frame_wherever_two_frames_are_beside_it(step: float, frame: int) -> None:
+    joints = np.zeros((14, len(JOINTS), 3)) + np.arange(14)[:, None, None] / 64.0
+    joints[frame:, :, 0] += 0.5
+    found = displaced_by(joints, step)
+    assert np.flatnonzero(found > 0).tolist() == [frame]
+    assert found[frame] == pytest.approx(0.5, abs=0.01)

@@ -60,7 +60,7 @@ def sight(head: HeadPoints, image: ArrayLike) -> HeadSighting:
     points[~seen] = 0.0
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     by_pattern = [degeneracy(head.names, head.points, pattern) for pattern in patterns]
-    reasons = [by_pattern[pattern] or "" for pattern in which.reshape(-1)]
+    reasons = [by_pattern[pattern] or "" for pattern in which.ravel()]
     for frame, spread in zip(*_flat(points, seen), strict=True):
         reasons[frame] = reasons[frame] or (
             f"the image points lie on one line or in one point (spread {spread[0]:.3g} by {spread[1]:.3g}): "

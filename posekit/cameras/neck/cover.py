@@ -47,8 +47,8 @@ def cover(intervals: Array, reach: float, most: int) -> tuple[Array, float]:
 
 def meet(a: Array, b: Array) -> Array:
     """Return the intersection (I, 2) of two unions of intervals (A, 2) and (B, 2), ascending and disjoint."""
-    low = np.maximum(a[:, None, 0], b[None, :, 0]).reshape(-1)
-    high = np.minimum(a[:, None, 1], b[None, :, 1]).reshape(-1)
+    low = np.maximum(a[:, None, 0], b[None, :, 0]).ravel()
+    high = np.minimum(a[:, None, 1], b[None, :, 1]).ravel()
     order = np.argsort(low, kind="stable")
     merged: list[list[float]] = []
     for start, end in zip(low[order].tolist(), high[order].tolist(), strict=True):
