@@ -14,7 +14,7 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.camera import meet_sphere
 from posekit.cameras.head import TABLE_A2, HeadWarning, estimate, solve_pose
 from posekit.cameras.head.estimate import BETTER_BEHIND
-from posekit.cameras.head.misfit import spread
+from posekit.cameras.head.misfit import misfits, spread
 from posekit.cameras.head.perspective import Heads
 from posekit.cameras.head.points import HeadPoints
 from posekit.cameras.head.starts import reversed_start
@@ -132,7 +132,6 @@ def test_a_head_is_behind_the_camera_where_it_fits_so_much_better_there(
 
 def test_a_chance_is_at_most_one(monkeypatch: pytest.MonkeyPatch) -> None:
     chances: list[Array] = []
-    misfits = estimate.misfits
 
     def spy(*given: Any) -> Any:
         found = misfits(*given)
