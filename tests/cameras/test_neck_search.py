@@ -11,7 +11,7 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.body import NeckRays, sight
 from posekit.cameras.neck.closure import RigidClosure
-from posekit.cameras.neck.search import NeckDepths, search
+from posekit.cameras.neck.search import NeckDepths, _angles, search
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, SyntheticScene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree
@@ -231,3 +231,18 @@ def test_where_nothing_is_within_the_tolerance_the_best_minimum_is_kept() -> Non
     known = [depths for depths in found if depths.known and len(depths.minima)]
     assert len(known) > 0.9 * len([depths for depths in found if depths.known])
     assert all(depths.residual[0] > 0 and len(depths.minima) == 1 for depths in known)
+
+
+def test_the_grid_stands_at_breaks_and_is_finer_where_there_are_none() -> None:
+    """A break is one between the nearest and the farthest distance."""
+    seen, closure, _ = searched(VIEWS, EXACT)
+    frames = np.flatnonzero(np.isfinite(seen.farthest[:, 0]))
+    upper = seen.farthest[frames, 0]
+    grid, breaks = _angles(closure, frames, upper), closure.breaks(frames)
+    count = breaks.shape[1]
+    for angles, own, far in zip(grid, breaks, upper, strict=True):
+        assert (np.diff(angles) >= 0).all()
+        for k, at in enumerate(own):
+            inside_ = closure.nearest < at < far
+            node = np.arccos(at / far) if inside_ else angles[-1] * (k + 0.5) / count
+            assert np.abs(angles - node).min() < 1e-12

@@ -17,8 +17,8 @@ from posekit.validators.motion.explained import explained
 from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.jumps import jumps_of
 from posekit.validators.motion.lifted import steps_of
-from posekit.validators.motion.order import _length, _shortest, _with_moves
-from posekit.validators.motion.sides import _continuity
+from posekit.validators.motion.order import _length, _shortest, _with_moves, _without_sides
+from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS, _continuity
 from posekit.validators.motion.sliding import FOOT_POINTS
 from posekit.validators.motion.speed import _over_gaps
 from tests.validators.test_ground_laws import moved, standing
@@ -35,6 +35,19 @@ def test_backward_in_time_every_jump_is_as_large(rng: np.random.Generator) -> No
         np.testing.assert_allclose(
             displaced_by(joints[::-1], 1 / 30)[::-1], displaced_by(joints, 1 / 30), atol=1e-12
         )
+
+
+def test_what_joints_say_whichever_is_the_right_one_tells_how_far_apart_they_are(
+    rng: np.random.Generator,
+) -> None:
+    """Neck and pelvis, six middles; then squares of halves of what is between, over their length: half that way."""
+    joints = rng.normal(size=(8, len(JOINTS), 3))
+    found = _without_sides(joints)
+    np.testing.assert_allclose(found, _without_sides(swapped(joints)), atol=1e-12)
+    right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
+    np.testing.assert_array_equal(found[:, 2:8], (right + left) / 2.0)
+    np.testing.assert_allclose(found[:, 8:14].sum(axis=-1), np.linalg.norm(right - left, axis=-1) / 2.0)
+    assert found.shape == (8, 20, 3)
 
 
 def test_no_move_of_one_frame_makes_an_order_shorter(rng: np.random.Generator) -> None:

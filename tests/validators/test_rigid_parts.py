@@ -116,6 +116,14 @@ def test_the_side_tells_a_mirror_image_within_any_tolerance_that_is_less_than_it
     assert not side(BEHIND, points * [-1, 1, 1], tolerance=tolerance + 1e-12).violated.any()
 
 
+@pytest.mark.parametrize("figure", [FIGURE, BEHIND])
+def test_the_side_is_told_by_how_far_shoulders_are_on_it(figure: Figure) -> None:
+    for sign in (1.0, -1.0):
+        points = postures(5) * [sign * np.sign(OFFSET * figure.shoulder_offset), 1.0, 1.0]
+        value = side(figure, points, tolerance=0.001).value
+        np.testing.assert_allclose(value, sign * abs(figure.shoulder_offset), atol=1e-9)
+
+
 def test_a_side_that_the_tolerance_covers_is_undecided() -> None:
     for sign in (1, -1):
         assert side(FIGURE, postures(5) * [sign, 1, 1], tolerance=2 * OFFSET + 1e-9).undecided.all()
