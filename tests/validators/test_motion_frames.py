@@ -11,6 +11,7 @@ import pytest
 from posekit.geometry import Array
 from posekit.skeleton import FEET_POINTS, JOINTS, SIDES
 from posekit.validators.motion import MotionClip
+from posekit.validators.motion.balance_still import BalanceStill
 from posekit.validators.motion.displaced_body import displaced_by
 from posekit.validators.motion.duplicates import MOVED_METRES, SAME_METRES, duplicates
 from posekit.validators.motion.explained import explained
@@ -163,3 +164,13 @@ def test_a_jump_is_found_in_its_frame_wherever_two_frames_are_beside_it(step: fl
     found = displaced_by(joints, step)
     assert np.flatnonzero(found > 0).tolist() == [frame]
     assert found[frame] == pytest.approx(0.5, abs=0.01)
+
+
+def test_who_stands_still_for_exactly_so_long_stands() -> None:
+    """In times that are exact: still, then away at eight metres a second."""
+    clip = standing(64, rate=32.0)
+    joints = np.repeat(clip.joints[:1], 64, axis=0)
+    joints[40:] += 0.25 * np.arange(24)[:, None, None] * np.eye(3)[0]
+    clip = replace(clip, joints=joints)
+    standing_ = [n for n in range(30, 50) if BalanceStill(lasting=n / 32.0)._stands(clip).any()]
+    assert standing_ and not BalanceStill(lasting=np.nextafter(standing_[-1] / 32.0, 2.0))._stands(clip).any()

@@ -12,7 +12,7 @@ from posekit.body import load_figure
 from posekit.body.measured import MeasuredPerson
 from posekit.validators import Validator
 from posekit.validators.projected_angles import projected_plane
-from posekit.validators.robot.balance import _plane, inside_hull
+from posekit.validators.robot.balance import _plane, convex_hull, inside_hull
 from posekit.validators.robot.robot_validator import RobotValidator
 
 FIGURE = load_figure()
@@ -30,6 +30,14 @@ def test_a_place_is_as_far_inside_a_hull_as_its_nearest_side(count: int, rng: np
     assert inside_hull(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([1.3, 1.4])) == (
         pytest.approx(-0.5)
     )
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_points_on_an_edge_are_no_corners_of_a_hull(count: int) -> None:
+    corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+    shares = np.arange(1, count + 1)[:, None] / 4.0
+    between = [a + shares * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    np.testing.assert_array_equal(convex_hull(np.concatenate([corners, *between, [[1.0, 2.0]]])), corners)
 
 
 def test_a_plane_across_up_is_a_right_handed_pair(rng: np.random.Generator) -> None:

@@ -291,3 +291,11 @@ def test_a_share_is_of_the_widest_that_a_volume_could_be_but_of_a_thousandth_of_
         assert each.share == pytest.approx((high - low) / (2 * widest), abs=1e-9)
         assert each.share < 0.999
     assert floors
+
+
+@pytest.mark.parametrize(("name", "most"), [("ur5", 2), ("panda", 1)])
+def test_intervals_are_of_points_with_few_joints_between(known, name, most):
+    """At most three for a distance, two for a volume; of the second arm volumes over one alone are narrow enough."""
+    _, _, limits = known(name)
+    assert max(len(each.joints) for each in limits.distances) == 3
+    assert max(len(each.joints) for each in limits.volumes) == most
