@@ -79,7 +79,6 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     depth = along[..., None] + np.stack([-half, half], axis=-1)
     excess = height - length
     reachable = excess <= np.maximum(tolerance, 0.0)
-    reachable |= tangent & (excess <= 0.0)
     valid = reachable[..., None] & (depth > 0.0)
     valid[..., 1] &= ~tangent
     points = origin[..., None, :] + depth[..., None] * direction[..., None, :]

@@ -70,7 +70,7 @@ def lift(
                 tangent = half <= COINCIDENT_METRES
                 if tangent:
                     half = 0.0
-                reachable = excess <= widest or (tangent and excess <= 0.0)
+                reachable = excess <= widest
                 near, far = along - half, along + half
                 near_valid = reachable and near > 0.0
                 far_valid = reachable and far > 0.0 and not tangent

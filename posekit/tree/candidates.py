@@ -176,7 +176,7 @@ def _meet(ray: Array, start: Array, length: Array | float, tolerance: float) -> 
     depth = np.empty((*along.shape, 2))
     np.subtract(along, half, out=depth[..., 0])
     np.add(along, half, out=depth[..., 1])
-    reachable = (excess <= max(tolerance, 0.0)) | (tangent & (excess <= 0.0))
+    reachable = excess <= max(tolerance, 0.0)
     valid = depth > 0.0
     valid[..., 0] &= reachable
     valid[..., 1] &= reachable & ~tangent
