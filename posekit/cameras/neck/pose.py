@@ -126,7 +126,7 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     first = affine_start(heads.points, plane, seen, known=True)
     depth = size / first.scale
     sigma = np.hypot(deviation[number], offset * (K[:, 0, 0] / depth)[:, None])
-    weights = np.where(seen, 1.0 / np.maximum(sigma, MIN_DEVIATION_PIXELS), 0.0)
+    weights = 1.0 / np.maximum(sigma, MIN_DEVIATION_PIXELS)
     starts = _starts(heads.points, plane - weight[:, None] @ plane, first)
     fits = [_fit(heads, weights, start) for start in starts]
     # Seen nearly face on, a flat part has its minima side by side, and all of these may lead to the same one.
