@@ -256,3 +256,19 @@ def test_the_nearer_the_pelvis_to_the_hips_the_less_is_known_of_how_it_leans() -
     assert between_the_hips.spread == pytest.approx(
         np.hypot(45.0, ANATOMY.motions["hip.flexion"].zero.spread)
     )
+
+
+def test_hips_that_lie_elsewhere_move_what_the_pelvis_is_measured_by_alone() -> None:
+    """By the part that the pelvis joint's place has in the variance, beside ten degrees of how somebody stands."""
+    forward, outward = 14.0, 3.0
+    found = ANATOMY.with_hips(forward, outward)
+    by_pelvis = {angle for angle, one in ANATOMY.motions.items() if one.pelvis}
+    assert 0 < len(by_pelvis) < len(ANATOMY.motions) - 1
+    for angle, one in ANATOMY.motions.items():
+        variance = one.zero.spread**2 + np.degrees(np.arctan(one.pelvis / 0.1)) ** 2
+        moved = (
+            variance / (variance + 10.0**2) * (forward - abs(one.zero.mean)) * np.copysign(1.0, one.zero.mean)
+        )
+        expected = {angle: 0.0} | ({angle: moved} if angle in by_pelvis else {}) | {"hip.abduction": -outward}
+        assert found.motions[angle].moved == pytest.approx(expected[angle])
+        assert replace(found.motions[angle], moved=one.moved) == one

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
-from posekit.robots import load_robot
+from posekit.robots import Robot, load_robot
 from posekit.robots.joint_map import postures_of
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
@@ -275,6 +275,23 @@ def test_the_second_solution_of_three_hinges_places_all_alike(name: str, balls: 
             np.testing.assert_allclose(data.oMi[joint].homogeneous, other.oMi[joint].homogeneous, atol=1e-8)
         changed += not np.allclose(a, b)
     assert changed == 20
+
+
+@pytest.mark.parametrize(
+    ("hinges", "balls"), [(2, []), (3, [(0, 1, 2)]), (4, [(0, 1, 2)]), (6, [(0, 1, 2), (3, 4, 5)])]
+)
+def test_a_hinge_is_of_one_ball_alone(hinges: int, balls: list[tuple[int, int, int]]) -> None:
+    """Hinges through one point about x, y, x, y and so on: any three that follow each other have a second solution."""
+    links = "".join(f'<link name="l{k}"/>' for k in range(hinges + 1))
+    joints = "".join(
+        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        f'<axis xyz="{1 - k % 2} {k % 2} 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for k in range(hinges)
+    )
+    robot = Robot(urdf=f'<robot name="wrist">{links}{joints}</robot>', free_flyer=False)
+    found = Branches(subject=Subject(model=robot.model, lower=robot.lower, upper=robot.upper)).balls
+    at = {int(robot.model.idx_qs[k + 1]): k for k in range(hinges)}
+    assert [tuple(at[index] for index in (one.first, one.middle, one.last)) for one in found] == balls
 
 
 def test_a_configuration_inside_its_limits_stays() -> None:
