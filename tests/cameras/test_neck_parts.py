@@ -419,3 +419,14 @@ def test_offsets_are_allowed_for_beside_deviations() -> None:
     image[:, JOINT["left_hip"]] = np.nan
     fewer = allowances(VIEWS.camera, FIGURE, checked(image=image, deviation=0.0, offset=offset))
     np.testing.assert_allclose(fewer.tangent, 4 * 0.03 / np.sqrt(5))
+
+
+def test_of_a_view_of_nothing_no_deviation_is_allowed_for() -> None:
+    image = VIEWS.image.copy()
+    image[3] = np.nan
+    found = allowances(VIEWS.camera, FIGURE, checked(image=image, deviation=3.0, offset=0.0))
+    assert (found.tangent[3], found.rigid[3]) == (1e-9, 1e-8) and (np.delete(found.rigid, 3) > 0.01).all()
+    image[4, [JOINT["neck"], JOINT["pelvis"]]] = np.nan
+    hidden = allowances(VIEWS.camera, FIGURE, checked(image=image, deviation=3.0, offset=0.02))
+    seen = np.isfinite(image[4, RIGID_JOINTS, 0]).sum()
+    assert hidden.tangent[4] == pytest.approx(4 * 0.02) and seen == 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.validators.motion.carried import FEWEST_FRAMES, carried, falls
@@ -11,7 +12,7 @@ from posekit.validators.motion.carried import FEWEST_FRAMES, carried, falls
 STEP = 1.0 / 32.0
 
 
-def stretches(*parts: tuple[str, float, int]) -> tuple[Array, Array, Array]:
+def stretches(*parts: tuple[str, float, int]) -> tuple[NDArray[np.bool_], Array, Array]:
     """Return who rests, and heights of the lowest point and the centre: rests at heights, flights and lifts to them."""
     resting: list[bool] = []
     height: list[float] = []

@@ -219,3 +219,18 @@ def test_rules_of_curation_pass_who_stands_and_reject_who_lies_low() -> None:
     low = replace(clip, joints=clip.joints * np.array([1, 1, 0.5]))
     names = {one.check for one in judge_motion(checks, low).judgements if one.violated.any()}
     assert names == {"root_height"}
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_on_a_foot_whose_heel_is_known_the_ankle_is_none(side: str) -> None:
+    """On its toes, the other foot lifted: what is lowest is the ankle itself, not the heel that would be below it."""
+    clip = standing(60, toes=False)
+    joints = clip.joints.copy()
+    joints[:, JOINT[other_side(f"{side}_ankle")], 2] += 0.3
+    ankle = joints[:, JOINT[f"{side}_ankle"]]
+    feet = np.full((60, len(FEET_POINTS), 3), np.nan)
+    unknown = ground_of(replace(clip, joints=joints)).lowest
+    feet[:, FEET_POINTS.index(f"{side}_heel")] = ankle + 0.05 * UP
+    known = ground_of(replace(clip, joints=joints, feet=feet))
+    np.testing.assert_allclose(known.low + known.lowest, ankle[:, 2], atol=1e-9)
+    assert (unknown + ground_of(replace(clip, joints=joints)).low < ankle[:, 2] - 0.02).all()

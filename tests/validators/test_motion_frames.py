@@ -19,7 +19,7 @@ from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.jumps import jumps_of
 from posekit.validators.motion.lifted import steps_of
 from posekit.validators.motion.order import _length, _shortest, _with_moves, _without_sides
-from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS, _continuity
+from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS, _continuity, _evidence
 from posekit.validators.motion.sliding import FOOT_POINTS
 from posekit.validators.motion.speed import _over_gaps
 from tests.validators.test_ground_laws import moved, standing
@@ -174,3 +174,26 @@ def test_who_stands_still_for_exactly_so_long_stands() -> None:
     clip = replace(clip, joints=joints)
     standing_ = [n for n in range(30, 50) if BalanceStill(lasting=n / 32.0)._stands(clip).any()]
     assert standing_ and not BalanceStill(lasting=np.nextafter(standing_[-1] / 32.0, 2.0))._stands(clip).any()
+
+
+def test_what_a_frame_says_of_its_sides_it_says_alone(rng: np.random.Generator) -> None:
+    """Of hips and shoulders; toes before or behind ankles and a nose before or behind ears say it, too."""
+    joints = WALK.joints[::9]
+    across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
+    ankles = joints[:, [JOINTS.index(f"{side}_ankle") for side in SIDES]]
+    feet = ankles + 0.1 * rng.normal(size=ankles.shape)
+    feet[1, 0], feet[2] = np.nan, np.nan
+    head = joints[:, :1] + 0.1 * rng.normal(size=(len(joints), 5, 3))
+    _, hips, shoulders = _evidence(joints, across, feet, head, 0.0)
+    for frame in range(len(joints)):
+        own = slice(frame, frame + 1)
+        _, hips_alone, shoulders_alone = _evidence(joints[own], across[own], feet[own], head[own], 0.0)
+        np.testing.assert_allclose(hips[own], hips_alone)
+        np.testing.assert_allclose(shoulders[own], shoulders_alone)
+    unseen = np.full_like(feet, np.nan)
+    assert not np.allclose(hips, _evidence(joints, across, unseen, head, 0.0)[1])
+    turned = [np.r_[RIGHT_JOINTS, LEFT_JOINTS], np.r_[LEFT_JOINTS, RIGHT_JOINTS]]
+    other = joints.copy()
+    other[:, turned[0]] = joints[:, turned[1]]
+    mirrored = _evidence(other, -across, feet[:, ::-1], head, 0.0)
+    np.testing.assert_allclose(mirrored[1], -hips, atol=1e-12)
