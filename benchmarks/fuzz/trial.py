@@ -142,6 +142,8 @@ def tried(case: Case, seeds: Path, folder: Path) -> Outcome:
         shutil.copytree(seeds / top, folder / top)
     if case.name:
         (folder / case.name).write_bytes(case.data)
+    if case.kind == "options":  # an odd value may name a whole file as the one to be written
+        seeds = shutil.copytree(seeds, folder / "seeds", copy_function=os.link)
     arguments = placed(case.arguments, folder / top, folder / "out", seeds)
     before = {path.name for path in folder.iterdir()}
     here = Path.cwd()

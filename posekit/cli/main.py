@@ -113,6 +113,17 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     when_compiling(_tell_of_compiling if on_terminal() else None)
     try:
+        sys.exit(_run())
+    except (typer.Abort, KeyboardInterrupt):
+        code = _fail("interrupted", INTERRUPTED_CODE)
+    except Ended as ended:
+        code = _fail(str(ended), ended.code)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """Run the command, say its error, and return the exit code; a signal ends that, too, and is the caller's."""
+    try:
         take_signals()
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
@@ -126,10 +137,6 @@ def main() -> None:
         code = _fail(_misused(error, arguments[0]))
     except ClickError as error:
         code = _fail(error.format_message())
-    except (typer.Abort, KeyboardInterrupt):
-        code = _fail("interrupted", INTERRUPTED_CODE)
-    except Ended as ended:
-        code = _fail(str(ended), ended.code)
     except BrokenPipeError:
         # What is still to be written has no reader: it goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -151,7 +158,7 @@ def main() -> None:
     except OSError as error:
         place = f"{error.filename}: " if error.filename is not None else ""
         code = _fail(f"{place}{error.strerror or error}; expected a file or folder that can be used")
-    sys.exit(code if isinstance(code, int) else 0)
+    return code if isinstance(code, int) else 0
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:

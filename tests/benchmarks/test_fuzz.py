@@ -58,6 +58,17 @@ def test_a_find_of_before_is_clean(seeds: Path, tmp_path: Path, kept: Path) -> N
     assert found.clean, found
 
 
+def test_whole_files_stay_whole_where_an_option_names_one_to_be_written(seeds: Path, tmp_path: Path) -> None:
+    before = whole(seeds, "photo.json")
+    found = tried(
+        Case("options", ["synth", "walker", "-o", "SEEDS/photo.json", "--frames", "1"]),
+        seeds,
+        tmp_path / "case",
+    )
+    assert found.what == "accepted", found
+    assert whole(seeds, "photo.json") == before
+
+
 def test_options_are_those_of_the_command() -> None:
     cases = [option_case(random.Random(seed)) for seed in range(300)]
     given = {word for case in cases for word in case.arguments if word.startswith("--") and len(word) > 2}

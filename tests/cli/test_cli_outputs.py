@@ -201,6 +201,28 @@ main()
     assert (ended.returncode, ended.stderr) == (130, "posekit: error: interrupted\n")
 
 
+@pytest.mark.parametrize(
+    ("signal", "code", "says"), [("SIGTERM", 143, "ended from outside"), ("SIGINT", 130, "interrupted")]
+)
+def test_a_signal_that_comes_while_an_error_is_said_is_one_line(signal: str, code: int, says: str) -> None:
+    program = f"""
+import os, signal, sys, typer
+from posekit.cli.main import main
+echo = typer.echo
+def ended(*given, **named):
+    typer.echo = echo
+    os.kill(os.getpid(), signal.{signal})
+typer.echo = ended
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["posekit", "inspect", "nothing.json"]
+main()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (code, f"posekit: error: {says}\n")
+
+
 def test_what_a_signal_leaves_half_made_is_not_complained_of() -> None:
     program = """
 import os, signal
