@@ -10,6 +10,7 @@ import pytest
 from posekit.skeleton import PARENTS
 from posekit.tree import Leaves, enumerate_leaves
 from posekit.tree.factors import factor_postures
+from posekit.tree.screening import screened
 from tests.annotated import watched
 from tests.tree import test_tree_fast as scenes
 
@@ -59,3 +60,19 @@ def test_enumerated_leaves_are_what_annotations_say() -> None:
             tolerance=1e-9,
         )
     assert wrong == set()
+
+
+def test_screens_give_what_is_to_be_confirmed_where_it_is_asked_for() -> None:
+    points = scenes.postures(2, 40, beyond=1.0)
+    rules = [(check.rule, check.points) for check in scenes.checks() if check.rule and check.rule.presumed]
+    kinds, of = [rule for rule, _ in rules], [each for _, each in rules]
+    with watched("posekit.tree") as wrong:
+        places, nothing = screened(kinds, of, points)
+        again, presumed = screened(kinds, of, points, presuming=True)
+        none, _ = screened(kinds, of, points[:0])
+    assert wrong == set()
+    np.testing.assert_array_equal(places, again)
+    assert (
+        nothing.size == 0 and presumed.shape == ((places >= 0).sum(), kinds[0].presumed) and len(presumed) > 0
+    )
+    assert none.shape == (0, len(kinds))
