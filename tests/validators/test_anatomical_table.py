@@ -272,3 +272,7 @@ def test_hips_that_lie_elsewhere_move_what_the_pelvis_is_measured_by_alone() -> 
         expected = {angle: 0.0} | ({angle: moved} if angle in by_pelvis else {}) | {"hip.abduction": -outward}
         assert found.motions[angle].moved == pytest.approx(expected[angle])
         assert replace(found.motions[angle], moved=one.moved) == one
+    # On a body whose pelvis has its place nothing is left that could be elsewhere.
+    told = ANATOMY.on_pelvis(0.1)
+    moved_ = {angle for angle, one in told.with_hips(forward, outward).motions.items() if one.moved}
+    assert moved_ == {"hip.abduction"} and any(told.motions[angle].zero.spread > 0 for angle in by_pelvis)

@@ -18,7 +18,10 @@ POINTS = np.concatenate([VIEWS.joints_cam, VIEWS.head_cam], axis=1)
 
 @pytest.mark.parametrize("name", NAMED_TABLES)
 def test_ranges(name: str) -> None:
-    assert repr(ranges._named.__wrapped__(name)) == repr(load_ranges(name))
+    anew = ranges._named.__wrapped__(name)
+    assert repr(anew) == repr(load_ranges(name))
+    kinds = {"table1": "rotation", "table1-printed": "projected", "anatomical": "configuration"}
+    assert (anew.name, anew.kind) == (name, kinds[name])
 
 
 @pytest.mark.parametrize("name", profile.BUILT_IN_PROFILES)
