@@ -6,10 +6,10 @@ trunk as a whole has six points for nine unknowns, and one or two places only wh
 first, by least squares, and their own image points put in place of the noisy ones: then the tree's rigid parts come
 out right to rounding, and limbs start from where they are most likely to start.
 
-Far away, a flat body and its image in a mirror at right angles to the ray look alike: with the mirror S of the ray
-and M of the body's own plane, S R M is the rotation of the second minimum if R is that of the first. Torso and hips
-are flat, or nearly, so from one minimum there are three more starts; what the near and far choices give themselves is
-only needed to find the first.
+Every near and far choice is followed to its minimum: where lengths vary, shoulders that are turned by themselves may
+fit as well as the whole torso in a mirror. Far away, a flat body and its image in a mirror at right angles to the ray
+look alike: with the mirror S of the ray and M of the body's own plane, S R M is the rotation of the second minimum if R
+is that of the first. Torso and hips are flat, or nearly, so the best minimum gives three more starts.
 """
 
 from __future__ import annotations
@@ -49,14 +49,17 @@ SEARCHED_DEVIATIONS = 2.0
 MAX_DEPTH_STEPS = 3
 """Depths tried on either side of where the root is most likely."""
 
-N_CHOICES_FOLLOWED = 2
-"""Near and far choices that are followed to their minima, the likeliest first."""
+EARLY_STEPS = 4
+"""Steps of every choice, before those that came near each other go on as one."""
+
+EARLY_METRES = 0.03
+"""Metres: choices none of whose joints are farther apart then go to the same minimum."""
 
 MAX_STEPS = 12
 """Steps of each search for a trunk: what it finds is a start, refined again with its limbs."""
 
 MAX_STEPS_IN_DOUBT = 40
-"""The same where all choices are followed, since none of the likeliest led to a trunk that the noise can explain."""
+"""The same where none led to a trunk that the noise can explain."""
 
 SAME_TRUNK_METRES = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
@@ -164,12 +167,11 @@ def find_trunks(
     in_front = isinstance(observed.camera, ScaledOrthographicCamera) | (observed.root.mean[:, 2] > 0)
     known = np.flatnonzero(np.isfinite(observed.root.mean).all(axis=1) & in_front)
     one = observed.problem(known, observed.root.mean[known]).trunk_alone()
-    found, least = _followed(observed, known, one, (N_CHOICES_FOLLOWED, MAX_STEPS), level, within)
+    found, least = _followed(observed, known, one, MAX_STEPS, level, within)
     doubtful = np.flatnonzero(np.isin(known, found.frame, invert=True) & (least < PROMISING_CHI2))
     if not len(doubtful):
         return found
-    every = N_CHOICES, MAX_STEPS_IN_DOUBT
-    again, _ = _followed(observed, known[doubtful], one.take(doubtful), every, level, within)
+    again, _ = _followed(observed, known[doubtful], one.take(doubtful), MAX_STEPS_IN_DOUBT, level, within)
     return found.joined(again)
 
 
@@ -177,15 +179,11 @@ def _followed(
     observed: ObservedFrames,
     known: NDArray[np.intp],
     one: RefinementProblem,
-    effort: tuple[int, int],
+    steps: int,
     level: float,
     within: float,
 ) -> tuple[Trunks, Array]:
-    """Follow the likeliest choices of frames (F,) and mirror images of the best: trunks, and each frame's least chi2.
-
-    The `effort` is how many choices, and with how many steps.
-    """
-    choices, steps = effort
+    """Follow every choice of frames (F,), and mirror images of the best: trunks, and each frame's least chi2."""
     factors, many = _depth_factors(observed, known), len(known) * N_CHOICES
     starts, chi2 = [], []
     # Depths together, as long as they are few postures.
@@ -196,18 +194,13 @@ def _followed(
         chi2.append(value.reshape(len(part), many))
     every = PostureState(*(np.concatenate(arrays, axis=-1) for arrays in zip(*starts, strict=True)))
     tried = np.concatenate(chi2)
-    # Of each near and far choice the depth that fits best, then the choices that fit best.
-    depth = np.argmin(tried, axis=0)
-    best_of = np.min(tried, axis=0).reshape(len(known), N_CHOICES)
-    order = np.argsort(best_of, axis=1, kind="stable")[:, :choices]
-    chosen = (np.arange(len(known))[:, None] * N_CHOICES + order).reshape(-1)
-    which = np.repeat(np.arange(len(known)), order.shape[1])
-    begin = every.take(depth[chosen] * many + chosen)
+    depth = np.argmin(tried, axis=0)  # of each choice the one that fits best
+    which = np.repeat(np.arange(len(known)), N_CHOICES)
+    early = descend(one.take(which), every.take(depth * many + np.arange(many)), steps=EARLY_STEPS)
+    apart = _distinct(which, early.chi2, _joints(early.state), EARLY_METRES)
+    which, begin = which[apart], early.state.take(apart)
     first = descend(one.take(which), begin, steps=steps)
-    best = (
-        np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
-        + np.arange(len(known)) * order.shape[1]
-    )
+    best = np.lexsort((first.chi2, which))[np.searchsorted(which, np.arange(len(known)))]
     turned = _reflections(first.state.take(best), one.optics.perspective)
     if one.anatomy.middle_pelvis:
         turned = turned._replace(hips=turned_by_spine(turned.torso, turned.hips))
@@ -223,15 +216,25 @@ def _followed(
     dof = degrees_of_freedom(one)[row] + active
     finite = np.isfinite(value)
     p = np.where(finite, chi2_survival(np.where(finite, value, 0.0), dof), 0.0)
-    joints = (state.root + trunk_offsets(state)).transpose(2, 0, 1)
+    joints = _joints(state)
     keep = np.flatnonzero(p >= level)
-    keep = keep[np.lexsort((value[keep], known[row[keep]]))]
-    leader = groups_of(known[row[keep]], joints[keep], within)
-    keep = keep[leader == np.arange(len(keep))]
+    keep = keep[_distinct(row[keep], value[keep], joints[keep], within)]
     least = np.full(len(known), np.inf)
     np.minimum.at(least, row, np.where(finite, value, np.inf))
     found = _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
     return found, least
+
+
+def _joints(state: PostureState) -> Array:
+    """Return the joints of trunks (N, 6, 3)."""
+    return np.asarray((state.root + trunk_offsets(state)).transpose(2, 0, 1))
+
+
+def _distinct(frame: NDArray[np.intp], chi2: Array, joints: Array, within: float) -> NDArray[np.intp]:
+    """Return the rows of trunks of which no likelier one of their frame is near, by frame, the likeliest first."""
+    order = np.lexsort((chi2, frame))
+    leader = groups_of(frame[order], joints[order], within)
+    return order[leader == np.arange(len(order))]
 
 
 def _started(observed: ObservedFrames, one: RefinementProblem, factors: Array) -> tuple[PostureState, Array]:

@@ -13,6 +13,7 @@ from posekit.errors import InputError
 from posekit.recovery import recover
 from posekit.refinement import ObservedFrames, RootPrior, find_trunks, refine
 from posekit.refinement.size import size_of
+from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import SEGMENT_NAMES
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.views.builtin import view_of
@@ -163,7 +164,12 @@ def test_uncertainties_are_fractions_of_segments() -> None:
         assert tuple(one.own) == SEGMENT_NAMES
         assert (np.linalg.eigvalsh(one.covariance) > 0).all()
     assert LengthUncertainty().exact
-    assert LengthUncertainty.uniform(0.03).total("neck-pelvis") == pytest.approx(0.03 * np.sqrt(2))
+    assert LengthUncertainty.uniform(0.03).total("right_hip-right_knee") == pytest.approx(0.03 * np.sqrt(2))
+    assert LengthUncertainty.uniform(0.0).exact
+    for said in (1e-4, 0.01, 0.05, MAX_LENGTH_DEVIATION):
+        own = LengthUncertainty.uniform(said).own
+        assert min(own.values()) == said and max(own.values()) <= min(3 * said, MAX_LENGTH_DEVIATION)
+        assert own["right_shoulder-pelvis"] == min(np.hypot(said, min(0.02, 2 * said)), MAX_LENGTH_DEVIATION)
     with pytest.raises(InputError, match="'shin' is not a segment"):
         LengthUncertainty(own={"shin": 0.1})
     for wrong in (-0.1, 0.4, float("nan")):

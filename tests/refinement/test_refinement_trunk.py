@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import posekit.refinement.trunks as searching
 from posekit.body import Figure, load_figure
 from posekit.body.uncertainty import STATED_LENGTHS
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
@@ -103,6 +104,20 @@ def test_a_mirrored_trunk_is_kept_where_noise_cannot_tell() -> None:
     assert (counts >= 1).all() and (counts > 1).any()
     # With less noise there is less that it can explain.
     assert len(found(0.5)) <= len(found(2.0))
+
+
+@pytest.mark.parametrize("off", [0.0, 0.01, 0.05])
+def test_no_trunk_is_missed_that_following_each_choice_by_itself_to_its_end_finds(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sight = replace(sight_of(2.0), length_deviation=off)
+    ours = find_trunks(sight)
+    monkeypatch.setattr(searching, "EARLY_METRES", 0.0)
+    monkeypatch.setattr(searching, "MAX_STEPS", 40)
+    every = find_trunks(sight)
+    apart = np.linalg.norm(every.joints[:, None] - ours.joints, axis=-1).max(axis=-1)
+    apart[every.frame[:, None] != ours.frame] = np.inf
+    assert (apart.min(axis=1) < 0.05).mean() > 0.97
 
 
 def test_points_that_were_not_seen_stay_unseen() -> None:
