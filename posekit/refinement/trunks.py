@@ -49,20 +49,11 @@ SEARCHED_DEVIATIONS = 2.0
 MAX_DEPTH_STEPS = 3
 """Depths tried on either side of where the root is most likely."""
 
-EARLY_STEPS = 4
-"""Steps of every choice, before those that came near each other go on as one."""
+EARLY_STEPS, MAX_STEPS = 4, 40
+"""Steps of every choice, before those that came near each other go on as one; and of each search then."""
 
-EARLY_METRES = 0.03
-"""Metres: choices none of whose joints are farther apart then go to the same minimum."""
-
-MAX_STEPS = 12
-"""Steps of each search for a trunk: what it finds is a start, refined again with its limbs."""
-
-MAX_STEPS_IN_DOUBT = 40
-"""The same where none led to a trunk that the noise can explain."""
-
-SAME_TRUNK_METRES = 0.01
-"""Metres: trunks none of whose joints are farther apart are one."""
+SAME_TRUNK_METRES = 0.03
+"""Metres: trunks none of whose joints are farther apart are one: what is found is a start, refined with its limbs."""
 
 LIFT_ROUNDING_METRES = 1e-5
 """Metres by which a trunk may be lifted otherwise than it was found: rounding, tangent to a ray."""
@@ -97,13 +88,6 @@ class Trunks:
     def __len__(self) -> int:
         """Count the trunks."""
         return len(self.frame)
-
-    def joined(self, others: Trunks) -> Trunks:
-        """Put in those of other frames."""
-        order = np.argsort(np.concatenate([self.frame, others.frame]), kind="stable")
-        names = ("frame", "joints", "image", "chi2", "dof", "p")
-        both = {name: np.concatenate([getattr(self, name), getattr(others, name)])[order] for name in names}
-        return Trunks(**both)
 
     @property
     def root(self) -> Array:
@@ -167,23 +151,6 @@ def find_trunks(
     in_front = isinstance(observed.camera, ScaledOrthographicCamera) | (observed.root.mean[:, 2] > 0)
     known = np.flatnonzero(np.isfinite(observed.root.mean).all(axis=1) & in_front)
     one = observed.problem(known, observed.root.mean[known]).trunk_alone()
-    found, least = _followed(observed, known, one, MAX_STEPS, level, within)
-    doubtful = np.flatnonzero(np.isin(known, found.frame, invert=True) & (least < PROMISING_CHI2))
-    if not len(doubtful):
-        return found
-    again, _ = _followed(observed, known[doubtful], one.take(doubtful), MAX_STEPS_IN_DOUBT, level, within)
-    return found.joined(again)
-
-
-def _followed(
-    observed: ObservedFrames,
-    known: NDArray[np.intp],
-    one: RefinementProblem,
-    steps: int,
-    level: float,
-    within: float,
-) -> tuple[Trunks, Array]:
-    """Follow every choice of frames (F,), and mirror images of the best: trunks, and each frame's least chi2."""
     factors, many = _depth_factors(observed, known), len(known) * N_CHOICES
     starts, chi2 = [], []
     # Depths together, as long as they are few postures.
@@ -197,15 +164,15 @@ def _followed(
     depth = np.argmin(tried, axis=0)  # of each choice the one that fits best
     which = np.repeat(np.arange(len(known)), N_CHOICES)
     early = descend(one.take(which), every.take(depth * many + np.arange(many)), steps=EARLY_STEPS)
-    apart = _distinct(which, early.chi2, _joints(early.state), EARLY_METRES)
+    apart = _distinct(which, early.chi2, _joints(early.state), within)
     which, begin = which[apart], early.state.take(apart)
-    first = descend(one.take(which), begin, steps=steps)
+    first = descend(one.take(which), begin, steps=MAX_STEPS)
     best = np.lexsort((first.chi2, which))[np.searchsorted(which, np.arange(len(known)))]
     turned = _reflections(first.state.take(best), one.optics.perspective)
     if one.anatomy.middle_pelvis:
         turned = turned._replace(hips=turned_by_spine(turned.torso, turned.hips))
     again = np.tile(np.arange(len(known)), 3)
-    second = descend(one.take(again), turned, steps=steps, hopeless=PROMISING_CHI2)
+    second = descend(one.take(again), turned, steps=MAX_STEPS, hopeless=PROMISING_CHI2)
     state = PostureState(
         *(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True))
     )
@@ -219,10 +186,7 @@ def _followed(
     joints = _joints(state)
     keep = np.flatnonzero(p >= level)
     keep = keep[_distinct(row[keep], value[keep], joints[keep], within)]
-    least = np.full(len(known), np.inf)
-    np.minimum.at(least, row, np.where(finite, value, np.inf))
-    found = _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
-    return found, least
+    return _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
 
 
 def _joints(state: PostureState) -> Array:
@@ -234,7 +198,7 @@ def _distinct(frame: NDArray[np.intp], chi2: Array, joints: Array, within: float
     """Return the rows of trunks of which no likelier one of their frame is near, by frame, the likeliest first."""
     order = np.lexsort((chi2, frame))
     leader = groups_of(frame[order], joints[order], within)
-    return order[leader == np.arange(len(order))]
+    return np.asarray(order[leader == np.arange(len(order))])
 
 
 def _started(observed: ObservedFrames, one: RefinementProblem, factors: Array) -> tuple[PostureState, Array]:
