@@ -28,6 +28,7 @@ from posekit.body.uncertainty import MEASURED_LENGTHS
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.recovery.noise import Noise
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.refiner import Refiner
 from posekit.recovery.result import result_of
 from posekit.refinement import (
@@ -44,7 +45,6 @@ from posekit.settings import MEASURED_TOLERANCE, RIGID_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
-from posekit.validation import recovered_with
 from posekit.validators import PHYSICAL_CHECKS, Validator, load_ranges, make_checks
 from posekit.views.builtin import view_of
 

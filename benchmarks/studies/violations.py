@@ -34,10 +34,10 @@ from posekit.formats.own import Postures
 from posekit.formats.own.report import columns_of
 from posekit.formats.own.report_columns import VerdictColumns
 from posekit.geometry import Array
+from posekit.recovery.recovered import recovered_with
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Capture, SyntheticScene
-from posekit.validation import recovered_with
 from posekit.views.builtin import view_of
 
 BEYOND_DEGREES = (10.0, 30.0)
