@@ -34,7 +34,8 @@ MOST_HIDDEN_MEASURED = 20_000
 """The same where points were measured, and survivors that are as good as one share what is inferred."""
 
 WORTH_ASKING = 64
-"""Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
+"""Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first: where points
+are called noisy any number is."""
 
 SPINE_SEGMENTS = tuple(
     segment for segment in RIGID_SEGMENTS if JOINT["pelvis"] in segment and min(segment) > 0
@@ -137,17 +138,22 @@ class Grower(ShortRepr):
         """Return those of some hypotheses that may be exact: of frames whose torso closes to rounding, or may.
 
         A torso that does not close in any branch, as those of measured points do not, is evidence enough: nothing is
-        left then of which `is_exact` could be true, and the tree need not be grown to see it. Many frames are only
-        asked where some are found not to close.
+        left then of which `is_exact` could be true, and the tree need not be grown to see it. Of points that nobody
+        calls noisy few frames are not asked, and many only where some are found not to close.
         """
         if not self.body.evidence:
             return chosen[:0]
-        if not isinstance(self.body, FigureBody) or len(chosen) < WORTH_ASKING:
+        noisy = self.view.deviation is not None
+        if not isinstance(self.body, FigureBody) or not (noisy or len(chosen) >= WORTH_ASKING):
             return chosen
-        if self._closed(chosen[:: len(chosen) // (WORTH_ASKING // 2)]).all():
+        some = chosen[:: max(len(chosen) // (WORTH_ASKING // 2), 1)]
+        closed = self._closed(some)
+        if closed.all():
             return chosen
+        if len(some) < len(chosen):
+            closed = self._closed(chosen)
         frame = self.fit.frame[chosen]
-        return chosen[np.isin(frame, frame[self._closed(chosen)])]
+        return chosen[np.isin(frame, frame[closed])]
 
     def _closed(self, chosen: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Say of which hypotheses (H,) some branch closes the torso exactly, or does not show it."""

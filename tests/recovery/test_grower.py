@@ -76,6 +76,24 @@ def test_frames_whose_torso_does_not_close_are_grown_once(monkeypatch: pytest.Mo
     assert grown[:2] == [FRAMES - FRAMES // 3, FRAMES // 3]
 
 
+@pytest.mark.filterwarnings("ignore:frames.*root is:UserWarning")
+def test_a_frame_that_is_called_noisy_is_grown_as_exact_only_if_its_torso_closes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    grown: list[int] = []
+    grow = Grower.grow
+
+    def counted(self: Grower, chosen: Any, *how: Any) -> Any:
+        grown.append(len(chosen))
+        return grow(self, chosen, *how)
+
+    monkeypatch.setattr(Grower, "grow", counted)
+    for noisy, judged in ((slice(0, 0), "exact"), (slice(None), "refined")):
+        view = replace(mixed(noisy), deviation=1.0).take([4])
+        assert [frame.judged for frame in recover(view).frames] == [judged]
+        assert len(grown) == 1
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_heads_in_blocks_are_placed_as_all_at_once(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     generator = np.random.default_rng(3)
