@@ -13,8 +13,8 @@ from posekit.geometry import Array
 def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Find rows (N, K) that are equal to the last bit.
 
-    Rows are told apart by one number each, a fixed mixture of their entries, and then compared: should different rows
-    ever share that number, all rows are taken for different.
+    Rows are told apart by one number each, a fixed mixture of their entries, and then compared. Rows that differ by the
+    last bit alone, as where both ends of a segment are tangent to a ray, may share that number: then they are sorted.
 
     Returns
     -------
@@ -27,10 +27,9 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     # Not a product of matrices: that adds up some rows in another order than others, so that equal rows would differ.
     mixture = (filled * _weights(table.shape[1])).sum(axis=1)
     _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
-    which = which.ravel()
-    if (filled[one[which]] == filled).all():
-        return one, which
-    return np.arange(len(table)), np.arange(len(table))
+    if not (filled[one[which.ravel()]] == filled).all():
+        _, one, which = np.unique(filled, axis=0, return_index=True, return_inverse=True)
+    return one, which.ravel()
 
 
 def equal_pairs(left: NDArray[np.intp], right: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -49,5 +48,5 @@ def _weights(count: int) -> Array:
     return np.random.default_rng(0).standard_normal(count)
 
 
-NAN_SUBSTITUTE = 1e9
-"""Stands for NaN, which equals nothing."""
+NAN_SUBSTITUTE = -4321.0
+"""Stands for NaN, which equals nothing: no joint is there, and mixtures keep their digits."""

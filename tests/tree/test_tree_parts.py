@@ -101,6 +101,18 @@ def test_rows_are_the_same_to_the_last_bit(rows: list[list[float]]) -> None:
     np.testing.assert_array_equal(table[one[which]], table)
 
 
+def test_rows_that_differ_by_the_last_bit_alone_are_told_apart_and_no_others() -> None:
+    rng = np.random.default_rng(4)
+    rows = rng.standard_normal((200, 18))
+    beside = rows.copy()
+    beside[:, 7] = np.nextafter(beside[:, 7], np.inf)
+    kinds = np.concatenate([rows, beside])
+    table = np.repeat(kinds, 3, axis=0)
+    one, which = distinct(table)
+    assert len(one) == len(kinds)
+    np.testing.assert_array_equal(table[one[which]], table)
+
+
 # --- candidates -----------------------------------------------------------------------------------------
 
 
