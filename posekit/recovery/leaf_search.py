@@ -117,9 +117,7 @@ class _LeafSearch:
             kept=listed,
             unlisted=whole & ~listed,
             share=share,
-            survivors=RefinedSurvivors.of(
-                merged.take(np.flatnonzero(listed[rows])), self.known[self.row], share[self.row]
-            ),
+            survivors=RefinedSurvivors.of(merged.take(np.flatnonzero(listed[rows])), self.known[self.row]),
             made_of=(FactoredLeaves.of(self.begun, self.frame, self.legal),),
         )
 

@@ -252,14 +252,6 @@ class FrameRecovery(Pictured):
         return None if self.refined is None else self.refined.chi2
 
     @property
-    def listed_probability(self) -> Array | None:
-        """The probability that each survivor (N,) was listed by; None where joints were open, or none was refined."""
-        refined = self.refined
-        if refined is None or not np.isfinite(refined.joints).all():
-            return None
-        return np.asarray(refined.share / refined.share.sum())
-
-    @property
     def spread(self) -> float:
         """How far off survivors are, metres: from the noise where it is known, else from what was tolerated."""
         if self.batch is not None and self.batch.refined is not None:
@@ -443,10 +435,7 @@ class Recovery(Pictured):
 
     @cached_property
     def probability(self) -> list[Array]:
-        """The probability of the survivors of each frame: what they were listed by, where all joints were known."""
-        told = [known for frame in self.frames if (known := frame.listed_probability) is not None]
-        if len(told) == len(self.frames):
-            return told
+        """The probability of the survivors of each frame."""
         return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])
 
     @cached_property

@@ -15,7 +15,7 @@ from posekit.refinement import Merged, Refined
 
 ALL_ROWS = slice(None)
 
-SURVIVOR_ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged", "share", "size", "size_deviation")
+SURVIVOR_ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged", "size", "size_deviation")
 
 
 class Covariances:
@@ -86,8 +86,6 @@ class RefinedSurvivors(ShortRepr):
         The probability that noise alone gives a chi2 as large.
     merged : int array (N,)
         How many other leaves became the same posture.
-    share : array (N,)
-        What share of its frame's probability each has, those included that are not listed.
     size, size_deviation : array (N,)
         By what factor each body is larger than its figure, and the standard deviation of the logarithm of that, beside
         what the covariance has of it.
@@ -103,7 +101,6 @@ class RefinedSurvivors(ShortRepr):
     dof: NDArray[np.intp]
     p: Array
     merged: NDArray[np.intp]
-    share: Array
     size: Array
     size_deviation: Array
     covariances: Covariances
@@ -123,8 +120,8 @@ class RefinedSurvivors(ShortRepr):
         return len(self.joints)
 
     @staticmethod
-    def of(merged: Merged, known: NDArray[np.bool_], share: Array) -> RefinedSurvivors:
-        """Take what was merged, with the `share` of each leaf; joints that are not `known` (of all) become NaN."""
+    def of(merged: Merged, known: NDArray[np.bool_]) -> RefinedSurvivors:
+        """Take what was merged; joints that are not `known` (of all leaves) become NaN."""
         order = np.argsort(merged.rows)
         unknown = ~known[merged.rows[order]]
         chosen = merged.refined.select(order)
@@ -138,7 +135,6 @@ class RefinedSurvivors(ShortRepr):
             dof=chosen.dof.copy(),
             p=chosen.p.copy(),
             merged=count - 1,
-            share=share[merged.rows[order]],
             size=np.ones(len(order)) if chosen.size is None else chosen.size.factor.copy(),
             size_deviation=np.zeros(len(order)) if chosen.size is None else chosen.size.deviation.copy(),
             covariances=Covariances(chosen, unknown),

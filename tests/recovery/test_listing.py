@@ -92,14 +92,6 @@ def brute(score: NDArray[np.float64], coverage: float) -> int:
     return int(np.searchsorted(np.cumsum(p) / p.sum(), coverage - 1e-12) + 1)
 
 
-def test_what_bodies_are_listed_by_is_what_they_are_ranked_with(both: tuple[Recovery, Recovery]) -> None:
-    for recovery in both:
-        assert any(frame.listed_probability is not None and len(frame) > 1 for frame in recovery.frames)
-        np.testing.assert_allclose(
-            np.concatenate(recovery.probability), recovery.ranking.probability, rtol=1e-9, atol=1e-15
-        )
-
-
 @pytest.mark.parametrize("coverage", [0.5, 0.9, 0.999])
 def test_the_fewest_that_hold_the_share_are_chosen(coverage: float) -> None:
     rng = np.random.default_rng(2)
