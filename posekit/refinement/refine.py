@@ -19,7 +19,7 @@ from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY, Refined
 from posekit.refinement.shared_search import SearchResult, SharedSearch
 from posekit.refinement.size import BodySize, size_of
-from posekit.refinement.state import head_points, place, place_limbs, trunk_offsets
+from posekit.refinement.state import head_points, place, place_limbs, trunk_joints
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import HEAD_POINTS, JOINTS, LIMB_JOINTS
 from posekit.tree.factors import Factors, factor_postures, whole_bodies
@@ -173,10 +173,7 @@ class BegunRefinement:
     @cached_property
     def trunks(self) -> Array:
         """The trunks (T, 6, 3), each refined by itself, camera frame, metres."""
-        state = self.search.bases.found.state
-        return np.asarray(
-            (state.root + trunk_offsets(state)).transpose(2, 0, 1) * self._factor[:, None, None]
-        )
+        return trunk_joints(self.search.bases.found.state) * self._factor[:, None, None]
 
     @cached_property
     def limbs(self) -> tuple[Array, ...]:

@@ -96,6 +96,11 @@ def trunk_offsets(state: PostureState) -> Array:
     return out
 
 
+def trunk_joints(state: PostureState) -> Array:
+    """Place torso and hips (N, 6, 3), camera frame, metres."""
+    return np.asarray((state.root + trunk_offsets(state)).transpose(2, 0, 1))
+
+
 def place(state: PostureState, offsets: Array | None = None) -> Array:
     """Place all joints (14, 3, N), camera frame, metres."""
     out = np.empty((14, 3, state.root.shape[1]))

@@ -33,7 +33,7 @@ from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import BLOCK_POSTURES, RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.start import state_of
-from posekit.refinement.state import PostureState, trunk_offsets, turned_by_spine
+from posekit.refinement.state import PostureState, trunk_joints, turned_by_spine
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 
@@ -164,7 +164,7 @@ def find_trunks(
     depth = np.argmin(tried, axis=0)  # of each choice the one that fits best
     which = np.repeat(np.arange(len(known)), N_CHOICES)
     early = descend(one.take(which), every.take(depth * many + np.arange(many)), steps=EARLY_STEPS)
-    apart = _distinct(which, early.chi2, _joints(early.state), within)
+    apart = _distinct(which, early.chi2, trunk_joints(early.state), within)
     which, begin = which[apart], early.state.take(apart)
     first = descend(one.take(which), begin, steps=MAX_STEPS)
     best = np.lexsort((first.chi2, which))[np.searchsorted(which, np.arange(len(known)))]
@@ -183,15 +183,10 @@ def find_trunks(
     dof = degrees_of_freedom(one)[row] + active
     finite = np.isfinite(value)
     p = np.where(finite, chi2_survival(np.where(finite, value, 0.0), dof), 0.0)
-    joints = _joints(state)
+    joints = trunk_joints(state)
     keep = np.flatnonzero(p >= level)
     keep = keep[_distinct(row[keep], value[keep], joints[keep], within)]
     return _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
-
-
-def _joints(state: PostureState) -> Array:
-    """Return the joints of trunks (N, 6, 3)."""
-    return np.asarray((state.root + trunk_offsets(state)).transpose(2, 0, 1))
 
 
 def _distinct(frame: NDArray[np.intp], chi2: Array, joints: Array, within: float) -> NDArray[np.intp]:
