@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from posekit.body import load_figure
+from posekit.body import load_figure, with_head
 from posekit.body.anthropometry import lengths_from_postures
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
@@ -78,10 +78,9 @@ def sequence_of(
     if isinstance(held, Motion):
         return _of_motion(one_clip(held), load_skeleton_map(skeleton) if skeleton else None)
     known, given = ("", held) if isinstance(held, Postures) else (held.up, held.postures)
-    head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
-    points = np.concatenate([given.joints, head], axis=1)
+    points = given.joints if given.head is None else np.concatenate([given.joints, given.head], axis=1)
     up = up or known or guessed_up(given.joints, source)
-    return _recorded(points, np.arange(len(points)) / ASSUMED_RATE, up)
+    return _recorded(with_head(points), np.arange(len(points)) / ASSUMED_RATE, up)
 
 
 def _of_truth(view: View, source: str, stated: str) -> PostureSequence:
@@ -90,7 +89,7 @@ def _of_truth(view: View, source: str, stated: str) -> PostureSequence:
         raise InputError(
             f"{source}: a view without truth: pictures do not move in space; expected a result; recover it first"
         )
-    points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
+    points = with_head(view.truth[known])
     up = stated or CAMERA_UP
     if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
         points = in_world(points, view.camera)

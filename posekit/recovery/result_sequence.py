@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.answers.wording import percent, words_of_paths
-from posekit.body import Figure
+from posekit.body import Figure, with_head
 from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.following import bridge
@@ -199,7 +199,7 @@ def sequence_of_result(
     if not rows:
         raise InputError("result: no frame has a posture, and nothing is to be converted; recover it again")
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
-    points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
+    points = with_head(joints)
     says = (
         [f"{len(lost)} of {plural(len(result.frames), 'frame')} without a posture are left out"]
         if lost
@@ -252,7 +252,7 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     time, place = _evenly(np.array([result.frames[k].time for k in known.tolist()]))
     filled = np.full((len(time), len(JOINTS), 3), np.nan)
     filled[place] = joints[known]
-    points = np.concatenate([bridge(time, filled), np.full((len(time), 5, 3), np.nan)], axis=1)
+    points = with_head(bridge(time, filled))
     survivor = np.full(len(time), -1, dtype=np.intp)
     survivor[place] = paths.survivor[0, known]
     interpolated = np.full(len(time), float(len(JOINTS)))

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
-from posekit.body import Figure
+from posekit.body import Figure, with_head
 from posekit.geometry import Array
 from posekit.linkages import Linkage
 from posekit.recovery.body import ranges_of
@@ -16,7 +14,6 @@ from posekit.recovery.taylor_figure.completion import COMPLETED_FROM, Completion
 from posekit.recovery.taylor_figure.human import Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
 from posekit.settings import RecoverSettings, Tolerance
-from posekit.skeleton import HEAD
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import collision, judge
 
@@ -65,8 +62,7 @@ class TaylorBody:
 
     def points(self, leaves: Leaves) -> Array:
         """Complete neck and pelvis; the head is not known."""
-        joints = self._completion.complete(leaves.postures())
-        return np.concatenate([joints, np.full((len(joints), len(HEAD), 3), np.nan)], axis=1)
+        return with_head(self._completion.complete(leaves.postures()))
 
     def checks(self, settings: RecoverSettings, tolerance: Tolerance) -> Sequence[Check]:
         """Make the checks that hold the middles, and the figure's on the completed joints."""
