@@ -281,10 +281,13 @@ def _truth_of(
     """Read the truth of a result's frames in the camera's frame."""
     from posekit.cli.true_joints import before_camera, joints_in_view
     from posekit.formats.own import Result
+    from posekit.formats.recognising import recognise
 
     if not isinstance(content, Result) or rejected:
         raise InputError("--truth: is drawn beside what was recovered; expected a result, without --rejected")
-    seen = None if view is None else joints_in_view(path, view, view_path, len(content.frames))
+    seen = None
+    if view is not None:
+        seen = joints_in_view(path, recognise(path), view, view_path, len(content.frames))
     return before_camera(content, path)[0] if seen is None else seen
 
 

@@ -12,6 +12,7 @@ from posekit.skeleton import JOINTS
 if TYPE_CHECKING:
     from posekit.formats.held import HeldPostures
     from posekit.formats.own import Result, View
+    from posekit.formats.recognising import Recognised
     from posekit.geometry import Array
 
 
@@ -89,20 +90,21 @@ def true_joints(path: Path, view: View | None, view_path: Path | None, times: Ar
     from posekit.formats.held_postures import held_postures
     from posekit.formats.recognising import recognise
 
-    seen = joints_in_view(path, view, view_path, len(times))
-    return _by_second(held_postures(path, recognise(path)), path, times) if seen is None else seen
+    found = recognise(path)
+    seen = joints_in_view(path, found, view, view_path, len(times))
+    return _by_second(held_postures(path, found), path, times) if seen is None else seen
 
 
-def joints_in_view(path: Path, view: View | None, view_path: Path | None, count: int) -> Array | None:
+def joints_in_view(
+    path: Path, found: Recognised, view: View | None, view_path: Path | None, count: int
+) -> Array | None:
     """Read the truth of so many frames in the frame of a view's camera; None where motion is not seen by it.
 
-    The parameters are those of `true_joints`.
+    The parameters are those of `true_joints`, and what the file was found to be.
     """
     from posekit.formats.format import Content
     from posekit.formats.own import OpenCVModel
-    from posekit.formats.recognising import recognise
 
-    found = recognise(path)
     if found.holds is Content.VIEW:
         return _of_view(path, count)
     placed = view is not None and isinstance(view.camera, OpenCVModel) and view.camera.R is not None
