@@ -18,7 +18,6 @@ from posekit.skeleton import SEGMENT_NAMES
 NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 """What a bending spine and moving clavicles change in one person."""
 
-
 TRUNK_BENDS: Final = {"neck-pelvis": 0.012, "right_shoulder-pelvis": 0.02, "left_shoulder-pelvis": 0.02}
 """Relative deviations by which a bending spine and moving clavicles change one person's trunk.
 
@@ -86,11 +85,10 @@ class LengthUncertainty:
         The trunk bends beside that by `TRUNK_BENDS`, but by no more than twice the deviation: exact lengths are those
         of a stiff body.
         """
-        bends = {name: min(bend, 2.0 * deviation) for name, bend in TRUNK_BENDS.items()}
-        own = {name: math.hypot(deviation, bends.get(name, 0.0)) for name in SEGMENT_NAMES}
-        return LengthUncertainty(
-            common=deviation, own={n: min(v, MAX_LENGTH_DEVIATION) for n, v in own.items()}
-        )
+        own = dict.fromkeys(SEGMENT_NAMES, deviation)
+        for name, bend in TRUNK_BENDS.items():
+            own[name] = min(math.hypot(deviation, min(bend, 2.0 * deviation)), MAX_LENGTH_DEVIATION)
+        return LengthUncertainty(common=deviation, own=own)
 
     def widened(self, times: float) -> LengthUncertainty:
         """Return the same with deviations that are so many times as large, as far as they are taken for one."""

@@ -32,6 +32,20 @@ def mixed(noisy: slice) -> View:
     return replace(view, image=image, root=view.truth[:, 0], head_image=head, length_deviation=0.0)
 
 
+@pytest.fixture
+def grown(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many hypotheses each tree was grown of."""
+    counts: list[int] = []
+    grow = Grower.grow
+
+    def counted(self: Grower, chosen: Any, *how: Any) -> Any:
+        counts.append(len(chosen))
+        return grow(self, chosen, *how)
+
+    monkeypatch.setattr(Grower, "grow", counted)
+    return counts
+
+
 def said(view: View, **options: Any) -> list[tuple[Any, ...]]:
     """All that distinguishes the frames of two recoveries."""
     return [
@@ -63,31 +77,13 @@ def test_torsos_that_are_asked_first_change_nothing(
 
 
 @pytest.mark.filterwarnings("ignore:frames.*root is:UserWarning")
-def test_frames_whose_torso_does_not_close_are_grown_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    grown: list[int] = []
-    grow = Grower.grow
-
-    def counted(self: Grower, chosen: Any, *how: Any) -> Any:
-        grown.append(len(chosen))
-        return grow(self, chosen, *how)
-
-    monkeypatch.setattr(Grower, "grow", counted)
+def test_frames_whose_torso_does_not_close_are_grown_once(grown: list[int]) -> None:
     recover(mixed(slice(0, None, 3)), checks=("rigid-parts",))
     assert grown[:2] == [FRAMES - FRAMES // 3, FRAMES // 3]
 
 
 @pytest.mark.filterwarnings("ignore:frames.*root is:UserWarning")
-def test_a_frame_that_is_called_noisy_is_grown_as_exact_only_if_its_torso_closes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    grown: list[int] = []
-    grow = Grower.grow
-
-    def counted(self: Grower, chosen: Any, *how: Any) -> Any:
-        grown.append(len(chosen))
-        return grow(self, chosen, *how)
-
-    monkeypatch.setattr(Grower, "grow", counted)
+def test_a_frame_that_is_called_noisy_is_grown_as_exact_only_if_its_torso_closes(grown: list[int]) -> None:
     for noisy, judged in ((slice(0, 0), "exact"), (slice(None), "refined")):
         view = replace(mixed(noisy), deviation=1.0).take([4])
         assert [frame.judged for frame in recover(view).frames] == [judged]
