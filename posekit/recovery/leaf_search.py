@@ -83,7 +83,7 @@ class _LeafSearch:
         self.begun, self.frame, self.known = begun, frame, known
         self.checks, self.listing = checks, listing
         self.p, self.group = begun.promised_p.copy(), np.unique(frame, return_inverse=True)[1].reshape(-1)
-        self.row, self.refined = np.arange(0), replace(begun.finish(np.arange(0)), frame=np.arange(0))
+        self.rows, self.parts = [np.arange(0)], list[Refined]()
         self.explained, self.done = (np.zeros(count, dtype=np.bool_) for _ in range(2))
         self.contradicted: list[Contradiction] = []
         self.legal = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
@@ -97,8 +97,9 @@ class _LeafSearch:
         while len(chosen := self._waiting(most)):
             self._refine(chosen)
             most *= 2
-        merged = merge(self.refined)
-        rows = self.row[merged.rows]
+        row, refined = self._tellers()
+        merged = merge(refined)
+        rows = row[merged.rows]
         score = self.listing.score(merged.refined.joints, merged.refined.chi2, self.frame[rows])
         share = np.zeros(len(self.frame))
         share[rows] = softmax(score, self.group[rows])
@@ -108,7 +109,7 @@ class _LeafSearch:
         listed = whole if self.listing.all else likeliest(share, self.group, spare)
         legal = np.flatnonzero(self.legal)
         number = np.full(int(self.valley.max(initial=-1)) + 1, -1)
-        number[self.valley[self.row]] = merged.group
+        number[self.valley[row]] = merged.group
         merged = replace(merged, group=number[self.valley[legal]])
         return LeafOutcomes(
             p=self.p,
@@ -117,14 +118,14 @@ class _LeafSearch:
             kept=listed,
             unlisted=whole & ~listed,
             share=share,
-            survivors=RefinedSurvivors.of(merged.take(np.flatnonzero(listed[rows])), self.known[self.row]),
+            survivors=RefinedSurvivors.of(merged.take(np.flatnonzero(listed[rows])), self.known[row]),
             made_of=(FactoredLeaves.of(self.begun, self.frame, self.legal),),
         )
 
     def _waiting(self, most: int) -> NDArray[np.intp]:
         """Return the next leaves of each valley that none tells yet, no more than `most` of each."""
         told = np.zeros(len(self.frame), dtype=np.bool_)
-        told[self.valley[self.row]] = True
+        told[self.valley[np.concatenate(self.rows)]] = True
         rows = self.order[(self.legal & ~self.done & ~told[self.valley])[self.order]]
         first = np.diff(self.valley[rows], prepend=-1) > 0
         place = np.arange(len(rows)) - np.flatnonzero(first)[np.cumsum(first) - 1]
@@ -147,10 +148,17 @@ class _LeafSearch:
         tells = np.zeros(len(self.frame), dtype=np.bool_)
         tells[passed[np.diff(self.valley[passed], prepend=-1) > 0]] = True
         own = tells[chosen]
-        row = np.concatenate([self.row, chosen[own]])
-        joined = Refined.joined([self.refined, part.select(own)], self.begun.search.problem.take(row))
+        self.rows.append(chosen[own])
+        self.parts.append(part.select(own))
+
+    def _tellers(self) -> tuple[NDArray[np.intp], Refined]:
+        """Return the leaves that tell of a valley each, in their order, refined as whole bodies."""
+        row = np.concatenate(self.rows)
+        if not len(row):
+            return row, replace(self.begun.finish(row), frame=self.frame[row])
         order = np.argsort(row)
-        self.row, self.refined = row[order], joined.select(order)
+        joined = Refined.joined(self.parts, self.begun.search.problem.take(row))
+        return row[order], joined.select(order)
 
 
 def blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:
