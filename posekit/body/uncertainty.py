@@ -18,11 +18,11 @@ from posekit.skeleton import SEGMENT_NAMES
 NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 """What a bending spine and moving clavicles change in one person."""
 
-TRUNK_BENDS: Final = {"neck-pelvis": 0.012, "right_shoulder-pelvis": 0.02, "left_shoulder-pelvis": 0.02}
+TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "left_shoulder-pelvis": 0.027}
 """Relative deviations by which a bending spine and moving clavicles change one person's trunk.
 
-Against each clip's medians 0.2 % from neck to pelvis in CMU's motion (16 clips) and 1.7 % in DeepMimic's (20), 0.9 and
-2.7 % from shoulders to pelvis; both sources together 1.2 and 2.0 %.
+What DeepMimic's motion, whose spine bends, has against each clip's medians (20 clips). In CMU's (16) it hardly does: 0.2 %
+from neck to pelvis, 0.9 % from shoulders to pelvis.
 """
 
 
@@ -82,12 +82,12 @@ class LengthUncertainty:
     def uniform(deviation: float) -> LengthUncertainty:
         """Say of a body that its size, and each length beside it, are off by the same relative deviation.
 
-        The trunk bends beside that by `TRUNK_BENDS`, but by no more than twice the deviation: exact lengths are those
+        The trunk bends beside that by `TRUNK_BENDS`, but by no more than thrice the deviation: exact lengths are those
         of a stiff body.
         """
         own = dict.fromkeys(SEGMENT_NAMES, deviation)
         for name, bend in TRUNK_BENDS.items():
-            own[name] = min(math.hypot(deviation, min(bend, 2.0 * deviation)), MAX_LENGTH_DEVIATION)
+            own[name] = min(math.hypot(deviation, min(bend, 3.0 * deviation)), MAX_LENGTH_DEVIATION)
         return LengthUncertainty(common=deviation, own=own)
 
     def widened(self, times: float) -> LengthUncertainty:
