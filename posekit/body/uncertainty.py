@@ -21,8 +21,8 @@ NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "left_shoulder-pelvis": 0.027}
 """Relative deviations by which a bending spine and moving clavicles change one person's trunk.
 
-What DeepMimic's motion, whose spine bends, has against each clip's medians (20 clips). In CMU's (16) it hardly does: 0.2 %
-from neck to pelvis, 0.9 % from shoulders to pelvis.
+What DeepMimic's motion, whose spine bends, has against each clip's medians (20 clips). In CMU's (16) it hardly does:
+0.2 % from neck to pelvis, 0.9 % from shoulders to pelvis.
 """
 
 

@@ -297,6 +297,21 @@ def test_what_takes_longer_than_a_sixth_of_a_second_is_never_displaced_as_a_whol
     assert np.nanmax(found, initial=0.0) < 1.0 - 5.0 * (count / 30.0) ** 2 - 0.05
 
 
+@pytest.mark.parametrize(("rate", "beside"), [(30.0, (-3, 3)), (60.0, (-6, 6))])
+def test_a_lesser_displacement_beside_another_comes_of_it_and_one_farther_off_does_not(
+    rate: float, beside: tuple[int, int]
+) -> None:
+    """Beside is what the velocities of a fifteenth of a second, and a thirtieth more, reach: both ways, to the slot."""
+    slots, first, last = np.arange(200), *beside
+    for off in (first - 1, first, last, last + 1):
+        for lesser in (0.5, 0.8):
+            way = 1.0 * (slots > 100) + lesser * (slots > 100 + off)
+            found = displaced_by(along(way), 1.0 / rate)
+            alone = np.flatnonzero(np.isfinite(found)).tolist() == sorted([101, 101 + off])
+            assert alone is (lesser > 0.75 or not first <= off <= last), (off, lesser)
+            assert found[101] == pytest.approx(1.0 - 5.0 / rate**2, abs=1e-9)
+
+
 def test_without_a_rate_only_what_is_displaced_at_once_is_found() -> None:
     way = 0.3 * (np.arange(40) > 20)
     found = displaced_by(along(way), np.nan)

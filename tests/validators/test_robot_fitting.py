@@ -14,6 +14,7 @@ from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
 from posekit.validators import Report, Validator
 from posekit.validators.robot.branches import Branches
+from posekit.validators.robot.fitting import ROUND_DEVIATIONS, Fitter
 from posekit.validators.robot.subject import Subject
 
 FIGURE = load_figure()
@@ -97,6 +98,25 @@ def test_a_limit_that_is_broken_is_named_with_its_value(joint: str, angle: float
     lower, upper = np.degrees(robot.lower[k]), np.degrees(robot.upper[k])
     assert margin == pytest.approx(min(value - lower, upper - value))
     assert report.worst[0] == pytest.approx(margin)
+
+
+def test_each_round_starts_as_far_around_as_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What no limited fit reaches is tried from the free fit, once, and then around the best, farther and nearer."""
+    starts: list[str | float] = []
+    inside, around = Fitter._inside, Fitter._from_around
+
+    def from_around(self: Fitter, targets: np.ndarray, q: np.ndarray, start: int) -> np.ndarray:
+        starts.append(ROUND_DEVIATIONS[start])
+        return around(self, targets, q, start)
+
+    def from_free(self: Fitter, targets: np.ndarray, start: np.ndarray, steps: int = 0) -> np.ndarray:
+        starts.extend([] if steps else ["free"])
+        return inside(self, targets, start, *([steps] if steps else []))
+
+    monkeypatch.setattr(Fitter, "_from_around", from_around)
+    monkeypatch.setattr(Fitter, "_inside", from_free)
+    validator("human").check(bent("human", right_elbow_Z=160.0))
+    assert starts == ["free", *ROUND_DEVIATIONS]
 
 
 @pytest.mark.parametrize("angle", [-0.05, -0.2, -0.4])

@@ -299,3 +299,18 @@ def test_intervals_are_of_points_with_few_joints_between(known, name, most):
     _, _, limits = known(name)
     assert max(len(each.joints) for each in limits.distances) == 3
     assert max(len(each.joints) for each in limits.volumes) == most
+
+
+def test_joints_that_hardly_turn_are_bounded_over_few_joints_all_the_same():
+    """Three for a distance, two for a volume: over more, sums of intervals would be narrow, and many."""
+    text = '<link name="l0"/>'
+    for k, axis in enumerate(["1 0 0", "0 1 0", "0 0 1", "0.6 0.8 0", "0 -0.6 0.8", "1 0 0"], 1):
+        text += (
+            f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
+            f'<origin xyz="0.{k} 0.3 -0.2" rpy="0.{k} 0.2 0"/><axis xyz="{axis}"/>'
+            '<limit lower="-0.02" upper="0.02" effort="1" velocity="1"/></joint>'
+        )
+    robot = Robot(urdf=f'<robot name="stiff">{text}</robot>', name="stiff", with_geometry=False)
+    limits = RobotLimits(robot=robot, names=tuple(f"j{k}" for k in range(1, 7)))
+    assert {len(each.joints) for each in limits.distances} == {1, 2, 3}
+    assert max(len(each.joints) for each in limits.volumes) == 2
