@@ -206,7 +206,7 @@ def test_lengths_are_allowed_what_bodies_are_or_what_is_said(lengths: float) -> 
     noise = Noise(deviation=2.0, lengths=LengthUncertainty.uniform(lengths))
     allowed = certified_within(noise, FIGURE)
     assert allowed.angle == 6.0
-    bends = min(0.02, 2 * lengths)
+    bends = min(0.027, 3 * lengths)
     most = np.sqrt(2 * lengths**2 + bends**2) * max(FIGURE.lengths.values())
     assert allowed.rigid == pytest.approx(max(0.03, 3 * most))
     assert certified_within(Noise(deviation=2.0), FIGURE).rigid == 0.03
