@@ -55,8 +55,8 @@ def answer_lines(answers: Sequence[Answer]) -> list[str]:
         ]
     others = _nothing_else([answers[k] for k in found])
     if max(count) > 1:
-        held, middle = _held([answers[k] for k in found]), float(np.median(count))
-        some = "1 distinct posture holds" if middle == 1 else f"{middle:g} distinct postures hold"
+        held, middle = _held([answers[k] for k in found]), sorted(count)[len(count) // 2]
+        some = "1 distinct posture holds" if middle == 1 else f"{middle} distinct postures hold"
         others = f"{some} {held} in the median frame, {max(count)} in frame {most}"
     return [
         f"likeliest: {percent(float(np.median(sure)))} sure in the median frame, to 5 cm in {_joints(answers)}; "

@@ -60,6 +60,7 @@ def test_of_frames_the_least_sure_is_named_counted_from_0():
     first, second = answer_lines([ONE, NONE, TWO, ONE])
     assert "least sure is frame 2, 80 %: the right forearm" in first
     assert second.endswith("1 distinct posture holds 95 % in the median frame, 2 in frame 2")
+    assert "2 distinct postures hold 95 % in the median frame" in answer_lines([ONE, TWO])[1]
 
 
 def test_what_is_not_listed_counts_against_what_is_said():
