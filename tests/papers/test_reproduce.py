@@ -268,7 +268,9 @@ def test_taylors_objects_and_experiment_are_reproduced(tmp_path: Path) -> None:
     assert len(document["random_views"]) == 4
     for views in document["random_views"]:
         assert abs(views["within"] - views["within_expected"]) < 0.06 * views["views"]
-        assert views["solvable_within"] > 0.96 * views["solvable"] > 0
+        # Each of them is within in 95 of 100 pictures or more; three deviations of a count of such.
+        count = views["solvable"]
+        assert views["solvable_within"] >= 0.95 * count - 3 * np.sqrt(0.05 * 0.95 * count) > 0
     checks = {row["checks"]: row for row in document["survivors_exact"]}
     assert checks["none"]["mean"] == 2048
     assert checks["all, urdf"]["mean"] < checks["rigid parts"]["mean"]

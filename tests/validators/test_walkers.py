@@ -172,7 +172,7 @@ def test_a_result_says_what_its_frames_were_judged_with() -> None:
     assert (
         recovered_with(uncertain).settings.rigid_tolerance
         == uncertain.settings["refined"]["rigid"]
-        == pytest.approx(3 * np.sqrt(2 * 0.05**2 + 0.02**2) * max(scene.figure.lengths.values()))
+        == pytest.approx(3 * np.sqrt(2 * 0.05**2 + 0.027**2) * max(scene.figure.lengths.values()))
     )
 
 
