@@ -1,1 +1,0 @@
-"""What was looked into once: studies that no command reaches, not installed."""
