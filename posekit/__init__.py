@@ -1,4 +1,4 @@
-"""posekit: every physically possible posture behind one view, each certified.
+"""posekit: is a posture possible, what is wrong with a motion, and every posture behind one view.
 
 The names below are loaded when they are first used: importing posekit reads no file and loads no library.
 """
@@ -11,66 +11,47 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from posekit.body import Figure as Figure
     from posekit.body import load_figure as load_figure
-    from posekit.conversion.from_python import convert as convert
-    from posekit.conversion.from_python import render as render
-    from posekit.errors import CameraError as CameraError
-    from posekit.errors import FigureError as FigureError
-    from posekit.errors import HeadError as HeadError
+    from posekit.cameras import Detections as Detections
+    from posekit.cameras import View as View
+    from posekit.doors import convert as convert
+    from posekit.doors import recover as recover
+    from posekit.doors import render as render
     from posekit.errors import InputError as InputError
     from posekit.errors import PosekitError as PosekitError
-    from posekit.formats.cameras import read_cameras as read_cameras
-    from posekit.formats.keypoints import read_keypoints as read_keypoints
-    from posekit.formats.motion import read_motion as read_motion
-    from posekit.formats.opening import open as open
-    from posekit.formats.own import View as View
-    from posekit.formats.own import read_postures as read_postures
-    from posekit.formats.own import read_result as read_result
-    from posekit.formats.own import read_view as read_view
-    from posekit.formats.own import write_postures as write_postures
-    from posekit.formats.own import write_view as write_view
-    from posekit.live import TrackedPosture as TrackedPosture
-    from posekit.live import Tracker as Tracker
-    from posekit.recovery import recover as recover
-    from posekit.recovery.answered import result_answers as result_answers
-    from posekit.recovery.recovery import Recovery as Recovery
-    from posekit.recovery.result import result_of as result_of
-    from posekit.recovery.result_output import write_result as write_result
-    from posekit.recovery.sequences import follow as follow
-    from posekit.remedy import repair as repair
+    from posekit.following import Tracker as Tracker
+    from posekit.formats import open as open
+    from posekit.formats import save as save
+    from posekit.motion import Motion as Motion
+    from posekit.motion.repair.repair import repair as repair
+    from posekit.motion.validation import validate as validate
+    from posekit.recovery import Recovery as Recovery
+    from posekit.robots import Robot as Robot
+    from posekit.robots import load_robot as load_robot
     from posekit.settings import RecoverSettings as RecoverSettings
-    from posekit.settings import Tolerance as Tolerance
     from posekit.settings import ValidateSettings as ValidateSettings
-    from posekit.validation import validate as validate
+    from posekit.synthesis import builtin_view as builtin_view
+    from posekit.validators import Judgement as Judgement
+    from posekit.validators import Report as Report
     from posekit.validators import Validator as Validator
-    from posekit.views.builtin import builtin_view as builtin_view
-    from posekit.views.opening import open_views as open_views
-    from posekit.views.source import Source as Source
+    from posekit.validators import assert_valid as assert_valid
+    from posekit.validators.check import check as check
 
 _HOMES = {
-    "posekit.conversion.from_python": ("convert", "render"),
-    "posekit.formats.cameras": ("read_cameras",),
-    "posekit.errors": ("CameraError", "FigureError", "HeadError", "InputError", "PosekitError"),
     "posekit.body": ("Figure", "load_figure"),
-    "posekit.formats.own": (
-        "View",
-        "read_postures",
-        "read_result",
-        "read_view",
-        "write_postures",
-        "write_view",
-    ),
-    "posekit.formats.keypoints": ("read_keypoints",),
-    "posekit.formats.motion": ("read_motion",),
-    "posekit.formats.opening": ("open",),
-    "posekit.live": ("TrackedPosture", "Tracker"),
-    "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
-    "posekit.recovery.answered": ("result_answers",),
-    "posekit.recovery.result_output": ("write_result",),
-    "posekit.remedy": ("repair",),
-    "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
-    "posekit.views": ("Source", "builtin_view", "open_views"),
-    "posekit.validation": ("validate",),
-    "posekit.validators": ("Validator",),
+    "posekit.cameras": ("Detections", "View"),
+    "posekit.doors": ("convert", "recover", "render"),
+    "posekit.errors": ("InputError", "PosekitError"),
+    "posekit.following": ("Tracker",),
+    "posekit.formats": ("open", "save"),
+    "posekit.motion": ("Motion",),
+    "posekit.motion.repair.repair": ("repair",),
+    "posekit.motion.validation": ("validate",),
+    "posekit.recovery": ("Recovery",),
+    "posekit.robots": ("Robot", "load_robot"),
+    "posekit.settings": ("RecoverSettings", "ValidateSettings"),
+    "posekit.synthesis": ("builtin_view",),
+    "posekit.validators": ("Judgement", "Report", "Validator", "assert_valid"),
+    "posekit.validators.check": ("check",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -1,33 +1,138 @@
-"""The errors posekit raises.
+"""Errors, and the one line that refuses an input: source, field, value, what was expected, what to do."""
 
-Every text names the object, the value, what was expected and what to do; the command line prints it as
-one line and exits with 2.
-"""
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Iterable
+from os import PathLike
+from typing import Final
+
+#: Characters of a value or a name that a message shows before it is cut.
+MAX_SHOWN_CHARACTERS: Final = 60
+
+#: Characters of a message before its middle is cut.
+MAX_LINE_CHARACTERS: Final = 500
 
 
 class PosekitError(Exception):
-    """Base of every error that posekit raises on purpose."""
+    """Base of every error that posekit raises on purpose.
+
+    Examples
+    --------
+    >>> try:
+    ...     raise InputError("walk.bvh: MOTION: got text; expected numbers; correct it")
+    ... except PosekitError as error:
+    ...     print(error)
+    walk.bvh: MOTION: got text; expected numbers; correct it
+    """
 
 
 class InputError(PosekitError):
-    """A file or an argument is not what its schema says."""
+    """A file or an argument is not as its schema requires.
+
+    Examples
+    --------
+    >>> raise refusal("walk.bvh", "Frame Time", "0", "seconds above 0", "give --rate")
+    Traceback (most recent call last):
+    posekit.errors.InputError: walk.bvh: Frame Time: got 0; expected seconds above 0; give --rate
+    """
 
 
 class TooLargeError(InputError):
-    """What is to be written could not be read again."""
+    """An object is too large to be written: it could not be read again."""
 
 
-class FigureError(PosekitError):
-    """The lengths or the URDF of a figure describe no body."""
+class FigureError(InputError):
+    """Lengths or a URDF describe no body."""
 
 
-class HeadError(PosekitError):
+class HeadError(InputError):
     """The head's points do not determine a camera."""
 
 
-class CameraError(PosekitError):
-    """A camera's parameters are impossible."""
+class CameraError(InputError):
+    """The parameters describe no camera."""
 
 
 class ViewerError(PosekitError):
     """A picture, a plot or a page cannot be made."""
+
+
+def refusal(
+    source: str | PathLike[str],
+    field: str,
+    got: str,
+    expected: str,
+    remedy: str = "correct it",
+    *,
+    error: type[InputError] = InputError,
+) -> InputError:
+    """Build the error ``SOURCE: FIELD: got VALUE; expected …; REMEDY``, always one line.
+
+    Parameters
+    ----------
+    source : path or str
+        The file, or another origin of the value; empty if there is none.
+    field : str
+        Place in the source, as ``frames[3].image.left_elbow``; empty for the whole.
+    got : str
+        The value, as `shown` writes it.
+    expected : str
+        The values that are accepted.
+    remedy : str
+        The user's next step.
+    error : type, default `InputError`
+        Class of the error.
+
+    Examples
+    --------
+    >>> print(refusal("view.json", "camera.f", shown(-1.0), "a positive number", "give it in metres"))
+    view.json: camera.f: got -1.0; expected a positive number; give it in metres
+    """
+    places = [str(place) for place in (source, field) if str(place)]
+    return error(bounded(one_line(": ".join([*places, f"got {got}; expected {expected}; {remedy}"]))))
+
+
+def one_line(text: str) -> str:
+    """Escape characters that do not print, line ends included."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+
+
+def bounded(text: str) -> str:
+    """Cut a long line in its middle: it keeps the place at its start and the remedy at its end."""
+    half = MAX_LINE_CHARACTERS // 2
+    return text if len(text) <= MAX_LINE_CHARACTERS else f"{text[:half]} … {text[3 - half :]}"
+
+
+def shown(value: object) -> str:
+    """Write a value as JSON does, cut to a readable length, on one line."""
+    if isinstance(value, dict):
+        names = [cut(json.dumps(str(key))) for key in list(value)[:3]]
+        return f"an object of {len(value)} entries ({', '.join(names)}{', …' if len(value) > 3 else ''})"
+    if isinstance(value, list | tuple):
+        if len(value) <= 6 and not any(isinstance(entry, list | tuple | dict) for entry in value):
+            return "[" + ", ".join(shown(entry) for entry in value) + "]"
+        return f"a list of {len(value)} entries"
+    if isinstance(value, str):
+        return cut(json.dumps(value[: MAX_SHOWN_CHARACTERS + 1]))
+    if value is None or isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value)):
+        return json.dumps(value)
+    return cut(str(value))
+
+
+def cut(text: str) -> str:
+    """Shorten a text to `MAX_SHOWN_CHARACTERS`."""
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else text[: MAX_SHOWN_CHARACTERS - 1] + "…"
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Suggest the valid names closest to a misspelt one, or list all if none is close."""
+    valid = list(names)
+    flipped = "-".join(reversed(name[:MAX_SHOWN_CHARACTERS].split("-")))
+    if "-" in name and flipped in valid:
+        return f"did you mean {flipped}?"
+    if near := difflib.get_close_matches(name[:MAX_SHOWN_CHARACTERS], valid):
+        return f"did you mean {' or '.join(near)}?"
+    return f"valid names are {', '.join(valid)}"

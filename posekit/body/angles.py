@@ -1,40 +1,55 @@
-r"""Closed-form joint angles: every branch of the decomposition, the one inside the limits taken.
+r"""Closed-form joint angles of a posture: all branches of the decomposition, and the choice among them by limits.
 
 A ball joint of the figure is three revolutes, :math:`R = R_y(\alpha) R_x(\beta) R_z(\gamma)` in the parent's
 frame (x forward, y left, z up); a hinge below it turns about y by :math:`\varepsilon`. A limb hangs along -z,
 so that its upper segment points along
 :math:`R(-e_z) = (-\sin\alpha \cos\beta, \sin\beta, -\cos\alpha \cos\beta)`.
 
-Angles here are the URDF joints' own: each is the rotation above times the sign of the joint's axis.
+Returned angles are the URDF joints' own: each is the rotation above times the sign of the joint's axis.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posekit.geometry import Array, cross, other_branch, turned_near
-from posekit.geometry.rotations import TIED_ANGLES_RADIANS
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.geometry import Array, Flags, cross, fit_rotation, unit
+from posekit.geometry.rotations import coordinate_rotation, relative_rotation, rotate_back, turned_near
+from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 
-FREE_ANGLE_SINE = 1e-6
-"""Sine below which an angle is free: the limb is straight, or points along the abduction axis.
+#: Sine below which an angle is free: the limb is straight, or points along the abduction axis.
+#:
+#: Turning a free angle to its limit moves the limb's end by less than this times its length.
+FREE_ANGLE_SINE: Final = 1e-6
 
-Turning a free angle to its limit moves the limb's end by less than this times its length.
-"""
+#: Sine below which a limb's bend is rounding, and its axial rotation is set to zero.
+STRAIGHT_LIMB_SINE: Final = 1e-10
 
-STRAIGHT_LIMB_SINE = 1e-10
-"""Sine below which a limb's bend is rounding, and its axial rotation is none."""
+#: Violation of limits for which a free angle is not turned: below the tolerance of the range check.
+NEGLIGIBLE_VIOLATION_RADIANS: Final = 1e-5
 
-N_LIMB_ANGLES = 4
-"""Angles of a whole limb: three of its ball joint and one of its hinge."""
+#: Difference of violations below which two branches tie, as both do if the hinge is the worst.
+TIED_ANGLES_RADIANS: Final = 1e-8
 
-NEGLIGIBLE_VIOLATION_RADIANS = 1e-5
-"""Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
+#: Angles of a whole limb: three of its ball joint and one of its hinge.
+N_LIMB_ANGLES: Final = 4
+
+HIP_FLEXIONS: Final = tuple(DOFS.index(f"{side}_hip.flexion") for side in SIDES)
+PELVIS_FLEXION: Final = DOFS.index("pelvis.flexion")
+
+#: First angle and the three joints of each limb: right arm, left arm, right leg, left leg.
+LIMBS: Final = tuple(
+    (6 + 8 * k + 4 * i, tuple(JOINT[f"{side}_{name}"] for name in names))
+    for k, names in enumerate((("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")))
+    for i, side in enumerate(SIDES)
+)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
     """Signs and limits of consecutive revolutes.
 
@@ -50,6 +65,11 @@ class Limits:
     lower: Array
     upper: Array
 
+    def part(self, first: int, count: int) -> Limits:
+        """Return the limits of some consecutive revolutes."""
+        rows = slice(first, first + count)
+        return Limits(sign=self.sign[rows], lower=self.lower[rows], upper=self.upper[rows])
+
     def clip(self, k: int, angle: Array | float) -> Array:
         """Bring the k-th angle into its limits."""
         return np.clip(angle, self.lower[k], self.upper[k])
@@ -59,9 +79,9 @@ class Limits:
         return turned_near(angles, (self.lower + self.upper) / 2)
 
     def cost(self, angles: Array) -> Array:
-        """Return how far outside the limits branches (..., K) are, radians, to choose among them.
+        """Return the cost (...) of branches (..., K): the largest violation, radians.
 
-        Of a whole limb (K = 4) the axial rotation counts by how far it turns the lower segment: little, where
+        The axial rotation of a whole limb (K = 4) is weighted by how far it turns the lower segment: little if
         the limb is almost straight.
         """
         outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
@@ -70,44 +90,132 @@ class Limits:
         return np.asarray(outside.max(axis=-1))
 
     def violation(self, angles: Array) -> Array:
-        """Return how far the worst of the angles (..., K) is outside its limits, radians; 0 inside."""
-        outside = np.maximum(self.lower - angles, angles - self.upper)
-        worst: Array = np.maximum(outside, 0.0).max(axis=-1)
-        return worst
+        """Return the largest violation (...) of angles (..., K), radians; 0 inside."""
+        return np.asarray(np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0).max(axis=-1))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClosedForm:
+    """Closed-form inverse kinematics of the figure.
+
+    Parameters
+    ----------
+    limits : Limits
+        Of all 22 angles. They choose among the branches; a free angle is turned into them.
+    head_offsets : array (5, 3)
+        From the neck to the head's points, head link's frame, metres.
+    middle_pelvis : bool
+        Whether the pelvis is between the hips, so that the spine gives their orientation. The flexion of the pelvis is
+        then the least that brings both thighs inside their limits, if possible.
+    """
+
+    limits: Limits
+    head_offsets: Array
+    middle_pelvis: bool = False
+
+    def with_limits(self, lower: Array, upper: Array) -> ClosedForm:
+        """Return the same with other limits (22,) of the figure's angles, radians."""
+        return replace(self, limits=Limits(sign=self.limits.sign, lower=lower, upper=upper))
+
+    def angles(self, points: Array) -> Array:
+        """Find the 22 angles of postures.
+
+        Parameters
+        ----------
+        points : array (N, 19, 3)
+            Joints and head points, metres, any right-handed frame; NaN marks an unknown point.
+
+        Returns
+        -------
+        array (N, 22)
+            Radians, in the order of `posekit.skeleton.DOFS`; NaN if the points that determine an angle are unknown.
+        """
+        R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
+        hips_joints = (*HIPS, "neck")[: 4 if self.middle_pelvis else 3]
+        R_hips = hips_frame(*(points[:, JOINT[joint]] for joint in hips_joints))
+        angles = np.empty((len(points), len(DOFS)))
+        angles[:, :3] = self.neck(R_torso, points[:, 0], points[:, HEAD])
+        angles[:, 3:6] = self.pelvis(R_torso, R_hips)
+        for first, (start, middle, end) in LIMBS:
+            R_parent = R_torso if first < LIMBS[2][0] else R_hips
+            upper = rotate_back(R_parent, unit(points[:, middle] - points[:, start]))
+            lower = rotate_back(R_parent, unit(points[:, end] - points[:, middle]))
+            angles[:, first : first + 4] = limb_angles(upper, lower, self._choosing.part(first, 4))
+        if self.middle_pelvis:
+            self._share_flexion(angles, R_torso, R_hips)
+        return angles
+
+    def head_frame(self, neck: Array, head: Array) -> Array:
+        """Fit the figure's head to head points (N, 5, 3): R_cam_head (N, 3, 3), NaN if they are unknown."""
+        return fit_rotation(self.head_offsets, head - neck[:, None])
+
+    def neck(self, R_torso: Array, neck: Array, head: Array) -> Array:
+        """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
+        return ball_angles(relative_rotation(R_torso, self.head_frame(neck, head)), self.limits.part(0, 3))
+
+    def pelvis(self, R_torso: Array, R_hips: Array) -> Array:
+        """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
+        return ball_angles(relative_rotation(R_torso, R_hips), self.limits.part(3, 3))
+
+    @cached_property
+    def _choosing(self) -> Limits:
+        """Limits that choose among branches: hip flexions against the spine, of which the pelvis has an unknown part.
+
+        Turning the hips about their own line changes no other angle of a leg.
+        """
+        if not self.middle_pelvis:
+            return self.limits
+        lower, upper = self.limits.lower.copy(), self.limits.upper.copy()
+        low, high = self._pelvis_turn
+        for hip in HIP_FLEXIONS:
+            lower[hip] += low
+            upper[hip] += high
+        return Limits(sign=self.limits.sign, lower=lower, upper=upper)
+
+    @property
+    def _pelvis_turn(self) -> tuple[float, float]:
+        """Limits of the pelvis's flexion, radians, in the sense of a hip's flexion."""
+        sign = self.limits.sign[PELVIS_FLEXION] * self.limits.sign[HIP_FLEXIONS[0]]
+        ends = (sign * self.limits.lower[PELVIS_FLEXION], sign * self.limits.upper[PELVIS_FLEXION])
+        return min(ends), max(ends)
+
+    def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
+        """Flex pelvises by the least that brings both hips inside their own limits (N, 22), if possible."""
+        low, high = self._pelvis_turn
+        least, most = np.full(len(angles), low), np.full(len(angles), high)
+        for k in HIP_FLEXIONS:
+            flexion = np.where(np.isnan(angles[:, k]), 0.0, angles[:, k])
+            least = np.maximum(least, flexion - self.limits.upper[k])
+            most = np.minimum(most, flexion - self.limits.lower[k])
+        turn = np.clip(0.0, np.minimum(least, most), np.maximum(least, most))
+        rows = np.flatnonzero(turn)
+        if rows.size:
+            angles[rows[:, None], HIP_FLEXIONS] -= turn[rows, None]
+            turned = R_hips[rows] @ coordinate_rotation(1, self.limits.sign[HIP_FLEXIONS[0]] * turn[rows])
+            angles[rows, 3:6] = self.pelvis(R_torso[rows], turned)
 
 
 def ball_angles(R: Array, limits: Limits) -> Array:
     """Decompose rotations (N, 3, 3) of a part in its parent's frame into three angles (N, 3), radians.
 
-    Both Euler branches are tried; the one inside the limits is taken, else the one that violates them least.
+    Both Euler branches are tried; the one that violates the limits less is returned.
     """
     branches = _direction_branches(-R[:, :, 2])
     candidates = []
     for k in range(2):
         alpha, beta = branches[:, k, 0], branches[:, k, 1]
-        # From what is left after alpha and beta: where alpha is free (beta = +-90 deg), gamma makes up for it.
-        left = _into_ball(R[:, :, 0], alpha, beta)
-        candidates.append(np.stack([alpha, beta, np.arctan2(left[:, 1], left[:, 0])], axis=-1))
+        # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
+        rest = _into_ball(R[:, :, 0], alpha, beta)
+        candidates.append(np.stack([alpha, beta, np.arctan2(rest[:, 1], rest[:, 0])], axis=-1))
     return _least_violating(np.stack(candidates, axis=1) * limits.sign, limits)
-
-
-def direction_angles(upper: Array, limits: Limits) -> Array:
-    """Find the first two angles (N, 2) of a ball joint from its limb's direction (N, 3), parent's frame.
-
-    The axial rotation is left free: with only the upper segment known, nothing constrains it.
-    """
-    two = Limits(sign=limits.sign[:2], lower=limits.lower[:2], upper=limits.upper[:2])
-    angles = _least_violating(_direction_branches(upper) * two.sign, two)
-    angles[:, 0] = np.where(_along_abduction_axis(upper), two.clip(0, angles[:, 0]), angles[:, 0])
-    return angles
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     r"""Find the four angles of a ball joint and the hinge below it.
 
-    Two Euler branches times two signs of the hinge are tried. Where the limb is straight the axial rotation
-    is free, and where the upper segment lies along the abduction axis the first angle is: where none of the
-    four is inside the limits, the free angles are used to bring one inside.
+    Two Euler branches times two signs of the hinge are tried. If the limb is straight the axial rotation
+    is free, and if the upper segment lies along the abduction axis the first angle is: where none of the
+    four branches is inside the limits, the free angles are used to bring one inside.
 
     Parameters
     ----------
@@ -119,20 +227,50 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     Returns
     -------
     array (N, 4)
-        Radians; NaN where a direction is NaN.
+        Radians; NaN if a direction is unknown. Rotation and hinge alone are NaN if `lower` is.
     """
+    angles = np.full((len(upper), N_LIMB_ANGLES), np.nan)
+    both = np.isfinite(upper).all(axis=1) & np.isfinite(lower).all(axis=1)
+    angles[~both, :2] = _upper_angles(upper[~both], limits.part(0, 2))
+    upper, lower = upper[both], lower[both]
     branches = _direction_branches(upper)
     candidates = []
     for k in range(2):
         alpha, beta = branches[:, k, 0], branches[:, k, 1]
         local = _into_ball(lower, alpha, beta)
         candidates += [_hinge_branch(local, alpha, beta, side, limits) for side in (1.0, -1.0)]
-    angles = _least_violating(np.stack(candidates, axis=1), limits)
-    free = _along_abduction_axis(upper) | _along(upper, lower)
-    free &= limits.violation(angles) > NEGLIGIBLE_VIOLATION_RADIANS
+    found = _least_violating(np.stack(candidates, axis=1), limits)
+    free = _along_abduction_axis(upper) | _parallel(upper, lower)
+    free &= limits.violation(found) > NEGLIGIBLE_VIOLATION_RADIANS
     if free.any():
-        angles[free] = _turn_free_angles(upper[free], lower[free], angles[free], limits)
+        found[free] = _turn_free_angles(upper[free], lower[free], found[free], limits)
+    angles[both] = found
     return angles
+
+
+def _upper_angles(upper: Array, limits: Limits) -> Array:
+    """Find flexion and abduction (N, 2) of directions (N, 3), the lower segment being unknown."""
+    angles = _least_violating(_direction_branches(upper) * limits.sign, limits)
+    angles[:, 0] = np.where(_along_abduction_axis(upper), limits.clip(0, angles[:, 0]), angles[:, 0])
+    return angles
+
+
+def other_branch(angles: Array) -> Array:
+    r"""Return the angles of the same rotation with the second on the other side of a quarter turn.
+
+    :math:`(\alpha, \beta, \gamma) \to (\alpha + \pi, \pi - \beta, \gamma + \pi)` for rotations about three mutually
+    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). The first two alone give the third
+    axis the same direction; a hinge that follows the three keeps its angle.
+
+    Parameters
+    ----------
+    angles : array (..., K)
+        Two, three or four angles, radians.
+    """
+    turned = angles.copy()
+    turned[..., 0:3:2] += np.pi
+    turned[..., 1] = np.pi - angles[..., 1]
+    return turned
 
 
 def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
@@ -144,17 +282,14 @@ def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: 
 
 
 def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits) -> Array:
-    r"""Bring limbs (N) inside their limits by their free angles, where that helps.
+    r"""Bring limbs (N) inside their limits by their free angles, if that helps.
 
     A straight limb's axial rotation is put into its limits. At beta = +-90 deg,
     :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
     their limits, then also with one of the two at a limit, or with alpha at zero.
     """
-    branches, pinned, straight = (
-        _direction_branches(upper),
-        _along_abduction_axis(upper),
-        _along(upper, lower),
-    )
+    branches = _direction_branches(upper)
+    pinned, straight = _along_abduction_axis(upper), _parallel(upper, lower)
     sign, low, high = limits.sign, limits.lower, limits.upper
     candidates = [angles]
     for k in range(2):
@@ -171,13 +306,13 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
     return _least_violating(np.stack(candidates, axis=1), limits)
 
 
-def _along(upper: Array, lower: Array) -> NDArray[np.bool_]:
-    """Return where two directions (N, 3) lie on one line: a straight or folded limb."""
+def _parallel(upper: Array, lower: Array) -> Flags:
+    """Return which directions (N, 3) lie on one line: a straight or folded limb."""
     return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE_ANGLE_SINE)
 
 
-def _along_abduction_axis(upper: Array) -> NDArray[np.bool_]:
-    """Return where a direction (N, 3) leaves the first angle free."""
+def _along_abduction_axis(upper: Array) -> Flags:
+    """Return which directions (N, 3) leave the first angle free."""
     return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
@@ -198,7 +333,7 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least, of those that tie the first."""
+    """Return the branch (N, K) of (N, B, K) that violates the limits least, the first of those that tie."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)

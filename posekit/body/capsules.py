@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
-import coal
 import numpy as np
-import pinocchio as pin
 
-from posekit.errors import FigureError
+from posekit.errors import FigureError, refusal, shown
 from posekit.geometry import Array, cross, unit
+from posekit.robots.capsules import PARTS
 from posekit.skeleton import HEAD, JOINT
 
-CAPSULE_AXES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
-    "torso": ((JOINT["neck"],), (JOINT["pelvis"],)),
-    "head": ((JOINT["neck"],), HEAD),
-    "hips": ((JOINT["right_hip"],), (JOINT["left_hip"],)),
-    **{
-        f"{side}_{part}": ((JOINT[f"{side}_{start}"],), (JOINT[f"{side}_{end}"],))
-        for side in ("right", "left")
-        for part, start, end in (
-            ("upper_arm", "shoulder", "elbow"),
-            ("forearm", "elbow", "wrist"),
-            ("thigh", "hip", "knee"),
-            ("shank", "knee", "ankle"),
-        )
-    },
-}
-"""For each link with a capsule: the points whose mean starts its axis, and those whose mean ends it."""
+if TYPE_CHECKING:
+    import pinocchio as pin
 
-OFF_AXIS = 1e-9
-"""Metres by which a capsule's ends may lie beside the line of its link."""
+#: For each link with a capsule: the points whose mean starts its axis, and those whose mean ends it.
+CAPSULE_AXES: Final[dict[str, tuple[tuple[int, ...], tuple[int, ...]]]] = {
+    **{part: ((JOINT[start],), (JOINT[end],)) for part, (start, end) in PARTS.items()},
+    "head": ((JOINT["neck"],), HEAD),
+}
+
+#: Largest distance of a capsule's ends from the line of its link.
+OFF_AXIS_METRES: Final = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +36,7 @@ class Capsule:
     start, end : tuple of int
         Points whose means start and end the axis.
     center : float
-        Metres from the start to the capsule's middle, along the axis.
+        Distance from the start to the capsule's middle along the axis, metres.
     half_length : float
         Half the length of the capsule's axis, metres.
     radius : float
@@ -68,23 +60,21 @@ class Capsule:
 
         Parameters
         ----------
-        points : array (N, len(self.points), 3)
-            Metres, in the order of `self.points`.
+        points : array (N, 19, 3)
+            Postures, metres; NaN in the points that are unknown.
 
         Returns
         -------
         middle, axis : array (N, 3)
-            The capsule's middle (m) and the unit direction of its axis.
+            The capsule's middle (m) and the unit direction of its axis; NaN if one of its points is unknown.
         """
-        n = len(self.start)
-        start = points[:, 0] if n == 1 else points[:, :n].mean(axis=1)
-        end = points[:, n] if len(self.end) == 1 else points[:, n:].mean(axis=1)
-        axis = unit(end - start)
+        start = points[:, list(self.start)].mean(axis=1)
+        axis = unit(points[:, list(self.end)].mean(axis=1) - start)
         return start + self.center * axis, axis
 
 
 def read_capsules(
-    model: pin.Model, geometry: pin.GeometryModel, neutral: Array
+    model: pin.Model, geometry: pin.GeometryModel, neutral: Array, source: str
 ) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
     """Read the capsules and the pairs to check from Pinocchio's geometry model.
 
@@ -92,6 +82,8 @@ def read_capsules(
     ----------
     neutral : array (19, 3)
         The figure's points at the neutral configuration, metres.
+    source : str
+        The URDF's name, for errors.
 
     Returns
     -------
@@ -101,53 +93,36 @@ def read_capsules(
     Raises
     ------
     FigureError
-        Where a body is missing, is not a capsule, has no positive size, or lies beside its link's line.
+        If a body is missing, is not a capsule, has no positive size, or does not lie on its link's line.
     """
+    import coal
+    import pinocchio as pin
+
     data, geometry_data = model.createData(), geometry.createData()
     pin.updateGeometryPlacements(model, data, geometry, geometry_data, pin.neutral(model))
     capsules = []
-    for body, placement in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):
-        link = model.frames[body.parentFrame].name
-        if link not in CAPSULE_AXES:
-            raise FigureError(
-                f"link {link!r} has a collision body; expected one on {', '.join(CAPSULE_AXES)} only"
-            )
-        shape = body.geometry
+    links = [model.frames[body.parentFrame].name for body in geometry.geometryObjects]
+    if sorted(links) != sorted(CAPSULE_AXES):
+        expected = f"one on each of {', '.join(CAPSULE_AXES)}"
+        raise refusal(source, "collision bodies", f"those on {', '.join(links)}", expected, error=FigureError)
+    for link, body, placement in zip(links, geometry.geometryObjects, geometry_data.oMg, strict=True):
+        shape, field = body.geometry, f"link {shown(link)}, collision"
         if not isinstance(shape, coal.Capsule):
-            raise FigureError(
-                f"link {link!r}: its collision body is a {type(shape).__name__}; expected a capsule, spelled as a "
-                "cylinder with collision_checking"
-            )
+            remedy = "write a cylinder and name it in collision_checking"
+            raise refusal(source, field, type(shape).__name__, "a capsule", remedy, error=FigureError)
         if not (np.isfinite(shape.radius) and shape.radius > 0 and shape.halfLength > 0):
-            raise FigureError(
-                f"link {link!r}: its capsule has radius {shape.radius:g} and half length {shape.halfLength:g} m; "
-                "expected both positive"
-            )
+            got = f"radius {shape.radius:g} and half length {shape.halfLength:g} m"
+            raise refusal(source, field, got, "positive numbers", error=FigureError)
         start, end = (neutral[list(points)].mean(axis=0) for points in CAPSULE_AXES[link])
         axis = (end - start) / np.linalg.norm(end - start)
         middle = placement.translation - start
         center = float(middle @ axis)
         beside = np.linalg.norm(middle - center * axis)
         tilt = np.linalg.norm(cross(placement.rotation[:, 2], axis)) * shape.halfLength
-        if max(beside, tilt) > OFF_AXIS:
-            raise FigureError(
-                f"link {link!r}: its capsule lies {max(beside, tilt):.3g} m beside the line between its joints; "
-                "expected it on that line"
-            )
-        capsules.append(
-            Capsule(
-                link=link,
-                start=CAPSULE_AXES[link][0],
-                end=CAPSULE_AXES[link][1],
-                center=center,
-                half_length=float(shape.halfLength),
-                radius=float(shape.radius),
-            )
-        )
-    missing = sorted(set(CAPSULE_AXES) - {capsule.link for capsule in capsules})
-    if missing or len(capsules) != len(CAPSULE_AXES):
-        raise FigureError(
-            f"{len(capsules)} collision bodies were loaded, expected one each on {', '.join(CAPSULE_AXES)}; "
-            f"missing: {', '.join(missing) or 'none, one is there twice'}"
-        )
+        if max(beside, tilt) > OFF_AXIS_METRES:
+            got = f"a capsule {max(beside, tilt):.3g} m beside the line between its joints"
+            raise refusal(source, field, got, "a capsule on that line", error=FigureError)
+        size = {"half_length": float(shape.halfLength), "radius": float(shape.radius)}
+        first, last = CAPSULE_AXES[link]
+        capsules.append(Capsule(link=link, start=first, end=last, center=center, **size))
     return tuple(capsules), tuple((pair.first, pair.second) for pair in geometry.collisionPairs)

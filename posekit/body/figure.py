@@ -1,71 +1,55 @@
-"""The stick figure: one URDF, its Pinocchio model, and the way between joint positions and q."""
+"""The stick figure: one URDF, its Pinocchio model, and closed forms between joint positions and q."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, lru_cache
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from posekit.body.angles import Limits
-from posekit.body.axes import axis_signs
+from posekit.body.angles import LIMBS, ClosedForm, Limits
 from posekit.body.capsules import Capsule, read_capsules
-from posekit.body.closed_form import Alike, ClosedForm, freed, with_head
-from posekit.body.closing import TORSO_LENGTHS, closed_lengths
 from posekit.body.frames import MIDDLE_PELVIS_PART, torso_frame
-from posekit.body.lengths import check_lengths
-from posekit.body.pool import collides, make_pool
-from posekit.body.side import side_is_certain
-from posekit.body.stature import lengths_from_stature
-from posekit.body.uncertainty import LengthUncertainty
-from posekit.body.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
-from posekit.display.short_repr import ShortRepr
-from posekit.errors import FigureError
-from posekit.geometry import Array, quaternion_from_rotation
-from posekit.robots.kinematics import Kinematics, body_points
-from posekit.robots.srdf import check_srdf
-from posekit.skeleton import (
-    DOFS,
-    HEAD,
-    JOINT,
-    JOINTS,
-    POINTS,
-    SEGMENTS,
-    SIDES,
-    TORSO,
-    segment_name,
-    urdf_joint_name,
+from posekit.body.lengths import (
+    TORSO_LENGTHS,
+    check_lengths,
+    closed_lengths,
+    lengths_from_stature,
+    segment_lengths,
+    side_is_certain,
 )
+from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
+from posekit.body.urdf import replace_limits, rewrite
+from posekit.errors import FigureError, refusal, shown
+from posekit.geometry import Array, Ints, coordinate_rotation, frame_along, read_only, unit
+from posekit.geometry.quaternions import quaternion_from_rotation, rotation_from_quaternion
+from posekit.robots.capsules import PARTS
+from posekit.robots.robot import Robot
+from posekit.robots.urdf import read_text
+from posekit.skeleton import DOFS, HEAD, HEAD_POINTS, HIPS, JOINT, JOINTS, POINTS, TORSO, urdf_joint_name
 
-LINK_OF_POINT = {
-    "neck": "torso",
+#: The URDF link whose origin is each point.
+LINK_OF_POINT: Final = {
+    **{point: point for point in POINTS},
+    **{start: part for part, (start, _) in PARTS.items()},
     "pelvis": "hips",
-    **{
-        f"{side}_{joint}": f"{side}_{link}"
-        for side in SIDES
-        for joint, link in (
-            ("shoulder", "upper_arm"),
-            ("elbow", "forearm"),
-            ("hip", "thigh"),
-            ("knee", "shank"),
-        )
-    },
 }
-"""The URDF link whose origin is each point; points that are not listed have a link of their own name."""
 
+#: Flexion turns about y, bending and abduction about x, rotation about z, in this order.
+AXIS_OF_ANGLE: Final = {"flexion": 1, "bending": 0, "abduction": 0, "rotation": 2}
 
+#: Largest difference of a torso's distances that leaves it the same torso.
 SAME_TORSO_METRES: Final = 1e-4
-"""Metres: a torso whose distances are no more other than that is the same."""
 
-NO_VELOCITY = np.arange(0)
-"""No entries of v: positions alone are wanted, no Jacobian."""
+#: Largest distance between a point by Pinocchio and by the closed form, in a URDF of the stick figure's layout.
+SAME_POINT_METRES: Final = 1e-6
 
 
 class Configurations(NamedTuple):
@@ -75,7 +59,7 @@ class Configurations(NamedTuple):
     ----------
     q : array (N, nq)
         In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. NaN in angles of unknown joints;
-        a head that was not seen is at neutral.
+        an unknown head is at neutral.
     distance : array (N,)
         The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
     """
@@ -84,101 +68,92 @@ class Configurations(NamedTuple):
     distance: Array
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Figure(ShortRepr):
-    """A stick figure, made from URDF and SRDF text by `load_figure` and changed by `scaled`.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Figure(Robot):
+    """A stick figure: a robot with closed-form kinematics, made by `load_figure` and changed by `scaled`.
 
     Parameters
     ----------
     urdf, srdf : str
         The texts; the model, the lengths, limits, capsules and checked pairs are read from them.
     source : str
-        What to call it in errors.
+        Name of the URDF in errors.
     side_known : bool
-        Whether it is known on which side of the line from neck to pelvis the shoulders lie: a URDF says it, lengths
-        do not.
+        Whether it is known on which side of the line from neck to pelvis the shoulders lie: a URDF determines it,
+        lengths do not.
     moved_lengths : mapping
-        By how much lengths had to be changed so that torso and hips close, metres, by segment name.
+        Changes of lengths so that torso and hips close, metres, by segment name.
 
     Raises
     ------
-    FigureError
-        Where the texts do not describe a stick figure.
+    InputError
+        If the texts do not describe a stick figure.
+
+    Examples
+    --------
+    >>> figure = load_figure()
+    >>> q, distance = figure.configurations(figure.neutral_points[None, :14])
+    >>> bool(distance[0] < 1e-9)
+    True
     """
 
-    urdf: str = field(repr=False)
-    srdf: str = field(repr=False)
-    source: str = "stick_figure.urdf"
+    name: str = "figure"
+    source: str = "figure"
     side_known: bool = field(default=True, repr=False)
     moved_lengths: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the texts alone: they are small, and a model is built from them in milliseconds."""
-        return _figure, (self.urdf, self.srdf, self.source, self.side_known, dict(self.moved_lengths))
+        """Pickle the texts and settings: a model is built from them in milliseconds."""
+        settings = {one.name: getattr(self, one.name) for one in fields(self)}
+        return _figure, (settings | {"moved_lengths": dict(self.moved_lengths)},)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "moved_lengths", MappingProxyType(dict(self.moved_lengths)))
-        links = [link.get("name", "") for link in parse(self.urdf, self.source).findall("link")]
+        self._set("moved_lengths", MappingProxyType(dict(self.moved_lengths)))
+        super().__post_init__()
         names = set(self.model.names)
         missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
-        missing += [link for link in map(_frame_name, POINTS) if not self.model.existFrame(link)]
+        missing += [link for link in LINK_OF_POINT.values() if not self.model.existFrame(link)]
         if missing or self.model.nq != 7 + len(DOFS):
-            raise FigureError(
-                f"{self.source}: not a stick figure: it has {self.model.nq} configuration variables, expected "
-                f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
-            )
-        with as_figure_error():
-            check_srdf(self.srdf, f"{self.source}, SRDF", links)
+            lacking = f", without {', '.join(missing)}" if missing else ""
+            got = f"{self.model.nq} configuration variables{lacking}"
+            expected = f"the stick figure's {7 + len(DOFS)} configuration variables and its links"
+            raise refusal(self.source, "", got, expected, "start from Figure.write", error=FigureError)
         _ = self.limits, self.capsules
         self._check_layout()
-
-    @cached_property
-    def model(self) -> pin.Model:
-        """Pinocchio's model, torso on a free-flyer."""
-        try:
-            return pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
-            raise FigureError(
-                f"{self.source}: Pinocchio cannot read it: {str(error).splitlines()[0]}"
-            ) from error
-
-    @cached_property
-    def geometry(self) -> pin.GeometryModel:
-        """Pinocchio's geometry model with the SRDF's pairs."""
-        geometry = pin.buildGeomFromUrdfString(self.model, self.urdf, pin.GeometryType.COLLISION)
-        geometry.addAllCollisionPairs()
-        pin.removeCollisionPairsFromXML(self.model, geometry, self.srdf)
-        return geometry
+        check_lengths(self.lengths)
 
     @cached_property
     def neutral_points(self) -> Array:
         """The 19 points at the neutral configuration (19, 3), metres, torso frame."""
-        points: Array = self.forward_kinematics(pin.neutral(self.model)[None])[0]
-        points.flags.writeable = False
-        return points
+        return read_only(self._placed(self.neutral))
+
+    def _placed(self, q: Array) -> Array:
+        """Place the points (19, 3) of one configuration (nq,) by Pinocchio."""
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, q)
+        frames = [self.model.getFrameId(LINK_OF_POINT[point]) for point in POINTS]
+        return np.array([data.oMf[frame].translation for frame in frames])
 
     @cached_property
     def lengths(self) -> Mapping[str, float]:
         """The 17 lengths, metres, by segment name."""
-        points = self.neutral_points
-        lengths = {segment_name((a, b)): float(np.linalg.norm(points[a] - points[b])) for a, b in SEGMENTS}
-        return MappingProxyType(lengths)
+        return MappingProxyType(segment_lengths(self.neutral_points[None]))
 
     @property
     def shoulder_offset(self) -> float:
-        """How far the shoulders lie in front of the line from neck to pelvis, metres; negative behind it."""
+        """Distance of the shoulders in front of the line from neck to pelvis, metres; negative behind it."""
         return float(self.neutral_points[1, 0])
 
     @property
     def shoulder_side(self) -> Literal["front", "behind", "undecided"]:
-        """On which side of that line they are; undecided where it is not known, and of a flat torso."""
+        """Side of that line on which they are; undecided if unknown, and for a flat torso."""
         if not self.side_known or self.shoulder_offset == 0:
             return "undecided"
         return "behind" if self.shoulder_offset < 0 else "front"
 
     @cached_property
     def pelvis_between_hips(self) -> bool:
-        """Whether the pelvis is on the line between the hips, or so near that it makes no plane with them."""
+        """Whether the pelvis is so near to the line between the hips that it spans no plane with them."""
         pelvis, right = self.neutral_points[[JOINT["pelvis"], JOINT["right_hip"]]]
         return bool(pelvis[2] - right[2] < MIDDLE_PELVIS_PART * self.lengths["right_hip-left_hip"])
 
@@ -188,129 +163,118 @@ class Figure(ShortRepr):
         head = self.neutral_points[[0, *HEAD]]
         return np.stack([head[:, 0], head[:, 2], -head[:, 1]], axis=-1)
 
-    @cached_property
+    @property
     def capsules(self) -> tuple[Capsule, ...]:
         """The collision bodies."""
-        return self._collision[0]
+        return self._bodies[0]
+
+    @property
+    def capsule_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Index pairs into `capsules` that are to be checked."""
+        return self._bodies[1]
 
     @cached_property
-    def collision_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Index pairs into `capsules` that the SRDF leaves to be checked."""
-        return self._collision[1]
-
-    @cached_property
-    def _collision(self) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
-        return read_capsules(self.model, self.geometry, self.neutral_points)
+    def _bodies(self) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
+        return read_capsules(self.model, self.geometry, self.neutral_points, self.source)
 
     @cached_property
     def limits(self) -> Limits:
         """Signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
+        signs = np.empty(len(DOFS))
+        for k, dof in enumerate(DOFS):
+            joint = self.model.joints[self.model.getJointId(urdf_joint_name(dof))]
+            data = joint.createData()
+            joint.calc(data, np.zeros(joint.nq))
+            axis = np.asarray(data.S).reshape(6)[3:]
+            coordinate = AXIS_OF_ANGLE[dof.split(".")[1]]
+            signs[k] = axis[coordinate]
+            if abs(signs[k]) != 1:
+                place, expected = f"joint {shown(urdf_joint_name(dof))}", f"plus or minus {'xyz'[coordinate]}"
+                raise refusal(self.source, place, f"axis {axis.tolist()}", expected, error=FigureError)
         index = self.angle_index
-        return Limits(
-            sign=axis_signs(self.model, self.source),
-            lower=self.model.lowerPositionLimit[index],
-            upper=self.model.upperPositionLimit[index],
-        )
+        return Limits(sign=signs, lower=self.lower[index], upper=self.upper[index])
 
     @cached_property
     def ik(self) -> ClosedForm:
         """The closed form from points to angles."""
-        middle = self.pelvis_between_hips
-        limits = freed(self.limits) if middle else self.limits
-        return ClosedForm(limits=limits, head_offsets=self._head_offsets, middle_pelvis=middle)
+        offsets = self.neutral_points[list(HEAD)] - self.neutral_points[0]
+        return ClosedForm(limits=self.limits, head_offsets=offsets, middle_pelvis=self.pelvis_between_hips)
 
     @cached_property
-    def angle_index(self) -> NDArray[np.intp]:
-        """Where each of `posekit.skeleton.DOFS` stands in q."""
+    def angle_index(self) -> Ints:
+        """Index in q of each of `posekit.skeleton.DOFS`."""
         return np.array([self.model.idx_qs[self.model.getJointId(urdf_joint_name(dof))] for dof in DOFS])
 
-    @cached_property
-    def configuration_names(self) -> tuple[str, ...]:
-        """A name for each entry of q: x, y, z, qx, qy, qz, qw of the torso, then the URDF's joints."""
-        names = ["x", "y", "z", "qx", "qy", "qz", "qw"] + [""] * len(DOFS)
-        for dof, index in zip(DOFS, self.angle_index, strict=True):
-            names[index] = urdf_joint_name(dof)
-        return tuple(names)
-
-    @cached_property
-    def hash(self) -> str:
-        """SHA-256 of URDF and SRDF: what a result names to say which figure it used."""
-        return hashlib.sha256(f"{self.urdf}\0{self.srdf}".encode()).hexdigest()
-
-    def scaled(
+    def scaled(  # type: ignore[override]
         self,
-        lengths: Mapping[str, float],
+        lengths: Mapping[str, float] | None = None,
         head_points: Mapping[str, ArrayLike] | None = None,
         *,
+        stature: float | None = None,
+        key_points: bool = False,
         behind: bool | None = None,
-        known: LengthUncertainty | None = None,
+        known: LengthUncertainty = MEASURED_LENGTHS,
     ) -> Figure:
         """Make the same figure with other lengths; capsules grow with their part.
 
-        Lengths that miss closing are laid onto the nearest body that closes (`posekit.body.closing`), and
-        `moved_lengths` says by how much. Lengths do not tell on which side of the line from neck to pelvis the
-        shoulders lie: unless that is said, or the torso stays as it is, the new figure does not know it (`side_known`).
+        Lengths that do not close are replaced by the nearest that do (`posekit.body.lengths`), and `moved_lengths` has
+        the changes. Lengths do not determine on which side of the line from neck to pelvis the shoulders lie: unless it
+        is given, or the torso is unchanged, the new figure does not know it (`side_known`).
 
         Parameters
         ----------
-        lengths : mapping
-            Metres, by segment name ``a-b``, a before b in tree order; others stay. Left and right are separate.
+        lengths : mapping, optional
+            Metres, by segment name ``a-b``, a before b in tree order; others are unchanged. Left and right are
+            separate.
         head_points : mapping, optional
-            Head points in the paper's head frame, metres; with ``neck`` among them, the others count from it.
+            Head points in the paper's head frame, metres; if ``neck`` is among them, the others are relative to it.
+        stature : float, optional
+            Height of the person, metres: lengths that are not given follow from it (`lengths_from_stature`), and the
+            head is scaled with the stature.
+        key_points : bool
+            Take lengths between key points of detectors from the stature (`lengths_from_stature`).
         behind : bool, optional
-            Whether the shoulders lie behind the line from neck to pelvis, where positions tell it
-            (`posekit.robots.shoulders_are_behind`).
-        known : LengthUncertainty, optional
-            How well the lengths are known: those that are known worse are changed more where they do not close.
+            Whether the shoulders lie behind the line from neck to pelvis, if positions tell it
+            (`shoulders_are_behind`).
+        known : LengthUncertainty
+            How well the lengths are known: uncertain ones are changed more if the lengths do not close.
 
         Raises
         ------
         FigureError
-            Where a length is unknown, not positive, or no torso or hips have lengths near these.
+            If a length is unknown, not positive, or no torso or hips have lengths near these.
         """
-        check_lengths(lengths)
-        head = self._head_in_link(head_points or {})
-        closed = closed_lengths({**self.lengths, **lengths}, known)
-        same = all(
-            abs(closed.lengths[name] - self.lengths[name]) <= SAME_TORSO_METRES for name in TORSO_LENGTHS
-        )
-        text = rewrite(
-            self.urdf,
-            self.capsules,
-            self.neutral_points,
-            closed.lengths,
-            head,
-            behind=self.shoulder_offset < 0 if behind is None else behind,
-        )
-        stale = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
-        # What was checked of the old text holds of the new one, which differs in lengths that are checked here.
+        lengths, head_points = dict(lengths or {}), dict(head_points or {})
+        if stature is not None:
+            usual = lengths_from_stature(stature, self.lengths, key_points=key_points)
+            spine = lengths_from_stature(stature, self.lengths)["neck-pelvis"]
+            ratio = spine / self.lengths["neck-pelvis"]
+            lengths = usual | lengths
+            usual_head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(HEAD_POINTS)}
+            head_points = head_points or usual_head
+        head = self._head_in_link(head_points)
+        closed, moved = closed_lengths({**self.lengths, **lengths}, known)
+        same = all(abs(closed[name] - self.lengths[name]) <= SAME_TORSO_METRES for name in TORSO_LENGTHS)
+        was_behind = self.shoulder_offset < 0
+        side = was_behind if behind is None else behind
+        text = rewrite(self.urdf, self.capsules, self.neutral_points, closed, head, behind=side)
+        unchanged = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
+        # The new text differs from the checked one in checked lengths only, so that it is not checked again.
         figure = object.__new__(Figure)
+        figure.__dict__.update({one.name: getattr(self, one.name) for one in fields(self)})
         figure.__dict__.update(
             urdf=text,
-            srdf=self.srdf,
-            source=self.source,
             side_known=behind is not None or (same and self.side_known),
-            moved_lengths=MappingProxyType({**stale, **closed.moved}),
+            moved_lengths=MappingProxyType({**unchanged, **moved}),
             limits=self.limits,
         )
         return figure
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
-        """Return the figure as it is known within uncertain lengths: they may leave the side of the shoulders open."""
+        """Return the figure as far as uncertain lengths determine it: the side of the shoulders may become unknown."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
-        return self._of_unknown_side
-
-    @cached_property
-    def _of_unknown_side(self) -> Figure:
         return replace(self, side_known=False)
-
-    def from_stature(self, stature: float) -> Figure:
-        """Make the figure of a person of this stature (m): see `posekit.body.stature`."""
-        lengths = lengths_from_stature(stature, dict(self.lengths))
-        ratio = lengths["neck-pelvis"] / self.lengths["neck-pelvis"]
-        head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(POINTS[len(JOINTS) :])}
-        return self.scaled(lengths, head)
 
     def with_limits(self, limits: Mapping[str, tuple[float, float]]) -> Figure:
         """Make the same figure with other joint limits (radians), by name in `posekit.skeleton.DOFS`."""
@@ -318,17 +282,12 @@ class Figure(ShortRepr):
         return replace(self, urdf=replace_limits(self.urdf, named))
 
     def write(self, path: str | Path) -> None:
-        """Write the URDF to `path` and the SRDF beside it; `posekit.load_figure` reads them again.
+        """Write the URDF to `path` and the SRDF beside it; `load_figure` reads them again."""
+        Path(path).with_suffix(".srdf").write_text(self.srdf or "", encoding="utf-8")
+        Path(path).write_text(self.urdf, encoding="utf-8")
 
-        Raises
-        ------
-        FigureError
-            Where they cannot be written.
-        """
-        write_texts(Path(path), self.urdf, self.srdf)
-
-    def forward_kinematics(self, q: Array) -> Array:
-        """Place the 19 points by forward kinematics: Pinocchio's, for a batch.
+    def forward_kinematics(self, q: ArrayLike) -> Array:
+        """Place the 19 points of configurations.
 
         Parameters
         ----------
@@ -338,121 +297,196 @@ class Figure(ShortRepr):
         Returns
         -------
         array (N, 19, 3)
-            Metres; NaN where q has NaN.
-
-        Raises
-        ------
-        FigureError
-            Where q has another width or a quaternion is not of unit length: Pinocchio would place a
-            non-rotation without a word.
+            Metres; NaN in points that follow from an unknown entry of q.
         """
-        if q.ndim != 2 or q.shape[1] != self.model.nq:
-            raise FigureError(f"q has shape {q.shape}; expected (N, {self.model.nq})")
-        norm = np.linalg.norm(q[:, 3:7], axis=1)
-        if (np.abs(norm - 1) > 1e-6).any():
-            raise FigureError(
-                f"the quaternion of configuration {int(np.argmax(np.abs(norm - 1)))} has length "
-                f"{norm[np.argmax(np.abs(norm - 1))]:g}; expected 1; normalise q[3:7]"
+        q = np.asarray(q, dtype=np.float64)
+        angles, neutral = q[:, self.angle_index] * self.limits.sign, self.neutral_points
+        R_torso = rotation_from_quaternion(q[:, 3:7])
+        R_hips, R_head = R_torso @ _ball(angles[:, 3:6]), R_torso @ _ball(angles[:, :3])
+        points = np.empty((len(q), len(POINTS), 3))
+        parts = ((TORSO, R_torso, 0), (HEAD_POINTS, R_head, 0), (HIPS[1:], R_hips, JOINT["pelvis"]))
+        for names, R, origin in parts:
+            rows = [POINTS.index(name) for name in names]
+            base = points[:, [origin]] if origin else q[:, None, :3]
+            points[:, rows] = base + (neutral[rows] - neutral[origin]) @ np.swapaxes(R, 1, 2)
+        for first, (start, middle, end) in LIMBS:
+            # A limb hangs along -z. Its axial rotation does not move its middle joint, even if it is unknown.
+            R = (R_torso if first < LIMBS[2][0] else R_hips) @ _ball(angles[:, first : first + 2])
+            points[:, middle] = points[:, start] + (neutral[middle, 2] - neutral[start, 2]) * R[..., 2]
+            R = (
+                R
+                @ coordinate_rotation(2, angles[:, first + 2])
+                @ coordinate_rotation(1, angles[:, first + 3])
             )
-        return self._kinematics.place(q, NO_VELOCITY).positions
+            points[:, end] = points[:, middle] + (neutral[end, 2] - neutral[middle, 2]) * R[..., 2]
+        return points
 
-    def collides(self, q: Array) -> NDArray[np.bool_]:
-        """Ask coal which configurations (N, nq) penetrate in a pair that the SRDF leaves to be checked (N,)."""
-        return collides(self._pool, q.T)
+    def points(self, q: ArrayLike) -> Array:
+        """Place the 14 joints (N, 14, 3), metres, of configurations (N, nq)."""
+        return self.forward_kinematics(q)[:, : len(JOINTS)]
 
-    def configurations(self, points: Array, alike: Alike | None = None) -> Configurations:
+    def configurations(
+        self,
+        joints: ArrayLike,
+        head: Array | None = None,
+        *,
+        start: ArrayLike | None = None,
+        in_time: bool = False,
+    ) -> Configurations:
         """Turn postures into configurations, in closed form.
 
         All branches of the decomposition are tried; the one inside the limits is taken, else the one that
-        violates them least. Where the posture has the figure's lengths, forward kinematics gives its joints
-        back; where it has not, the rigid parts are the figure's own and `distance` says how far the two are
-        apart.
+        violates them least. If the posture has the figure's lengths, forward kinematics returns its joints; otherwise
+        the rigid parts are the figure's own, every segment keeps its direction, and `distance` tells how far
+        the two are apart. Every posture with 14 finite joints has a finite configuration.
 
         Parameters
         ----------
-        points : array (N, 14, 3) or (N, 19, 3)
-            Joints, and the head's five points where they are known, metres, any right-handed frame.
-        alike : callable, optional
-            Finds postures that share limbs, which are then solved once (`posekit.body.closed_form.Alike`).
-
-        Returns
-        -------
-        Configurations
+        joints : array (N, 14, 3) or (N, 19, 3)
+            Joints, and the head's five points if they are known, metres, any right-handed frame.
+        head : array (N, 5, 3), optional
+            The head's points, NaN if unknown.
+        start, in_time
+            Have no effect: the closed form needs no start, and depends on no other frame.
         """
-        points = with_head(points)
-        q = self.inverse_kinematics(points, alike)
-        placed = np.isfinite(q[:, :7]).all(axis=1)
-        distance = np.full(len(points), np.nan)
-        if placed.any():
-            joints = self.forward_kinematics(q[placed])[:, : len(JOINTS)]
-            gap = np.linalg.norm(joints - points[placed, : len(JOINTS)], axis=-1)
-            distance[placed] = np.fmax.reduce(gap, axis=1)
-        return Configurations(q, distance)
-
-    def inverse_kinematics(self, points: Array, alike: Alike | None = None) -> Array:
-        """Turn postures (N, 19, 3) into q (N, nq), in closed form: `configurations` without the distance."""
-        R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
+        points = with_head(joints, head)
+        R_torso = _completed_frames(points, torso_frame(*(points[:, JOINT[joint]] for joint in TORSO)))
         q = np.full((len(points), self.model.nq), np.nan)
         q[:, :3] = points[:, 0]
         q[:, 3:7] = quaternion_from_rotation(R_torso)
-        angles = self.ik.angles(points, R_torso, alike)
+        angles = self.ik.angles(points)
+        # An unknown head is at neutral; so is an angle that degenerate points leave undetermined.
         angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
+        whole = np.isfinite(points[:, : len(JOINTS)]).all(axis=(1, 2))
+        neutral = np.clip(0.0, self.limits.lower, self.limits.upper)
+        angles[whole] = np.where(np.isnan(angles[whole]), neutral, angles[whole])
         q[:, self.angle_index] = angles
-        return q
-
-    @cached_property
-    def _pool(self) -> pin.GeometryPool:
-        return make_pool(self.model, self.geometry)
-
-    @cached_property
-    def _kinematics(self) -> Kinematics:
-        return Kinematics(model=self.model, points=body_points([_frame_name(name) for name in POINTS]))
-
-    @cached_property
-    def _head_offsets(self) -> Array:
-        return np.asarray(self.neutral_points[list(HEAD)] - self.neutral_points[0])
+        gap = np.linalg.norm(self.points(q) - points[:, : len(JOINTS)], axis=-1)
+        placed = np.isfinite(q[:, :7]).all(axis=1)
+        return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
         """Return the five head points in the head link's frame, some of them replaced."""
-        names = POINTS[len(JOINTS) :]
         for name, point in head_points.items():
-            if name not in ("neck", *names):
-                raise FigureError(
-                    f"figure.head_points: {name!r} is not a head point; expected neck, {', '.join(names)}"
-                )
-            if np.shape(point) != (3,):
-                raise FigureError(f"figure.head_points: {name} has shape {np.shape(point)}; expected x, y, z")
+            if name not in ("neck", *HEAD_POINTS) or np.shape(point) != (3,):
+                got, expected = f"shape {np.shape(point)}", f"x, y, z of neck, {', '.join(HEAD_POINTS)}"
+                raise refusal("figure", f"head_points.{name}", got, expected, error=FigureError)
         neck = np.asarray(head_points.get("neck", np.zeros(3)), dtype=np.float64)
-        head = self._head_offsets.copy()
-        for k, name in enumerate(names):
+        head = self.ik.head_offsets.copy()
+        for k, name in enumerate(HEAD_POINTS):
             if name in head_points:
                 x, y, z = np.asarray(head_points[name], dtype=np.float64) - neck
                 head[k] = x, -z, y
         if not np.isfinite(head).all() or np.linalg.norm(head.mean(axis=0)) == 0:
-            raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
+            got, expected = shown(head.ravel().tolist()), "finite points that are not centred on the neck"
+            raise refusal("figure", "head_points", got, expected, error=FigureError)
         return head
 
     def _check_layout(self) -> None:
-        """Refuse joints that lie otherwise than the closed form takes them to: place a posture and take it back."""
-        q = pin.neutral(self.model)[None]
-        lower, upper = self.limits.lower, self.limits.upper
-        q[:, self.angle_index] = lower + 0.4 * (upper - lower)
-        if self.pelvis_between_hips:
-            # How far such a pelvis is flexed its joints do not tell: it is taken back as the neck turns it.
-            q[:, self.angle_index[3:6]] = 0.0
-        points = self.forward_kinematics(q)
-        back = self.forward_kinematics(self.inverse_kinematics(points))
-        apart = np.linalg.norm(back - points, axis=-1)[0]
-        if not (apart < 1e-6).all():
-            raise FigureError(
-                f"{self.source}: the joint before {POINTS[int(np.argmin(apart < 1e-6))]!r} does not lie as the stick "
-                "figure's; expected limbs along -z, joint origins without rpy, and the stick figure's order of joints"
-            )
+        """Raise if joints lie otherwise than the closed forms assume."""
+        q = self.neutral[None].copy()
+        q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
+        near = np.linalg.norm(self.forward_kinematics(q)[0] - self._placed(q[0]), axis=-1) < SAME_POINT_METRES
+        if not near.all():
+            place = f"the joint before {POINTS[int(np.argmin(near))]}"
+            expected = "limbs along -z, joint origins without rpy, the stick figure's order of joints"
+            raise refusal(self.source, place, "another layout", expected, error=FigureError)
 
 
-def _figure(urdf: str, srdf: str, source: str, side_known: bool, moved: Mapping[str, float]) -> Figure:
-    return Figure(urdf=urdf, srdf=srdf, source=source, side_known=side_known, moved_lengths=moved)
+def with_head(joints: ArrayLike, head: Array | None = None) -> Array:
+    """Append head points (N, 5, 3), unknown by default, to postures (N, 14, 3); leave (N, 19, 3) as they are."""
+    joints = np.asarray(joints, dtype=np.float64)
+    if joints.ndim != 3 or joints.shape[1] not in (len(JOINTS), len(POINTS)) or joints.shape[2] != 3:
+        expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
+        raise refusal("", "joints", f"shape {joints.shape}", expected, "one posture a row", error=FigureError)
+    if joints.shape[1] == len(POINTS):
+        return joints
+    if head is None:
+        head = np.full((len(joints), len(HEAD), 3), np.nan)
+    return np.concatenate([joints, head], axis=1)
 
 
-def _frame_name(point: str) -> str:
-    return LINK_OF_POINT.get(point, point)
+@lru_cache(maxsize=1)
+def _built_in() -> Figure:
+    folder = resources.files("posekit.urdf")
+    return Figure(
+        urdf=(folder / "stick_figure.urdf").read_text(encoding="utf-8"),
+        srdf=(folder / "stick_figure.srdf").read_text(encoding="utf-8"),
+    )
+
+
+def load_figure(path: str | Path | None = None) -> Figure:
+    """Load the built-in figure (Lee & Chen 1985, Tables A.1 and A.2), or one that `Figure.write` wrote.
+
+    Parameters
+    ----------
+    path : path, optional
+        A URDF with the stick figure's joints; an SRDF of the same name beside it, or the built-in one.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not a stick figure.
+
+    Examples
+    --------
+    >>> round(load_figure().lengths["neck-pelvis"], 3) > 0.4
+    True
+    """
+    if path is None:
+        return _built_in()
+    beside = Path(path).with_suffix(".srdf")
+    if beside.exists():
+        return Figure(urdf=read_text(path), srdf=read_text(beside), source=str(path))
+    return Figure(urdf=read_text(path), srdf=_built_in().srdf, source=str(path), shared_srdf=True)
+
+
+def angles_of(
+    joints: Array,
+    head: Array | None = None,
+    *,
+    figure: Figure | None = None,
+    limits: tuple[Array, Array] | None = None,
+) -> Array:
+    """Find the 22 angles of postures: what the range check judges and the solver limits.
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3) or (N, 19, 3)
+        Joints, metres; NaN marks an unknown joint.
+    head : array (N, 5, 3), optional
+        The head's points.
+    figure : Figure, optional
+        Gives the head's shape, the place of the pelvis and the default limits. The built-in one by default.
+    limits : (array (22,), array (22,)), optional
+        Lower and upper limits, radians, that choose among equivalent angles.
+
+    Returns
+    -------
+    array (N, 22)
+        Radians, in the order of `posekit.skeleton.DOFS`; NaN if unknown.
+    """
+    ik = (figure or _built_in()).ik
+    return (ik if limits is None else ik.with_limits(*limits)).angles(with_head(joints, head))
+
+
+def _figure(settings: dict[str, Any]) -> Figure:
+    return Figure(**settings)
+
+
+def _ball(angles: Array) -> Array:
+    """Return the rotations (N, 3, 3) of two or three angles (N, 2 or 3) of a ball joint, radians."""
+    R = coordinate_rotation(1, angles[:, 0]) @ coordinate_rotation(0, angles[:, 1])
+    return R if angles.shape[1] == 2 else np.asarray(R @ coordinate_rotation(2, angles[:, 2]))
+
+
+def _completed_frames(points: Array, R_torso: Array) -> Array:
+    """Replace undetermined torso frames (N, 3, 3) of whole postures, as with the shoulders in line with the spine."""
+    rows = np.isnan(R_torso).any(axis=(1, 2)) & np.isfinite(points[:, : len(JOINTS)]).all(axis=(1, 2))
+    if rows.any():
+        up = unit(points[rows, 0] - points[rows, JOINT["pelvis"]])
+        up = np.where(np.isnan(up), [0.0, 0.0, 1.0], up)
+        R = frame_along(up)
+        R_torso = R_torso.copy()
+        R_torso[rows] = np.stack([R[..., 1], R[..., 2], R[..., 0]], axis=-1)
+    return R_torso

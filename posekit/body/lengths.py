@@ -1,39 +1,128 @@
-"""The rigid parts from their distances: where shoulders and hips lie for given segment lengths."""
+r"""Segment lengths: rigid parts from their distances, the nearest lengths that close, and lengths from stature.
+
+Six distances make a torso, and three make hips, only if triangles close and the four points of the torso fit into
+space. Medians over frames, tapes and rounded numbers miss that by a little. The nearest lengths that close lie at the
+edge of the feasible set, where the torso's points are in one plane, or the hips' on one line:
+
+.. math:: \min_p \sum_i \left(\frac{\log d_i(p) - \log l_i}{\sigma_i}\right)^2
+
+over places p of the points in that plane or on that line, for lengths l of relative standard deviations
+:math:`\sigma`. A common unknown size changes nothing: lengths that close do so in every size.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
-from posekit.errors import FigureError
-from posekit.geometry import Array
-from posekit.skeleton import SEGMENT_NAMES
+from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
+from posekit.errors import FigureError, nearest, refusal, shown
+from posekit.geometry import Array, cross
+from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES, segment_name
 
-FLAT_DEPTH_SQUARED = 1e-9
-"""Squared depth (m^2) down to which a torso that cannot quite close counts as flat (rounded lengths)."""
+#: Metres by segment name.
+Lengths = Mapping[str, float]
+
+#: Squared depth (m^2) down to which a torso that cannot quite close counts as flat (rounded lengths).
+FLAT_DEPTH_SQUARED: Final = 1e-9
+
+#: The six distances inside the torso.
+TORSO_LENGTHS: Final = (
+    *("neck-right_shoulder", "neck-left_shoulder", "neck-pelvis"),
+    *("right_shoulder-left_shoulder", "right_shoulder-pelvis", "left_shoulder-pelvis"),
+)
+
+#: The three distances inside the hips.
+HIPS_LENGTHS: Final = ("pelvis-right_hip", "pelvis-left_hip", "right_hip-left_hip")
+
+#: Largest relative change of a length that is made to close.
+#:
+#: Adults' segments vary beside their size with a standard deviation of 5 % (`posekit.body.uncertainty.UNKNOWN_ADULT`):
+#: beyond four of them the lengths are no body's.
+MAX_MOVED: Final = 0.2
+
+#: Smallest distance of a starting point from the middle, as a fraction of the breadth: on the line itself no distance
+#: has a gradient.
+MIN_WIDTH_PART: Final = 0.25
+
+#: Length of each limb segment as a fraction of stature: Drillis & Contini 1966, "Body segment parameters", Technical
+#: Report 1166.03, New York University, as reprinted in Winter, "Biomechanics and Motor Control of Human Movement"
+#: (figure 4.1).
+LIMB_SHARES: Final = {
+    **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
+    **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
+}
+
+#: Width of the shoulders and of the hips, and height of the shoulders over the hips, by the same source.
+WIDTH_SHARES: Final = (0.259, 0.191)
+TRUNK_SHARE: Final = 0.818 - 0.530
+
+#: The same between joint centres, means of women and men: de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment
+#: inertia parameters", J Biomech 29:1223, Table 4 (statures 1735 and 1741 mm).
+CENTRE_SHARES: Final = {
+    ("shoulder", "elbow"): (275.1 / 1735 + 281.7 / 1741) / 2,
+    ("elbow", "wrist"): (264.3 / 1735 + 268.9 / 1741) / 2,
+    ("hip", "knee"): (368.5 / 1735 + 422.2 / 1741) / 2,
+    ("knee", "ankle"): (438.6 / 1735 + 440.3 / 1741) / 2,
+}
+
+#: Widths between key points. Shoulders: the breadth over the acromia (415.7 of 1756.2 mm: Gordon et al. 2014, ANSUR II)
+#: less what detectors mark further in on either side, near the heads of the humeri (fitted to MediaPipe's points,
+#: triangulated by four cameras; OpenPose's BODY_25B agrees within 1 %). Hips: the heads of the femurs (X-ray of 500
+#: adults: 91.54 of 1629 and 95.02 of 1756.2 mm from the middle).
+KEY_POINT_WIDTHS: Final = (415.7 / 1756.2 - 2 * 0.0227, 91.54 / 1629.0 + 95.02 / 1756.2)
+
+#: Accepted statures: beyond those ever recorded a number is more likely in another unit.
+STATURE_METRES: Final = (0.4, 2.8)
 
 
-def check_lengths(lengths: Mapping[str, float]) -> None:
-    """Refuse lengths that are unknown, not finite or not positive."""
+def check_lengths(lengths: Lengths) -> None:
+    """Raise `FigureError` if a length is unknown, not finite or not positive."""
     for name, length in lengths.items():
         if name not in SEGMENT_NAMES:
-            raise FigureError(
-                f"figure.lengths: {name!r} is not a segment; expected one of {', '.join(SEGMENT_NAMES)}"
-            )
+            remedy = nearest(name, SEGMENT_NAMES)
+            raise refusal("figure", "lengths", shown(name), "a segment's name", remedy, error=FigureError)
         if not (math.isfinite(length) and length > 0):
-            raise FigureError(f"figure.lengths: {name} is {length:g} m; expected a positive, finite length")
+            expected = "a positive, finite length in metres"
+            raise refusal("figure", f"lengths.{name}", f"{length:g}", expected, error=FigureError)
 
 
-def torso_points(lengths: Mapping[str, float], *, behind: bool = False) -> Array:
+def segment_lengths(joints: Array) -> dict[str, float]:
+    """Return the median length of each of the 17 segments over postures (N, 14, 3) or (N, 19, 3), metres.
+
+    Segments that are never seen whole are left out.
+    """
+    lengths = {}
+    for name, (a, b) in zip(SEGMENT_NAMES, SEGMENTS, strict=True):
+        distance = np.linalg.norm(joints[:, a] - joints[:, b], axis=-1)
+        known = distance[np.isfinite(distance)]
+        if known.size:
+            lengths[name] = float(np.median(known))
+    return lengths
+
+
+def shoulders_are_behind(joints: Array) -> bool | None:
+    """Tell on which side of the line from neck to pelvis the shoulders of postures (N, 14, 3) lie; None if unseen.
+
+    Lengths do not distinguish a torso from its mirror image.
+    """
+    names = ("neck", "pelvis", "right_shoulder", "left_shoulder")
+    neck, pelvis, right, left = (joints[:, JOINT[name]] for name in names)
+    forward = np.einsum("ni,ni->n", cross(pelvis - neck, left - right), (left + right) / 2 - neck)
+    known = forward[np.isfinite(forward)]
+    return bool(np.median(known) < 0) if known.size else None
+
+
+def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     r"""Place neck, right shoulder, left shoulder and pelvis by their six distances.
 
     With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that
     line: height :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for
     neck-shoulder a, neck-pelvis b, shoulder-pelvis c. The line between the shoulders gives the angle
-    between the two, and its part across the body the left axis. The distances leave the side open: the
-    shoulders are put in front, unless they are said to be `behind`.
+    between the two, and its part across the body the left axis. The distances leave the side open.
 
     Parameters
     ----------
@@ -50,62 +139,23 @@ def torso_points(lengths: Mapping[str, float], *, behind: bool = False) -> Array
     Raises
     ------
     FigureError
-        Where no such body exists: a triangle does not close, or the shoulders are too far apart or too near.
+        If no such body exists: a triangle does not close, or the shoulders are too far apart or too near.
     """
     right, left, forward_squared = _torso(lengths)
     if forward_squared < -FLAT_DEPTH_SQUARED:
-        width, (z_right, r_right), (z_left, r_left) = (
-            lengths["right_shoulder-left_shoulder"],
-            right[:2],
-            left[:2],
-        )
-        reach = r_right + r_left
-        raise FigureError(
-            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "
-            f"it must lie between {math.hypot(r_right - r_left, z_right - z_left):g} and "
-            f"{math.hypot(reach, z_right - z_left):g} m; correct one of the torso's six lengths"
-        )
-    forward = math.sqrt(max(forward_squared, 0.0))
-    if behind:
-        forward = -forward
-    return np.array(
-        [
-            [0.0, 0.0, 0.0],
-            [forward, right[2], -right[0]],
-            [forward, left[2], -left[0]],
-            [0.0, 0.0, -lengths["neck-pelvis"]],
-        ]
-    )
+        (z_right, r_right), (z_left, r_left) = right[:2], left[:2]
+        low = math.hypot(r_right - r_left, z_right - z_left)
+        high = math.hypot(r_right + r_left, z_right - z_left)
+        width, remedy = "right_shoulder-left_shoulder", "correct one of the torso's six lengths"
+        expected = f"{low:g} to {high:g} m with the other torso lengths"
+        got = f"{lengths[width]:g}"
+        raise refusal("figure", f"lengths.{width}", got, expected, remedy, error=FigureError)
+    forward = math.sqrt(max(forward_squared, 0.0)) * (-1.0 if behind else 1.0)
+    shoulders = [[forward, right[2], -right[0]], [forward, left[2], -left[0]]]
+    return np.array([[0.0, 0.0, 0.0], *shoulders, [0.0, 0.0, -lengths["neck-pelvis"]]])
 
 
-def forward_squared(lengths: Mapping[str, float]) -> float:
-    """Return the square of how far the shoulders lie beside the line from neck to pelvis, forward or back (m^2).
-
-    Negative where the six distances close in no space: how much is missing.
-    """
-    return _torso(lengths)[2]
-
-
-def _torso(
-    lengths: Mapping[str, float],
-) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Return depth, radius and place across of right and left shoulder, and the square of their place forward."""
-    right = _apex("neck", "right_shoulder", "pelvis", lengths)
-    left = _apex("neck", "left_shoulder", "pelvis", lengths)
-    width = lengths["right_shoulder-left_shoulder"]
-    across_squared = width**2 - (right[0] - left[0]) ** 2
-    if across_squared <= 0:
-        raise FigureError(
-            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but the shoulders' heights differ "
-            f"by {abs(right[0] - left[0]):g} m; lengthen it or make the two sides more alike"
-        )
-    across = math.sqrt(across_squared)
-    middle = (left[1] ** 2 - right[1] ** 2) / across
-    y_left, y_right = (middle + across) / 2, (middle - across) / 2
-    return (*right, y_right), (*left, y_left), right[1] ** 2 - y_right**2
-
-
-def hips_points(lengths: Mapping[str, float]) -> Array:
+def hips_points(lengths: Lengths) -> Array:
     """Place pelvis, right hip and left hip by their three distances; the pelvis may lie between the hips.
 
     Returns
@@ -118,20 +168,221 @@ def hips_points(lengths: Mapping[str, float]) -> Array:
     return np.array([[0.0, 0.0, 0.0], [0.0, -offset, -height], [0.0, base - offset, -height]])
 
 
-def _apex(start: str, apex: str, end: str, lengths: Mapping[str, float]) -> tuple[float, float]:
+def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: float = 3.0) -> bool:
+    r"""Tell whether uncertain lengths distinguish a torso from its mirror image.
+
+    The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. Small
+    errors of the lengths change :math:`f^2`, and so the deviation of f is that of :math:`f^2` over :math:`2 f`.
+
+    Parameters
+    ----------
+    lengths : mapping
+        Metres, by segment name.
+    known : LengthUncertainty
+        How well they are known.
+    deviations : float
+        Standard deviations of f by which it must differ from zero.
+    """
+    squared = max(_torso(lengths)[2], 0.0)
+    variance = 0.0
+    step = 1e-6
+    for name in TORSO_LENGTHS:
+        ends = []
+        for factor in (1 + step, 1 - step):
+            try:
+                ends.append(_torso({**lengths, name: lengths[name] * factor})[2])
+            except FigureError:  # a triangle is at its edge: the other end is enough
+                ends.append(_torso(lengths)[2])
+        variance += (known.own[name] * (ends[0] - ends[1]) / (2 * step)) ** 2
+    # f > n sd(f^2) / (2 f)
+    return variance == 0 or squared > deviations * math.sqrt(variance) / 2
+
+
+def closed_lengths(
+    lengths: Lengths, known: LengthUncertainty = MEASURED_LENGTHS
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the nearest lengths that make a torso and hips; lengths that close already are unchanged.
+
+    Parameters
+    ----------
+    lengths : mapping
+        All 17, metres, by segment name.
+    known : LengthUncertainty
+        How well each is known beside their common size. If some lengths of a part are exact, all of them count alike.
+
+    Returns
+    -------
+    lengths, moved : dict
+        Metres, by segment name; `moved` has the changes, and only of the lengths that were changed.
+
+    Raises
+    ------
+    FigureError
+        If a length would have to change by more than `MAX_MOVED` of it.
+    """
+    check_lengths(lengths)
+    out, moved = dict(lengths), dict[str, float]()
+    for names, points in ((TORSO_LENGTHS, torso_points), (HIPS_LENGTHS, hips_points)):
+        try:
+            points(lengths)
+        except FigureError as error:
+            new = _nearest(names, lengths, known)
+            worst = max(abs(new[name] / lengths[name] - 1) for name in names)
+            if not worst <= MAX_MOVED:
+                raise FigureError(f"{error}; the nearest body differs by {worst:.0%} in a length") from None
+            points(new)
+            out |= new
+            moved |= {name: new[name] - lengths[name] for name in names}
+    return out, moved
+
+
+def stature_from_lengths(lengths: Lengths) -> float:
+    """Estimate a person's stature (m) from the limbs: their total length over its share (Drillis & Contini 1966)."""
+    total = sum(lengths[f"{side}_{a}-{side}_{b}"] for side in SIDES for a, b in LIMB_SHARES)
+    return total / (2 * sum(LIMB_SHARES.values()))
+
+
+def lengths_from_stature(stature: float, reference: Lengths, *, key_points: bool = False) -> dict[str, float]:
+    """Estimate the 17 lengths of a person of a given stature.
+
+    Limbs and widths are fractions of stature. The inner torso (neck, pelvis joint) has the reference figure's shape,
+    scaled across by the widths of shoulders and hips and along by the height of the shoulders above the hips.
+
+    Parameters
+    ----------
+    stature : float
+        Standing height, metres.
+    reference : mapping
+        The reference figure's lengths, metres.
+    key_points : bool
+        Use lengths between key points of detectors, close to joint centres, with the neck in the middle of the
+        shoulders, in place of Drillis & Contini's of anatomical landmarks.
+
+    Returns
+    -------
+    dict
+        Lengths, metres, by segment name.
+
+    Raises
+    ------
+    FigureError
+        If the stature is not a person's in metres.
+    """
+    low, high = STATURE_METRES
+    if not low <= stature <= high:
+        expected, remedy = f"{low} to {high} m", "check its unit"
+        raise refusal("figure", "stature", f"{stature:g} m", expected, remedy, error=FigureError)
+    limbs, widths = (CENTRE_SHARES, KEY_POINT_WIDTHS) if key_points else (LIMB_SHARES, WIDTH_SHARES)
+    torso, hips = torso_points(reference), hips_points(reference)
+    across = widths[0] * stature / (torso[2, 1] - torso[1, 1])
+    height = (torso[1, 2] + torso[2, 2]) / 2 - (torso[3, 2] + (hips[1, 2] + hips[2, 2]) / 2)
+    along = TRUNK_SHARE * stature / height
+    torso *= [across, across, along]
+    hips *= [1.0, widths[1] * stature / (hips[2, 1] - hips[1, 1]), along]
+    place = {**dict(enumerate(torso)), 4: hips[1] + torso[3], 5: hips[2] + torso[3]}
+    trunk = [(a, b) for a, b in SEGMENTS if a in place and b in place]
+    lengths = {segment_name((a, b)): float(np.linalg.norm(place[a] - place[b])) for a, b in trunk}
+    for (a, b), share in limbs.items():
+        lengths |= {f"{side}_{a}-{side}_{b}": share * stature for side in SIDES}
+    return middle_neck(lengths) if key_points else lengths
+
+
+def middle_neck(lengths: Lengths) -> dict[str, float]:
+    r"""Return a figure's lengths with its neck in the middle between its shoulders, as most detectors place it.
+
+    With shoulders w apart and c from the pelvis joint, the neck is w / 2 from each and :math:`\sqrt{c^2 - w^2 / 4}`
+    from the pelvis joint; c is the mean of both sides.
+    """
+    half = lengths["right_shoulder-left_shoulder"] / 2
+    to_pelvis = (lengths["right_shoulder-pelvis"] + lengths["left_shoulder-pelvis"]) / 2
+    moved = {"neck-pelvis": math.sqrt(to_pelvis**2 - half**2)}
+    for side in SIDES:
+        moved |= {f"neck-{side}_shoulder": half, f"{side}_shoulder-pelvis": to_pelvis}
+    return {**lengths, **moved}
+
+
+def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
+    """Return depth, radius and place across of right and left shoulder, and the square of their place forward.
+
+    The square is negative if the six distances fit into no space.
+    """
+    right = _apex("neck", "right_shoulder", "pelvis", lengths)
+    left = _apex("neck", "left_shoulder", "pelvis", lengths)
+    width = lengths["right_shoulder-left_shoulder"]
+    across_squared = width**2 - (right[0] - left[0]) ** 2
+    if across_squared <= 0:
+        expected = f"more than {abs(right[0] - left[0]):g} m, by which the shoulders' heights differ"
+        remedy, field = "lengthen it or make both sides more alike", "lengths.right_shoulder-left_shoulder"
+        raise refusal("figure", field, f"{width:g}", expected, remedy, error=FigureError)
+    across = math.sqrt(across_squared)
+    middle = (left[1] ** 2 - right[1] ** 2) / across
+    y_left, y_right = (middle + across) / 2, (middle - across) / 2
+    return (*right, y_right), (*left, y_left), right[1] ** 2 - y_right**2
+
+
+def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, float]:
     """Return how far along start-end, and how far from that line, the third corner of a triangle is."""
-    base = _length(start, end, lengths)
-    near = _length(start, apex, lengths)
-    far = _length(apex, end, lengths)
+    base, near, far = (
+        lengths[f"{a}-{b}"] if f"{a}-{b}" in lengths else lengths[f"{b}-{a}"]
+        for a, b in ((start, end), (start, apex), (apex, end))
+    )
     along = (base**2 + near**2 - far**2) / (2 * base)
     squared = near**2 - along**2
     if squared < -FLAT_DEPTH_SQUARED:
-        raise FigureError(
-            f"figure.lengths: the triangle {start}, {apex}, {end} does not close with {base:g}, {near:g} and "
-            f"{far:g} m; each must be at most the sum of the other two"
-        )
+        field, got = f"lengths of the triangle {start}, {apex}, {end}", f"{base:g}, {near:g} and {far:g} m"
+        raise refusal("figure", field, got, "each at most the sum of the other two", error=FigureError)
     return along, math.sqrt(max(squared, 0.0))
 
 
-def _length(a: str, b: str, lengths: Mapping[str, float]) -> float:
-    return lengths[f"{a}-{b}"] if f"{a}-{b}" in lengths else lengths[f"{b}-{a}"]
+def _nearest(names: tuple[str, ...], lengths: Lengths, known: LengthUncertainty) -> dict[str, float]:
+    """Return the lengths of a part's points, in a plane or on a line, that are nearest to those given."""
+    from scipy.optimize import least_squares
+
+    own = np.array([known.own[name] for name in names])
+    weight = 1.0 / own if own.all() else np.ones(len(own))
+    wanted = np.log([lengths[name] for name in names])
+    if names == TORSO_LENGTHS:
+        ends = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+        start, free = _torso_start(lengths), np.array([(1, 0), (1, 1), (2, 0), (2, 1), (3, 1)])
+    else:
+        ends = np.array([(0, 1), (0, 2), (1, 2)])
+        start, free = _hips_start(lengths), np.array([(1, 0), (2, 0)])
+
+    def gaps(unknowns: Array) -> Array:
+        points = np.zeros((4, 2))
+        points[tuple(free.T)] = unknowns
+        return np.asarray(points[ends[:, 1]] - points[ends[:, 0]])
+
+    def residual(unknowns: Array) -> Array:
+        return np.asarray(weight * (np.log(np.linalg.norm(gaps(unknowns), axis=1)) - wanted))
+
+    def jacobian(unknowns: Array) -> Array:
+        gap = gaps(unknowns)
+        per_point = weight[:, None] * gap / np.sum(gap**2, axis=1, keepdims=True)
+        J = np.zeros((len(ends), 4, 2))
+        J[range(len(ends)), ends[:, 1]] += per_point
+        J[range(len(ends)), ends[:, 0]] -= per_point
+        return np.asarray(J[:, free[:, 0], free[:, 1]])
+
+    found = least_squares(residual, start, jac=jacobian, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    return dict(zip(names, np.linalg.norm(gaps(found.x), axis=1).tolist(), strict=True))
+
+
+def _torso_start(lengths: Lengths) -> Array:
+    """Place the shoulders beside the neck as far as their triangles close, and the pelvis below it (5,)."""
+    down, width = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"]
+    start = []
+    for side, sign in (("right", -1.0), ("left", 1.0)):
+        near, far = lengths[f"neck-{side}_shoulder"], lengths[f"{side}_shoulder-pelvis"]
+        along = (down**2 + near**2 - far**2) / (2 * down)
+        beside = math.sqrt(max(near**2 - along**2, 0.0))
+        start += [sign * max(beside, MIN_WIDTH_PART * width), -along]
+    return np.array([*start, -down])
+
+
+def _hips_start(lengths: Lengths) -> Array:
+    """Place the hips on both sides of the pelvis, or on one if that is nearer (2,)."""
+    right, left, width = (lengths[name] for name in HIPS_LENGTHS)
+    if width >= max(right, left):
+        return np.array([-right, left])
+    return np.array([-right, -left]) if right > left else np.array([right, left])

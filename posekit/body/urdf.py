@@ -1,13 +1,11 @@
-"""Reading, checking and rewriting the figure's URDF text."""
+"""The figure's URDF text with other lengths or limits."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import lru_cache
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,66 +13,18 @@ import numpy as np
 from posekit.body.capsules import Capsule
 from posekit.body.inertias import inertias
 from posekit.body.lengths import hips_points, torso_points
-from posekit.errors import FigureError, InputError
+from posekit.errors import FigureError, refusal
 from posekit.geometry import Array
-from posekit.robots.urdf import check_urdf, read_urdf
-from posekit.safe_io import write_text
+from posekit.robots.urdf import parse_xml
 from posekit.skeleton import HEAD_POINTS, SIDES
 
-LIMB_SEGMENTS = (
+#: Link, the joint at its end, and the two joints of the skeleton between which it lies.
+LIMB_LINKS = (
     ("upper_arm", "elbow_flexion", "shoulder", "elbow"),
     ("forearm", "wrist_fixed", "elbow", "wrist"),
     ("thigh", "knee_flexion", "hip", "knee"),
     ("shank", "ankle_fixed", "knee", "ankle"),
 )
-"""Link, the joint at its end, and the two joints of the skeleton between which it lies."""
-
-
-def read_text(path: Path) -> str:
-    """Read a URDF or SRDF file as text, with a limit on its size."""
-    with as_figure_error():
-        return read_urdf(path)
-
-
-def write_texts(path: Path, urdf: str, srdf: str) -> None:
-    """Write a URDF, and its SRDF beside it: each whole or not at all, and no new SRDF alone."""
-    beside = path.with_suffix(".srdf")
-    new = not beside.exists()
-    with as_figure_error():
-        write_text(beside, [srdf])
-    try:
-        with as_figure_error():
-            write_text(path, [urdf])
-    except FigureError:
-        if new:
-            beside.unlink(missing_ok=True)
-        raise
-
-
-def parse(text: str, source: str) -> ElementTree.Element:
-    """Parse the figure's URDF: what is checked of any robot's, and no meshes.
-
-    Raises
-    ------
-    FigureError
-        With the place that is wrong. Pinocchio would accept or silently drop most of these.
-    """
-    with as_figure_error():
-        robot = check_urdf(text, source)
-    if robot.find(".//collision//mesh") is not None:
-        raise FigureError(
-            f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)"
-        )
-    return robot
-
-
-@contextmanager
-def as_figure_error() -> Iterator[None]:
-    """Call what is wrong with any robot's file an error of the figure."""
-    try:
-        yield
-    except InputError as error:
-        raise FigureError(str(error)) from error
 
 
 def rewrite(
@@ -106,29 +56,17 @@ def rewrite(
         The head's points in the head link's frame (x forward, y left, z up, origin the neck), metres.
     behind : bool
         Whether the shoulders lie behind the line from neck to pelvis.
-
-    Returns
-    -------
-    str
-        URDF text.
     """
     robot = deepcopy(_parsed(text))
     torso, hips = torso_points(lengths, behind=behind), hips_points(lengths)
-    origins = {
-        "right_shoulder_flexion": torso[1],
-        "left_shoulder_flexion": torso[2],
-        "pelvis_flexion": torso[3],
-        "right_hip_flexion": hips[1],
-        "left_hip_flexion": hips[2],
-        **{f"{name}_fixed": point for name, point in zip(HEAD_POINTS, head, strict=True)},
-    }
-    lines = {
-        "torso": (torso[0], torso[3]),
-        "hips": (hips[1], hips[2]),
-        "head": (np.zeros(3), head.mean(axis=0)),
-    }
+    origins = {f"{name}_fixed": point for name, point in zip(HEAD_POINTS, head, strict=True)}
+    origins["pelvis_flexion"] = torso[3]
+    for k, side in enumerate(SIDES, 1):
+        origins |= {f"{side}_shoulder_flexion": torso[k], f"{side}_hip_flexion": hips[k]}
+    lines = {"torso": (torso[0], torso[3]), "hips": (hips[1], hips[2])}
+    lines["head"] = np.zeros(3), head.mean(axis=0)
     for side in SIDES:
-        for part, joint, start, end in LIMB_SEGMENTS:
+        for part, joint, start, end in LIMB_LINKS:
             length = lengths[f"{side}_{start}-{side}_{end}"]
             origins[f"{side}_{joint}"] = np.array([0.0, 0.0, -length])
             lines[f"{side}_{part}"] = (np.zeros(3), origins[f"{side}_{joint}"])
@@ -150,7 +88,7 @@ def rewrite(
         cylinder.set("radius", repr(capsule.radius * (shoulders if capsule.link == "torso" else ratio)))
     for name, (mass, centre, moments) in inertias(lengths).items():
         inertial = robot.find(f"link[@name='{name}']/inertial")
-        if inertial is None:  # a figure of one's own may do without masses
+        if inertial is None:  # a user's figure may have no masses
             continue
         _find(inertial, "origin").set("xyz", _numbers(centre))
         _find(inertial, "mass").set("value", repr(float(mass)))
@@ -160,7 +98,7 @@ def rewrite(
 
 
 def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
-    """Write the figure's URDF with other limits (radians) on some joints."""
+    """Write the figure's URDF with other limits (radians) on some joints, by URDF name."""
     robot = deepcopy(_parsed(text))
     for name, (lower, upper) in limits.items():
         limit = _find(robot, f"joint[@name='{name}']/limit")
@@ -171,8 +109,8 @@ def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
 
 @lru_cache(maxsize=4)
 def _parsed(text: str) -> ElementTree.Element:
-    """Parse the URDF of a figure of which many others are made: whoever changes the tree changes a copy."""
-    return parse(text, "stick figure")
+    """Parse the URDF of a figure; the tree is shared, so callers change a copy."""
+    return parse_xml(text, "stick figure")
 
 
 def _text(robot: ElementTree.Element) -> str:
@@ -184,7 +122,8 @@ def _text(robot: ElementTree.Element) -> str:
 def _find(element: ElementTree.Element, path: str) -> ElementTree.Element:
     found = element.find(path)
     if found is None:
-        raise FigureError(f"the URDF has no {path}; start from posekit's stick figure")
+        remedy = "start from posekit's stick figure"
+        raise refusal("the URDF", path, "nothing", "the element", remedy, error=FigureError)
     return found
 
 

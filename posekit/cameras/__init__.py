@@ -1,10 +1,11 @@
-"""Cameras: where a point is seen, and where the end of a segment can be.
-
-A camera is anything with `project` and `lift` (see `posekit.cameras.camera.Camera`); the interpretation
-tree asks for nothing else.
-"""
+"""Cameras, and what they saw: image points of a person as a `View`, key points of detectors as `Detections`."""
 
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift
+from posekit.cameras.detections import Detections as Detections
+from posekit.cameras.guesses import camera_from_fov as camera_from_fov
+from posekit.cameras.lee_chen import LeeChenCamera as LeeChenCamera
 from posekit.cameras.pinhole import PinholeCamera as PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera as ScaledOrthographicCamera
+from posekit.cameras.view import CameraModel as CameraModel
+from posekit.cameras.view import View as View

@@ -1,20 +1,19 @@
-"""What the tree asks of a camera, and the ray-sphere intersection behind every lift."""
+"""Rays of a camera, and the ray-sphere intersection behind every lift."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.errors import CameraError, refusal, shown
+from posekit.geometry import FARTHEST_COORDINATE, Array, Flags
 
-COINCIDENT_METRES = 1e-7
-"""Half the distance (m) between the two candidates below which they count as one.
-
-The candidates are at the foot of the perpendicular on the ray, plus and minus ``sqrt(l^2 - h^2)``. Rounding
-leaves about 1e-15 m^2 under the root a few metres away, so this is as near as the two can be told apart.
-"""
+#: Half the distance (m) between the two candidates below which they count as one.
+#:
+#: The candidates are at the foot of the perpendicular on the ray, plus and minus ``sqrt(l^2 - h^2)``. Rounding
+#: leaves about 1e-15 m^2 under the root a few metres away, so closer candidates cannot be distinguished.
+COINCIDENT_METRES: Final = 1e-7
 
 
 class Lift(NamedTuple):
@@ -23,24 +22,46 @@ class Lift(NamedTuple):
     Attributes
     ----------
     points : array (..., 2, 3)
-        The nearer and the farther candidate, camera frame, metres. NaN where the ray is unknown.
+        The nearer and the farther candidate, camera frame, metres. NaN if the ray is unknown.
     valid : bool array (..., 2)
         Whether each is a solution: both, the nearer alone (tangent, both coincide), or none.
     excess : array (...)
-        Distance from the segment's start to the ray less the segment's length, metres: positive where the
+        Distance from the segment's start to the ray minus the segment's length, metres: positive if the
         segment is too short for its image.
     """
 
     points: Array
-    valid: NDArray[np.bool_]
+    valid: Flags
     excess: Array
 
 
 class Camera(Protocol):
-    """Anything that projects points and lifts segments."""
+    """The interface of the three cameras.
+
+    Camera frame as OpenCV's: x right, y down, z forward. Normalised image points are free of intrinsics and lens:
+    (x/z, y/z) of a perspective camera, (x, y) in metres of the scaled orthographic one. The first axis of every
+    array counts frames, for cameras whose focal length or scale differs between frames.
+    """
+
+    @property
+    def perspective(self) -> bool:
+        """Whether rays meet in the optical centre; otherwise they are parallel."""
+        ...
 
     def project(self, points: Array) -> Array:
-        """Project points (F, ..., 3), camera frame, to image points (F, ..., 2)."""
+        """Project points (F, ..., 3), camera frame, metres, to image points (F, ..., 2)."""
+        ...
+
+    def normalize(self, image: Array) -> Array:
+        """Turn image points (F, ..., 2) into normalised ones; NaN if no ray reaches the point."""
+        ...
+
+    def jacobian(self, normalized: Array) -> Array:
+        """Return the derivatives (F, ..., 2, 2) of image points by their normalised ones (F, ..., 2)."""
+        ...
+
+    def rays(self, image: Array) -> tuple[Array, Array]:
+        """Return origins and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
         ...
 
     def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
@@ -48,8 +69,15 @@ class Camera(Protocol):
         ...
 
 
+def perspective_rays(normalized: Array) -> tuple[Array, Array]:
+    """Return origins and unit directions (..., 3) of the rays of normalised points (..., 2)."""
+    direction = np.concatenate([normalized, np.ones_like(normalized[..., :1])], axis=-1)
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    return np.zeros_like(direction), direction
+
+
 def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float) -> Lift:
-    r"""Meet the ray of a pixel with the sphere of a segment's ends.
+    r"""Intersect the ray of an image point with the sphere of a segment's ends.
 
     With the foot of the perpendicular from the start :math:`s` on the ray at parameter :math:`t_0`, and
     :math:`h` the distance between the two, the ends are at :math:`t_0 \pm \sqrt{l^2 - h^2}` (Lee & Chen 1985,
@@ -58,17 +86,13 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     Parameters
     ----------
     origin, direction : array (..., 3)
-        The ray, its direction of unit length; parameters below zero are behind the camera.
+        The ray, its direction of unit length; points with negative parameters are behind the camera.
     start : array (..., 3)
         The segment's known end, metres.
     length : array (...)
         The segment's length, metres.
     tolerance : float
-        Metres by which the ray may pass outside the sphere and still be taken as tangent to it.
-
-    Returns
-    -------
-    Lift
+        Metres by which the ray may miss the sphere and still count as tangent.
     """
     offset = start - origin
     along = np.einsum("...i,...i->...", offset, direction)
@@ -81,5 +105,22 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     reachable = excess <= np.maximum(tolerance, 0.0)
     valid = reachable[..., None] & (depth > 0.0)
     valid[..., 1] &= ~tangent
-    points = origin[..., None, :] + depth[..., None] * direction[..., None, :]
-    return Lift(points, valid, excess)
+    return Lift(origin[..., None, :] + depth[..., None] * direction[..., None, :], valid, excess)
+
+
+def check_positive(name: str, value: float | Array | None) -> None:
+    """Raise `CameraError` if a focal length or a scale is not positive and finite; None is unknown."""
+    if value is None:
+        return
+    values = np.asarray(value)
+    good = (values >= 1 / FARTHEST_COORDINATE) & (values <= FARTHEST_COORDINATE)
+    if values.ndim > 1 or not good.all():
+        bad = shown(values.tolist()) if values.ndim > 1 else shown(float(values[~good].flat[0]))
+        limits = f"{1 / FARTHEST_COORDINATE:g} to {FARTHEST_COORDINATE:g}"
+        raise refusal("camera", name, bad, f"a number from {limits}, one or one a frame", error=CameraError)
+
+
+def per_frame(value: float | Array, ndim: int) -> Array:
+    """Shape one number, or one a frame (F,), so that it broadcasts against an array of `ndim` axes."""
+    values = np.asarray(value, dtype=np.float64)
+    return values.reshape(*values.shape, *(1,) * (ndim - 1)) if values.ndim else values

@@ -1,41 +1,93 @@
-r"""The camera of the 1985 paper, converted at this boundary and nowhere else.
+r"""The camera of the 1985 paper, whose conventions are converted here and nowhere else.
 
-Its frame is left-handed: x right, y up, z away from the camera, with the origin *on the image plane*, f in
+The paper's frame is left-handed: x right, y up, z away from the camera, with the origin *on the image plane*, f in
 front of the centre of projection, so that :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6).
-Inside posekit the same camera is a `PinholeCamera` with intrinsics ``diag(f, f, 1)``: y turns over, z gains
-f. Both directions are exact.
+Inside posekit the camera is a pinhole with intrinsics ``diag(f, f, 1)``, y down and the origin in the centre of
+projection: y changes sign, z gains f. Both directions are exact.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from posekit.cameras.pinhole import PinholeCamera
-from posekit.errors import CameraError
-from posekit.geometry import Array
+from posekit.cameras.camera import Lift, check_positive, meet_sphere, per_frame, perspective_rays
+from posekit.errors import CameraError, refusal
+from posekit.geometry import Array, Record, from_metres, read_only
 
 UP_FLIP: Array = np.array([1.0, -1.0, 1.0])
 
 
-def pinhole(f: float | Array) -> PinholeCamera:
-    """Make the pinhole camera of lens-to-image-plane distance f, one or one a frame (F,), metres."""
-    distances = np.asarray(f, dtype=np.float64)
-    if not (np.isfinite(distances) & (distances > 0)).all():
-        raise CameraError(f"f must be positive and finite; got {distances.tolist()}")
-    K = np.zeros((*distances.shape, 3, 3))
-    K[..., 0, 0] = K[..., 1, 1] = distances
-    K[..., 2, 2] = 1.0
-    return PinholeCamera(K=K)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class LeeChenCamera(Record):
+    """A perspective camera with image points in metres on the image plane, y down.
+
+    Parameters
+    ----------
+    f : float or array (F,), optional
+        Distance from the centre of projection to the image plane, metres, one or one a frame; None if unknown.
+
+    Raises
+    ------
+    CameraError
+        If f is not finite and positive.
+    """
+
+    f: float | Array | None
+
+    def __post_init__(self) -> None:
+        check_positive("f", self.f)
+        if self.f is not None:
+            self._set("f", read_only(self.f) if np.ndim(self.f) else float(self.f))
+
+    @property
+    def perspective(self) -> bool:
+        """Whether rays meet in the optical centre: always."""
+        return True
+
+    def project(self, points: Array) -> Array:
+        """Project points (F, ..., 3), OpenCV camera frame, to the image plane (F, ..., 2); NaN behind the camera."""
+        depth = points[..., 2:]
+        return np.asarray(points[..., :2] / np.where(depth > 0, depth, np.nan) * self._distances(points.ndim))
+
+    def normalize(self, image: Array) -> Array:
+        """Turn image points (F, ..., 2), metres, into (x/z, y/z)."""
+        return np.asarray(image / self._distances(image.ndim))
+
+    def jacobian(self, normalized: Array) -> Array:
+        """Return the derivatives (F, ..., 2, 2) of image points by (x/z, y/z)."""
+        distances = np.broadcast_to(self._distances(normalized.ndim), normalized.shape)
+        return np.asarray(distances[..., None] * np.eye(2))
+
+    def rays(self, image: Array) -> tuple[Array, Array]:
+        """Return origins (zero) and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
+        return perspective_rays(self.normalize(image))
+
+    def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
+        """Find the ends of segments: see `posekit.cameras.PinholeCamera.lift`."""
+        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
+
+    def take(self, rows: Any) -> LeeChenCamera:
+        """Return the camera of some frames."""
+        if np.ndim(self.f if self.f is not None else 0.0) == 0:
+            return self
+        return LeeChenCamera(f=np.asarray(self.f)[rows])
+
+    def fields(self, unit: str = "m") -> dict[str, Any]:
+        """Return the camera as files spell it, f in `unit`."""
+        return {"model": "lee-chen", "f": None if self.f is None else from_metres(self.f, unit).tolist()}
+
+    def _distances(self, ndim: int) -> Array:
+        if self.f is None:
+            raise refusal("camera", "f", "null", "a distance in metres", "give it", error=CameraError)
+        return per_frame(self.f, ndim)
 
 
 def image_from_paper(image: Array) -> Array:
-    """Turn the paper's image points (y up) into posekit's (y down), and back: it is its own inverse."""
+    """Turn the paper's image points (y up) into posekit's (y down), or back: the map is its own inverse."""
     return image * UP_FLIP[:2]
-
-
-def points_from_paper(points: Array, f: float | Array) -> Array:
-    """Turn points (F, ..., 3) of the paper's camera frame into OpenCV's; f one, or one a frame (F,)."""
-    return points * UP_FLIP + _forward(f, points.ndim)
 
 
 def points_to_paper(points: Array, f: float | Array) -> Array:
@@ -44,7 +96,7 @@ def points_to_paper(points: Array, f: float | Array) -> Array:
 
 
 def rotation_to_paper(R: Array) -> Array:
-    """Turn R_cam_head of OpenCV's frame into the matrix [R] that the paper prints (Table 2b).
+    """Turn R_cam_head (..., 3, 3) of OpenCV's frame into the matrix [R] that the paper prints (Table 2b).
 
     Its columns are the right-handed camera's axes, right, up and backward, in the head's coordinates.
     """
@@ -54,16 +106,15 @@ def rotation_to_paper(R: Array) -> Array:
 def camera_position(R: Array, t: Array, f: float | Array) -> Array:
     """Return the paper's camera position (Table 2c): the image plane's origin in the head's coordinates.
 
-    R (..., 3, 3) and t (..., 3) take the head's frame to OpenCV's camera frame; f one, or one a frame.
+    R (..., 3, 3) and t (..., 3) map the head's frame to OpenCV's camera frame; f one, or one a frame.
     """
-    position: Array = np.einsum("...ji,...j->...i", R, _forward(f, t.ndim) - t)
-    return position
+    return np.asarray(np.einsum("...ji,...j->...i", R, _forward(f, t.ndim) - t))
 
 
 def transformation_matrix(R: Array, t: Array, f: float | Array) -> Array:
     """Return the paper's matrix [T] (..., 4, 3) of eq. (1), scaled as in Table 2a.
 
-    ``(x, y, z, 1) [T] = (X, Y, H)`` takes a point of the head's frame to its image ``(X / H, Y / H)``, y up.
+    ``(x, y, z, 1) [T] = (X, Y, H)`` maps a point of the head's frame to its image ``(X / H, Y / H)``, y up.
     """
     rows = np.concatenate([R, t[..., None]], axis=-1)
     distances = np.asarray(f, dtype=np.float64)[..., None]
@@ -71,8 +122,7 @@ def transformation_matrix(R: Array, t: Array, f: float | Array) -> Array:
 
 
 def _forward(f: float | Array, ndim: int) -> Array:
-    """Shape (0, 0, f) so that f's frames stand before the axes of an array of `ndim` axes."""
+    """Shape (0, 0, f) to broadcast against an array (F, ..., 3) of `ndim` axes."""
     distances = np.asarray(f, dtype=np.float64)
     distances = distances.reshape(*distances.shape, *(1,) * max(ndim - distances.ndim, 1))
-    forward: Array = distances * np.array([0.0, 0.0, 1.0])
-    return forward
+    return np.asarray(distances * np.array([0.0, 0.0, 1.0]))

@@ -1,76 +1,99 @@
-"""OpenCV's distortion models, all of them, in NumPy: what a lens does to an ideal image."""
+"""OpenCV's distortion models on normalised image points, and their inverse by Newton's method."""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any, Final
 
-from posekit.cameras.calibrated import CalibratedCamera
+import numpy as np
+from numpy.typing import NDArray
+
 from posekit.geometry import Array
 
+#: Real or complex numbers: derivatives are complex steps.
+Numbers = NDArray[Any]
 
-def distort(camera: CalibratedCamera, normalized: Array) -> Array:
-    r"""Apply a camera's distortion to ideal image coordinates.
+#: Numbers of coefficients of OpenCV's models: Brown's four or five, the rational model's eight, twelve with thin
+#: prism, fourteen with a tilted sensor. The fisheye model has none or four.
+COEFFICIENT_COUNTS: Final = (0, 4, 5, 8, 12, 14)
+
+#: Largest accepted coefficient: no lens is near it, and products of five remain finite.
+MAX_COEFFICIENT: Final = 1e9
+
+NEWTON_STEPS: Final = 30
+FIXED_POINT_STEPS: Final = 10
+#: Largest error of an undistorted point when it is distorted again (normalised; 1e-6 px at f = 1000 px).
+CLOSE: Final = 1e-9
+
+
+def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> Array:
+    r"""Apply a lens to ideal image points.
 
     With :math:`r^2 = x^2 + y^2`, the radial factor is
     :math:`(1 + k_1 r^2 + k_2 r^4 + k_3 r^6) / (1 + k_4 r^2 + k_5 r^4 + k_6 r^6)`; tangential, thin prism and tilt
     follow (OpenCV's documentation of `calib3d`, "Detailed Description"). The fisheye model replaces r by
     :math:`\theta_d = \theta (1 + k_1 \theta^2 + k_2 \theta^4 + k_3 \theta^6 + k_4 \theta^8)`,
-    :math:`\theta = \arctan r` (Kannala & Brandt 2006, as OpenCV's `fisheye` has it).
+    :math:`\theta = \arctan r` (Kannala & Brandt 2006, as in OpenCV's `fisheye`).
 
     Parameters
     ----------
     normalized : array (..., 2)
         x/z, y/z; NaN stays NaN.
+    distortion : array (n,)
+        Coefficients in OpenCV's order, n one of `COEFFICIENT_COUNTS`.
+    fisheye : bool
+        Whether they are those of the fisheye model.
 
     Returns
     -------
     array (..., 2)
-        Distorted coordinates, before K.
+        Distorted points, before K.
     """
-    return _fisheye(camera.distortion, normalized) if camera.fisheye else _lens(camera.distortion, normalized)
-
-
-def project(camera: CalibratedCamera, points_cam: Array) -> Array:
-    """Project points (..., 3) of the camera's frame, metres, to the file's own pixels (..., 2).
-
-    NaN behind the camera, and beyond `fold_radius`, where the model says nothing about the lens.
-    """
-    depth = points_cam[..., 2:]
-    normalized = points_cam[..., :2] / np.where(depth > 0, depth, np.nan)
-    outside = ~(ray_radius(camera, normalized) <= fold_radius(camera))
-    return np.where(outside[..., None], np.nan, to_pixels(camera.K, distort(camera, normalized)))
-
-
-def to_pixels(K: Array, normalized: Array) -> Array:
-    """Apply intrinsics, skew included, to image coordinates (..., 2)."""
-    x, y = normalized[..., 0], normalized[..., 1]
-    return np.stack([K[0, 0] * x + K[0, 1] * y + K[0, 2], K[1, 1] * y + K[1, 2]], axis=-1)
-
-
-def from_pixels(K: Array, pixels: Array) -> Array:
-    """Undo `to_pixels`."""
-    y = (pixels[..., 1] - K[1, 2]) / K[1, 1]
-    x = (pixels[..., 0] - K[0, 2] - K[0, 1] * y) / K[0, 0]
+    x, y = _bent(normalized[..., 0], normalized[..., 1], distortion, fisheye)
     return np.stack([x, y], axis=-1)
 
 
-def ray_radius(camera: CalibratedCamera, normalized: Array) -> Array:
-    """Return what the radial polynomial is in: r, or the angle to the optical axis where the lens is a fisheye."""
-    radius = np.linalg.norm(normalized, axis=-1)
-    return np.arctan(radius) if camera.fisheye else np.asarray(radius)
+def undistort(distorted: Array, distortion: Array, *, fisheye: bool = False) -> Array:
+    """Invert `distort`; NaN if no ray inside `fold_radius` reaches the point.
 
-
-def fold_radius(camera: CalibratedCamera) -> float:
-    r"""Return the `ray_radius` where the image turns back or breaks up; infinite where it never does.
-
-    The first zero of the slope of the radial function, or of its denominator: beyond it a polynomial fitted to a
-    lens is no lens.
+    Newton's method converges from different starts for different lenses: the result of a fixed-point iteration (as
+    OpenCV's `undistortPoints`), the point itself, and a point near the optical axis are tried in turn.
     """
-    k = np.zeros(8)
-    k[: min(len(camera.distortion), 8)] = camera.distortion[:8]
-    if camera.fisheye:
-        slope = np.array([1.0, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])
-        return _first_root([slope])
+    target = distorted.reshape(-1, 2)
+    found = np.full_like(target, np.nan)
+    with np.errstate(all="ignore"):  # iterations may diverge
+        for start in (_fixed_point(target, distortion, fisheye), target, 0.1 * target):
+            left = np.isnan(found[:, 0]) & np.isfinite(target).all(axis=-1)
+            if left.any():
+                found[left] = _newton(start[left], target[left], distortion, fisheye)
+    return found.reshape(distorted.shape)
+
+
+def lens_jacobian(normalized: Array, distortion: Array, *, fisheye: bool = False) -> Array:
+    """Return the derivatives (..., 2, 2) of `distort`, exact to rounding (complex step; Squire & Trapp 1998)."""
+    tiny = 1e-100
+    x, y = normalized[..., 0], normalized[..., 1]
+    by_x = _bent(x + 1j * tiny, y + 0j, distortion, fisheye)
+    by_y = _bent(x + 0j, y + 1j * tiny, distortion, fisheye)
+    rows = [np.stack([by_x[k].imag, by_y[k].imag], axis=-1) / tiny for k in range(2)]
+    return np.stack(rows, axis=-2)
+
+
+def lens_radius(normalized: Array, *, fisheye: bool = False) -> Array:
+    """Return the argument of the radial polynomial: r, or the angle to the optical axis of a fisheye lens."""
+    radius = np.linalg.norm(normalized, axis=-1)
+    return np.asarray(np.arctan(radius) if fisheye else radius)
+
+
+def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
+    r"""Return the `lens_radius` where the image folds back or breaks up; infinite if it never does.
+
+    It is the first zero of the slope of the radial function, or of its denominator. Beyond it a polynomial fitted to a
+    lens does not describe the lens.
+    """
+    if fisheye:
+        k1, k2, k3, k4 = np.pad(distortion, (0, 4 - len(distortion)))
+        return _first_root([np.array([1.0, 3 * k1, 5 * k2, 7 * k3, 9 * k4])])
+    k = np.pad(distortion, (0, 14 - len(distortion)))
     above = np.array([1.0, k[0], k[1], k[4]])
     below = np.array([1.0, k[5], k[6], k[7]])
     # d/dr (r N(q) / D(q)), q = r^2, is ((N + 2 q N') D - 2 q N D') / D^2.
@@ -80,7 +103,7 @@ def fold_radius(camera: CalibratedCamera) -> float:
 
 
 def _first_root(ascending: list[Array]) -> float:
-    """Return the root of the smallest positive zero in r^2 of some polynomials that are 1 at zero."""
+    """Return the root of the smallest positive zero in r^2 of polynomials that are 1 at zero."""
     smallest = 0.0
     for coefficients in ascending:
         # In 1 / r^2 the leading coefficient is one, however small the lens's own are.
@@ -90,43 +113,57 @@ def _first_root(ascending: list[Array]) -> float:
     return float(1 / np.sqrt(smallest)) if smallest > 0 else np.inf
 
 
-def _fisheye(distortion: Array, normalized: Array) -> Array:
-    k = np.zeros(4)
-    k[: len(distortion)] = distortion
-    radius = np.linalg.norm(normalized, axis=-1)
-    theta = np.arctan(radius)
-    q = theta * theta
-    bent = theta * (1 + q * (k[0] + q * (k[1] + q * (k[2] + q * k[3]))))
-    factor = np.divide(bent, radius, out=np.ones_like(radius), where=radius > 0)
-    return np.asarray(normalized * factor[..., None])
-
-
-def _lens(distortion: Array, normalized: Array) -> Array:
-    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = np.pad(
-        distortion, (0, 14 - len(distortion))
-    )
-    x, y = normalized[..., 0], normalized[..., 1]
+def _bent(x: Numbers, y: Numbers, distortion: Array, fisheye: bool) -> tuple[Numbers, Numbers]:
+    """Distort coordinates x, y (...), real or complex."""
     q = x * x + y * y
+    if fisheye:
+        k = np.pad(distortion, (0, 4 - len(distortion)))
+        radius = np.sqrt(q)
+        theta = np.arctan(radius)
+        p = theta * theta
+        factor = theta * (1 + p * (k[0] + p * (k[1] + p * (k[2] + p * k[3]))))
+        factor = np.divide(factor, radius, out=np.ones_like(factor), where=radius != 0)
+        return x * factor, y * factor
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tx, ty = np.pad(distortion, (0, 14 - len(distortion)))
     radial = (1 + q * (k1 + q * (k2 + q * k3))) / (1 + q * (k4 + q * (k5 + q * k6)))
-    bent = np.stack(
-        [
-            x * radial + 2 * p1 * x * y + p2 * (q + 2 * x * x) + q * (s1 + q * s2),
-            y * radial + p1 * (q + 2 * y * y) + 2 * p2 * x * y + q * (s3 + q * s4),
-        ],
-        axis=-1,
+    bent_x = x * radial + 2 * p1 * x * y + p2 * (q + 2 * x * x) + q * (s1 + q * s2)
+    bent_y = y * radial + p1 * (q + 2 * y * y) + 2 * p2 * x * y + q * (s3 + q * s4)
+    if tx == 0 and ty == 0:
+        return bent_x, bent_y
+    H = _tilt(tx, ty)
+    w = H[2, 0] * bent_x + H[2, 1] * bent_y + H[2, 2]
+    return (
+        (H[0, 0] * bent_x + H[0, 1] * bent_y + H[0, 2]) / w,
+        (H[1, 0] * bent_x + H[1, 1] * bent_y + H[1, 2]) / w,
     )
-    if tau_x == 0 and tau_y == 0:
-        return bent
-    tilted = bent @ (tilt := _tilt(tau_x, tau_y))[:, :2].T + tilt[:, 2]
-    return np.asarray(tilted[..., :2] / tilted[..., 2:])
 
 
-def _tilt(tau_x: float, tau_y: float) -> Array:
+def _tilt(tx: float, ty: float) -> Array:
     """Return the homography (3, 3) of a sensor tilted by two angles, radians (Scheimpflug; OpenCV's `calib3d`)."""
-    cx, sx, cy, sy = np.cos(tau_x), np.sin(tau_x), np.cos(tau_y), np.sin(tau_y)
+    cx, sx, cy, sy = np.cos(tx), np.sin(tx), np.cos(ty), np.sin(ty)
     turned_x = np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
     turned_y = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
     R = turned_y @ turned_x
-    along = np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]])
-    homography: Array = along @ R
-    return homography
+    return np.asarray(np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R)
+
+
+def _fixed_point(target: Array, distortion: Array, fisheye: bool) -> Array:
+    """Iterate x <- x + target - distort(x): a quasi-Newton step with the slope on the axis, which is one."""
+    x = target
+    for _ in range(FIXED_POINT_STEPS):
+        x = x + target - distort(x, distortion, fisheye=fisheye)
+    return x
+
+
+def _newton(x: Array, target: Array, distortion: Array, fisheye: bool) -> Array:
+    for _ in range(NEWTON_STEPS):
+        error = distort(x, distortion, fisheye=fisheye) - target
+        if np.nanmax(np.abs(error), initial=0.0) < 1e-15:
+            break
+        J = lens_jacobian(x, distortion, fisheye=fisheye)
+        a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
+        step = np.stack([d * error[:, 0] - b * error[:, 1], a * error[:, 1] - c * error[:, 0]], axis=-1)
+        x = x - step / (a * d - b * c)[:, None]
+    off = np.abs(distort(x, distortion, fisheye=fisheye) - target).max(axis=-1)
+    inside = lens_radius(x, fisheye=fisheye) <= fold_radius(distortion, fisheye=fisheye)
+    return np.where(((off <= CLOSE) & inside)[:, None], x, np.nan)

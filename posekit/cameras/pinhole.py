@@ -1,170 +1,225 @@
-"""The pinhole camera: OpenCV's frame and distortion."""
+"""The pinhole camera with OpenCV's frame, lens models and pose in the world."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.camera import Lift, meet_sphere
-from posekit.errors import CameraError
-from posekit.geometry import Array
+from posekit.cameras import lens
+from posekit.cameras.camera import Lift, meet_sphere, perspective_rays
+from posekit.errors import CameraError, refusal, shown
+from posekit.geometry import UP_AXES, Array, Record, best_rotation, from_metres
 
-UNDISTORTION_STEPS = 20
+#: Largest accepted width or height of a picture, pixels.
+MAX_PICTURE_SIDE: Final = 10**6
 
-MAX_DISTORTION: Final = 1e9
-"""Of a coefficient: no lens is near it, and products of five stay numbers."""
+#: Largest error of an entry of R R^T: rounding R to four digits causes up to this.
+ROTATION_ROUNDING: Final = 1e-3
 
 
-@dataclass(frozen=True, kw_only=True)
-class PinholeCamera:
-    r"""A perspective camera in OpenCV's convention: x right, y down, z forward, origin at the optical centre.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class PinholeCamera(Record):
+    """A perspective camera: x right, y down, z forward, origin at the optical centre.
 
     Parameters
     ----------
-    K : array (3, 3) or (F, 3, 3)
-        Intrinsics; one for all frames, or one a frame. Finite, with positive focal lengths.
-    distortion : array (5,), optional
-        Brown's coefficients k1, k2, p1, p2, k3, as OpenCV orders them.
+    K : array (3, 3)
+        Intrinsics, pixels, with positive focal lengths; the centre of the first pixel is (0, 0), as in OpenCV.
+    distortion : array (n,), optional
+        Coefficients in OpenCV's order, n one of 0, 4, 5, 8, 12, 14: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4,
+        tau_x, tau_y. With `fisheye`, none or k1, k2, k3, k4 of that model.
+    fisheye : bool
+        Whether the lens is OpenCV's fisheye model (Kannala & Brandt 2006).
+    R : array (3, 3), optional
+        Rotation from the world to the camera: ``p_cam = R p_world + t``. A rounded R is made orthonormal.
+    t : array (3,), optional
+        Translation of the same, metres.
+    size : (int, int), optional
+        Width and height of the pictures, pixels.
+    up : str
+        The world's axis that points up, ``+x`` … ``-z``; empty if unknown.
+    name : str
+        Name in its file.
+    how : str
+        ``calibrated``, or a description of the guess.
+    deviation : float
+        Standard deviation of a guessed focal length as a fraction of it; 0 if calibrated.
 
     Raises
     ------
     CameraError
-        Where K or the distortion describe no camera.
+        If the parameters describe no camera.
+
+    Examples
+    --------
+    >>> camera = PinholeCamera(K=[[1000, 0, 640], [0, 1000, 360], [0, 0, 1]])
+    >>> camera.project(np.array([0.5, 0.0, 5.0])).tolist()
+    [740.0, 360.0]
     """
 
     K: Array
     distortion: Array | None = None
+    fisheye: bool = False
+    R: Array | None = None
+    t: Array | None = None
+    size: tuple[int, int] | None = None
+    up: str = ""
+    name: str = ""
+    how: str = "calibrated"
+    deviation: float = 0.0
 
     def __post_init__(self) -> None:
         K = np.array(self.K, dtype=np.float64)
-        if K.ndim not in (2, 3) or K.shape[-2:] != (3, 3) or not np.isfinite(K).all():
-            raise CameraError(f"K must be finite, of shape (3, 3) or (F, 3, 3); got {K.tolist()}")
-        if (K[..., 0, 0] <= 0).any() or (K[..., 1, 1] <= 0).any():
-            raise CameraError(
-                f"focal lengths must be positive; K has {K[..., 0, 0].min():g} and {K[..., 1, 1].min():g}"
-            )
-        if not np.allclose(K[..., 2, :], [0, 0, 1], rtol=0, atol=0) or (K[..., 1, 0] != 0).any():
-            raise CameraError("K must be upper triangular with 1 in its last corner")
-        K.flags.writeable = False
-        object.__setattr__(self, "K", K)
-        if self.distortion is not None:
-            distortion = np.array(self.distortion, dtype=np.float64)
-            if distortion.shape != (5,) or not (abs(distortion) <= MAX_DISTORTION).all():
-                raise CameraError(
-                    f"distortion must be five numbers k1, k2, p1, p2, k3 of {MAX_DISTORTION:g} at most; "
-                    f"got {distortion.tolist()}"
-                )
-            distortion.flags.writeable = False
-            object.__setattr__(self, "distortion", distortion)
+        if K.shape != (3, 3) or not np.isfinite(K).all():
+            raise self._refused("K", shown(K.tolist()), "a finite matrix of shape (3, 3)")
+        if not (K[0, 0] > 0 and K[1, 1] > 0):
+            raise self._refused("K", f"focal lengths {K[0, 0]:g} and {K[1, 1]:g}", "positive focal lengths")
+        if (K[2] != [0, 0, 1]).any() or K[1, 0] != 0:
+            raise self._refused("K", shown(K.ravel().tolist()), "an upper triangular matrix with K[2, 2] = 1")
+        self._set("K", K)
+        if self.distortion is not None or self.fisheye:  # a fisheye lens bends rays without coefficients, too
+            distortion = np.array(self.distortion if self.distortion is not None else (), np.float64).ravel()
+            counts = (0, 4) if self.fisheye else lens.COEFFICIENT_COUNTS
+            if len(distortion) not in counts or not (abs(distortion) <= lens.MAX_COEFFICIENT).all():
+                model = "the fisheye model" if self.fisheye else "OpenCV's models"
+                most = lens.MAX_COEFFICIENT
+                expected = f"{', '.join(map(str, counts))} coefficients of {model}, up to {most:g}"
+                got = f"{len(distortion)} coefficients {shown(distortion.tolist())}"
+                raise self._refused("distortion", got, expected)
+            self._set("distortion", distortion if distortion.any() or self.fisheye else None)
+        if self.R is not None:
+            self._set("R", rotation_from_rounded(self.R))
+        if self.t is not None:
+            t = np.array(self.t, dtype=np.float64).ravel()
+            if t.shape != (3,) or not np.isfinite(t).all():
+                raise self._refused("t", shown(t.tolist()), "three finite numbers")
+            self._set("t", t)
+        if self.size is not None:
+            sides = tuple(self.size)
+            whole = [0 < side <= MAX_PICTURE_SIDE and float(side).is_integer() for side in sides]
+            if len(sides) != 2 or not all(whole):
+                expected = f"a width and a height in whole pixels, 1 to {MAX_PICTURE_SIDE:,}"
+                raise self._refused("size", shown(sides), expected)
+            self._set("size", (int(sides[0]), int(sides[1])))
+        if self.up and self.up not in UP_AXES:
+            raise self._refused("up", shown(self.up), f"one of {', '.join(UP_AXES)}")
+        if not 0 <= self.deviation < 1:
+            raise self._refused("deviation", f"{self.deviation:g}", "a fraction of the focal length below 1")
+
+    def _refused(self, field: str, got: str, expected: str) -> CameraError:
+        source = f"camera {shown(self.name)}" if self.name else "camera"
+        return refusal(source, field, got, expected, error=CameraError)  # type: ignore[return-value]
+
+    @property
+    def perspective(self) -> bool:
+        """Whether rays meet in the optical centre: always."""
+        return True
+
+    @property
+    def guessed(self) -> bool:
+        """Whether the focal length is a guess."""
+        return self.deviation > 0
+
+    @property
+    def position(self) -> Array | None:
+        """The optical centre (3,) in the world, metres; None if the pose is unknown."""
+        return None if self.R is None or self.t is None else np.asarray(-self.R.T @ self.t)
 
     def project(self, points: Array) -> Array:
-        r"""Project points to pixels.
+        """Project points (..., 3), camera frame, metres, to pixels (..., 2).
 
-        Parameters
-        ----------
-        points : array (F, ..., 3)
-            Camera frame, metres; the first axis counts frames where K does.
-
-        Returns
-        -------
-        array (F, ..., 2)
-            Pixels; NaN for points that are not in front of the camera.
+        Points that are not in front of the camera, or beyond the radius where the lens model folds, become NaN.
         """
         depth = points[..., 2:]
         normalized = points[..., :2] / np.where(depth > 0, depth, np.nan)
         if self.distortion is not None:
-            normalized = distort(normalized, self.distortion)
-        K = self._intrinsics(points.ndim)
-        u = K[..., 0, 0] * normalized[..., 0] + K[..., 0, 1] * normalized[..., 1] + K[..., 0, 2]
-        v = K[..., 1, 1] * normalized[..., 1] + K[..., 1, 2]
-        return np.stack([u, v], axis=-1)
+            fold = lens.fold_radius(self.distortion, fisheye=self.fisheye)
+            inside = lens.lens_radius(normalized, fisheye=self.fisheye) <= fold
+            normalized = lens.distort(normalized, self.distortion, fisheye=self.fisheye)
+            normalized = np.where(inside[..., None], normalized, np.nan)
+        return np.asarray(normalized @ self.K[:2, :2].T + self.K[:2, 2])
 
-    def normalize(self, pixels: Array) -> Array:
-        """Turn pixels (F, ..., 2) into undistorted image coordinates (x/z, y/z)."""
-        K = self._intrinsics(pixels.ndim)
-        y = (pixels[..., 1] - K[..., 1, 2]) / K[..., 1, 1]
-        x = (pixels[..., 0] - K[..., 0, 2] - K[..., 0, 1] * y) / K[..., 0, 0]
+    def normalize(self, image: Array) -> Array:
+        """Turn pixels (..., 2) into ideal image points (x/z, y/z); NaN if no ray reaches the pixel."""
+        y = (image[..., 1] - self.K[1, 2]) / self.K[1, 1]
+        x = (image[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
         normalized = np.stack([x, y], axis=-1)
-        return normalized if self.distortion is None else undistort(normalized, self.distortion)
+        if self.distortion is None:
+            return normalized
+        return lens.undistort(normalized, self.distortion, fisheye=self.fisheye)
+
+    def undistorted(self, image: Array) -> Array:
+        """Turn pixels (..., 2) into the pixels of a camera with the same K and no lens."""
+        return np.asarray(self.normalize(image) @ self.K[:2, :2].T + self.K[:2, 2])
+
+    def jacobian(self, normalized: Array) -> Array:
+        """Return the derivatives (..., 2, 2) of pixels by ideal image points (..., 2)."""
+        scale = self.K[:2, :2]
+        if self.distortion is None:
+            return np.broadcast_to(scale, (*normalized.shape[:-1], 2, 2))
+        return np.asarray(scale @ lens.lens_jacobian(normalized, self.distortion, fisheye=self.fisheye))
+
+    def rays(self, image: Array) -> tuple[Array, Array]:
+        """Return origins (zero) and unit directions (..., 3) of the rays of pixels (..., 2)."""
+        return perspective_rays(self.normalize(image))
 
     def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
         """Find the ends of segments: see `posekit.cameras.camera.meet_sphere`.
 
         Parameters
         ----------
-        start : array (F, ..., 3)
+        start : array (..., 3)
             Known ends, camera frame, metres.
-        pixel : array (F, ..., 2)
-            Where the other ends are seen.
-        length : array broadcastable to (F, ...)
+        pixel : array (..., 2)
+            Image points of the other ends.
+        length : array broadcastable to (...)
             Lengths, metres.
         tolerance : float
             Metres by which a segment may be too short for its image.
         """
-        normalized = self.normalize(pixel)
-        direction = np.concatenate([normalized, np.ones_like(normalized[..., :1])], axis=-1)
-        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-        return meet_sphere(np.zeros(3), direction, start, length, tolerance=tolerance)
+        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
 
-    def _intrinsics(self, ndim: int) -> Array:
-        """Shape K so that it broadcasts against an array of `ndim` axes less its last."""
-        if self.K.ndim == 2:
-            return self.K
-        return self.K.reshape(self.K.shape[0], *(1,) * (ndim - 2), 3, 3)
+    def take(self, rows: Any) -> PinholeCamera:
+        """Return the camera of some frames: the same for all."""
+        return self
 
-
-def distort(normalized: Array, distortion: Array) -> Array:
-    """Apply Brown's radial and tangential distortion (Brown 1966; OpenCV's first five coefficients)."""
-    k1, k2, p1, p2, k3 = distortion
-    x, y = normalized[..., 0], normalized[..., 1]
-    r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.stack(
-        [
-            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-        ],
-        axis=-1,
-    )
+    def fields(self, unit: str = "m") -> dict[str, Any]:
+        """Return the camera as files spell it, with t in `unit`."""
+        optional = {
+            "distortion": None if self.distortion is None else self.distortion.tolist(),
+            "fisheye": self.fisheye,
+            "R": None if self.R is None else self.R.tolist(),
+            "t": None if self.t is None else from_metres(self.t, unit).tolist(),
+            "size": None if self.size is None else list(self.size),
+            "up": self.up,
+            "name": self.name,
+            "how": self.how if self.guessed else "",
+            "deviation": self.deviation,
+        }
+        given = {name: value for name, value in optional.items() if value}
+        return {"model": "opencv", "K": self.K.tolist(), **given}
 
 
-def fold_radius(distortion: Array) -> float:
-    r"""Return the radius in (x/z, y/z) where the radial distortion turns back; infinite where it never does.
+def rotation_from_rounded(matrix: Array) -> Array:
+    """Return the rotation nearest to a rounded matrix (3, 3).
 
-    The first zero of :math:`d/dr\,(r + k_1 r^3 + k_2 r^5 + k_3 r^7)`. Beyond it a polynomial fitted to a lens
-    says nothing about the lens.
+    Raises
+    ------
+    CameraError
+        If the matrix is no rotation within `ROTATION_ROUNDING`, or mirrors.
     """
-    k1, k2, _, _, k3 = distortion
-    # In 1 / r^2: the leading coefficient is one, however small the lens's own are.
-    roots = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])
-    turning = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
-    return float(1 / np.sqrt(turning.max())) if len(turning) else np.inf
-
-
-def undistort(distorted: Array, distortion: Array) -> Array:
-    """Invert `distort` by Newton's method; NaN where no ray inside `fold_radius` reaches the pixel."""
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where it diverges
-        normalized = _newton(distorted, distorted, distortion)
-        error = np.abs(distort(normalized, distortion) - distorted).max(axis=-1, keepdims=True)
-        radius = np.linalg.norm(normalized, axis=-1, keepdims=True)
-        return np.where((error < 1e-9) & (radius <= fold_radius(distortion)), normalized, np.nan)
-
-
-def _newton(normalized: Array, distorted: Array, distortion: Array) -> Array:
-    k1, k2, p1, p2, k3 = distortion
-    for _ in range(UNDISTORTION_STEPS):
-        x, y = normalized[..., 0], normalized[..., 1]
-        r2 = x * x + y * y
-        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
-        xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
-        yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
-        xy = x * y * slope + 2 * p1 * x + 2 * p2 * y
-        error = distort(normalized, distortion) - distorted
-        determinant = xx * yy - xy * xy
-        step_x = (yy * error[..., 0] - xy * error[..., 1]) / determinant
-        step_y = (xx * error[..., 1] - xy * error[..., 0]) / determinant
-        normalized = normalized - np.stack([step_x, step_y], axis=-1)
-    return normalized
+    R = np.asarray(matrix, dtype=np.float64)
+    if R.shape != (3, 3) or not np.isfinite(R).all():
+        raise refusal("camera", "R", shown(R.tolist()), "a finite matrix of shape (3, 3)", error=CameraError)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.abs(R @ R.T - np.eye(3)).max())
+    if not error <= ROTATION_ROUNDING:
+        got = f"a matrix with R R^T off the identity by {error:.2g}"
+        raise refusal("camera", "R", got, "a rotation matrix", error=CameraError)
+    rotation, values = best_rotation(R)
+    if values[2] < 0:
+        raise refusal("camera", "R", "a mirroring matrix, of determinant -1", "a rotation", error=CameraError)
+    rotation.flags.writeable = False
+    return rotation

@@ -3,60 +3,72 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.camera import COINCIDENT_METRES, Lift
-from posekit.errors import CameraError
-from posekit.geometry import Array
+from posekit.cameras.camera import COINCIDENT_METRES, Lift, check_positive, per_frame
+from posekit.errors import CameraError, refusal
+from posekit.geometry import PER_METRE, Array, Record, read_only
 
-BOUND_ROUNDING = 1e-15
-"""Of the coordinates: at the bound of s the segment that sets it must not fail, nor split in two, by its last bits."""
+#: Relative rounding of coordinates: at the lower bound of s the segment that sets it must neither fail nor split.
+BOUND_ROUNDING: Final = 1e-15
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScaledOrthographicCamera:
-    r"""A camera far away: all of the body is seen at one scale, :math:`(u, v) = s\,(x, y)` (Taylor 2000, eq. 1).
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ScaledOrthographicCamera(Record):
+    r"""A distant camera, which sees all of the body at one scale: :math:`(u, v) = s\,(x, y)` (Taylor 2000, eq. 1).
 
     The frame is OpenCV's: x right, y down, z forward; its origin is the image's, and its depth is arbitrary.
 
     Parameters
     ----------
-    scale : float or array (F,)
-        s, pixels a metre (or a unit of length); one for all frames, or one a frame. Finite and positive.
+    scale : float or array (F,), optional
+        s, pixels a metre, one or one a frame; None if unknown.
     aspect : float
-        Width of a pixel over its height, where it is not square: u is rescaled by it, and s counts in v.
+        Width of a pixel over its height, if pixels are not square: u is rescaled by it, and s counts in v.
 
     Raises
     ------
     CameraError
-        Where the scale or the aspect ratio is not finite and positive.
+        If the scale or the aspect ratio is not finite and positive.
     """
 
-    scale: float | Array
+    scale: float | Array | None
     aspect: float = 1.0
 
     def __post_init__(self) -> None:
-        scale = np.array(self.scale, dtype=np.float64)
-        if scale.ndim > 1 or not (np.isfinite(scale) & (scale > 0)).all():
-            raise CameraError(f"scale must be finite and positive, one or one a frame; got {scale.tolist()}")
-        if not (np.isfinite(self.aspect) and self.aspect > 0):
-            raise CameraError(f"aspect must be finite and positive; got {self.aspect:g}")
-        scale.flags.writeable = False
-        object.__setattr__(self, "scale", scale)
+        check_positive("scale", self.scale)
+        check_positive("aspect", self.aspect)
+        if self.scale is not None:
+            self._set("scale", read_only(self.scale) if np.ndim(self.scale) else float(self.scale))
+
+    @property
+    def perspective(self) -> bool:
+        """Whether rays meet in the optical centre: never, they are parallel."""
+        return False
 
     def project(self, points: Array) -> Array:
         """Project points (F, ..., 3), metres, to pixels (F, ..., 2)."""
-        image: Array = points[..., :2] * self._scale(points.ndim) / np.array([self.aspect, 1.0])
-        return image
+        return np.asarray(points[..., :2] * self._scales(points.ndim) / np.array([self.aspect, 1.0]))
 
-    def unproject(self, pixels: Array) -> Array:
-        """Turn pixels (F, ..., 2) into x, y (F, ..., 2), metres: all but the depth is known."""
-        place: Array = pixels * np.array([self.aspect, 1.0]) / self._scale(pixels.ndim)
-        return place
+    def normalize(self, image: Array) -> Array:
+        """Turn pixels (F, ..., 2) into x, y (F, ..., 2), metres: only the depth remains unknown."""
+        return np.asarray(image * np.array([self.aspect, 1.0]) / self._scales(image.ndim))
+
+    def jacobian(self, normalized: Array) -> Array:
+        """Return the derivatives (F, ..., 2, 2) of pixels by x, y (F, ..., 2)."""
+        scales = np.broadcast_to(self._scales(normalized.ndim), normalized.shape) / [self.aspect, 1.0]
+        return np.asarray(scales[..., None] * np.eye(2))
+
+    def rays(self, image: Array) -> tuple[Array, Array]:
+        """Return origins at depth 0 and directions (0, 0, 1), both (F, ..., 3), of pixels (F, ..., 2)."""
+        place = self.normalize(image)
+        origin = np.concatenate([place, np.zeros_like(place[..., :1])], axis=-1)
+        return origin, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
 
     def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
-        r"""Find the ends of segments: the start's depth, less or more :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}`.
+        r"""Find the ends of segments: the start's depth plus or minus :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}`.
 
         (Taylor 2000, eq. 2.) Nothing is behind this camera.
 
@@ -65,29 +77,40 @@ class ScaledOrthographicCamera:
         start : array (F, ..., 3)
             Known ends, metres.
         pixel : array (F, ..., 2)
-            Where the other ends are seen.
+            Image points of the other ends.
         length : array broadcastable to (F, ...)
             Lengths, metres.
         tolerance : float
             Metres by which a segment may be too short for its image.
         """
-        place = self.unproject(pixel)
+        place = self.normalize(pixel)
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
-        lost = BOUND_ROUNDING * (length + np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1))
+        sizes = np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1)
+        rounding = BOUND_ROUNDING * (length + sizes)
         squared = np.maximum((length - apart) * (length + apart), 0.0)
-        # Lengths may be relative, hence large: what is coincident grows with them.
-        tangent = squared <= (COINCIDENT_METRES * np.maximum(length, 1.0)) ** 2 + 2 * length * lost
+        # Lengths may be relative, hence large: the coincidence threshold grows with them.
+        tangent = squared <= (COINCIDENT_METRES * np.maximum(length, 1.0)) ** 2 + 2 * length * rounding
         half = np.where(tangent, 0.0, np.sqrt(squared))
         depth = start[..., 2, None] + np.stack([-half, half], axis=-1)
         excess = apart - length
-        reachable = excess <= max(tolerance, 0.0) + lost
+        reachable = excess <= max(tolerance, 0.0) + rounding
         valid = np.stack([reachable, reachable & ~tangent], axis=-1)
-        points = np.concatenate(
-            [np.broadcast_to(place[..., None, :], (*depth.shape, 2)), depth[..., None]], axis=-1
-        )
-        return Lift(points, valid, excess)
+        beside = np.broadcast_to(place[..., None, :], (*depth.shape, 2))
+        return Lift(np.concatenate([beside, depth[..., None]], axis=-1), valid, excess)
 
-    def _scale(self, ndim: int) -> Array:
-        """Shape the scale so that it broadcasts against an array of `ndim` axes."""
-        scale = np.asarray(self.scale)
-        return scale.reshape(*scale.shape, *(1,) * (ndim - 1)) if scale.ndim else scale
+    def take(self, rows: Any) -> ScaledOrthographicCamera:
+        """Return the camera of some frames."""
+        if np.ndim(self.scale if self.scale is not None else 0.0) == 0:
+            return self
+        return ScaledOrthographicCamera(scale=np.asarray(self.scale)[rows], aspect=self.aspect)
+
+    def fields(self, unit: str = "m") -> dict[str, Any]:
+        """Return the camera as files spell it, the scale in pixels a `unit`."""
+        scale = None if self.scale is None else (np.asarray(self.scale) / PER_METRE[unit]).tolist()
+        fields: dict[str, Any] = {"model": "scaled-orthographic", "scale": scale}
+        return fields if self.aspect == 1 else {**fields, "aspect": self.aspect}
+
+    def _scales(self, ndim: int) -> Array:
+        if self.scale is None:
+            raise refusal("camera", "scale", "null", "pixels a metre", "give it", error=CameraError)
+        return per_frame(self.scale, ndim)

@@ -1,16 +1,9 @@
-"""Vectors, quaternions, rotations and rigid fits, each formula once.
+"""Vectors, quaternions, rotations, rigid fits and distances, each formula once.
 
-Everything is for a batch: vectors are (..., 3), quaternions (..., 4) in Pinocchio's order x, y, z, w, rotations
-(..., 3, 3). What is not known is NaN, and so is all that follows from it. Products of vectors also take the batch last,
-(..., 3, N) with ``axis=-2``, as `posekit.geometry.batch_last` does throughout, because NumPy is fastest along the last
-axis. Nothing here depends on how large the batch is, so a posture has the same numbers alone and among thousands.
+Arrays are batches: vectors (..., 3), quaternions (..., 4) in Pinocchio's order x, y, z, w, rotations (..., 3, 3).
+NaN marks an unknown value and propagates. A result never depends on the size of the batch.
 """
 
-from posekit.geometry.angles import other_branch as other_branch
-from posekit.geometry.angles import other_hinge as other_hinge
-from posekit.geometry.angles import turned_near as turned_near
-from posekit.geometry.arrays import Array as Array
-from posekit.geometry.arrays import runs as runs
 from posekit.geometry.quaternions import quaternion_conjugate as quaternion_conjugate
 from posekit.geometry.quaternions import quaternion_exp as quaternion_exp
 from posekit.geometry.quaternions import quaternion_from_rotation as quaternion_from_rotation
@@ -19,19 +12,35 @@ from posekit.geometry.quaternions import quaternion_product as quaternion_produc
 from posekit.geometry.quaternions import quaternion_rotate as quaternion_rotate
 from posekit.geometry.quaternions import rotation_from_quaternion as rotation_from_quaternion
 from posekit.geometry.quaternions import shorter_quaternion as shorter_quaternion
+from posekit.geometry.record import Record as Record
+from posekit.geometry.record import read_only as read_only
+from posekit.geometry.rigid import Alignment as Alignment
+from posekit.geometry.rigid import align as align
 from posekit.geometry.rigid import best_rotation as best_rotation
-from posekit.geometry.rigid import centred_covariance as centred_covariance
 from posekit.geometry.rigid import fit_rotation as fit_rotation
+from posekit.geometry.rigid import mean_known as mean_known
+from posekit.geometry.rigid import mpjpe as mpjpe
+from posekit.geometry.rigid import pa_mpjpe as pa_mpjpe
+from posekit.geometry.rigid import rms_distance as rms_distance
 from posekit.geometry.rotations import coordinate_rotation as coordinate_rotation
 from posekit.geometry.rotations import cross_matrix as cross_matrix
 from posekit.geometry.rotations import frame_along as frame_along
-from posekit.geometry.rotations import relative_rotation as relative_rotation
-from posekit.geometry.rotations import rotate_back as rotate_back
 from posekit.geometry.rotations import rotation_about as rotation_about
 from posekit.geometry.rotations import rotation_between as rotation_between
 from posekit.geometry.rotations import rotation_from_vector as rotation_from_vector
+from posekit.geometry.rotations import turned_near as turned_near
 from posekit.geometry.rotations import vector_from_rotation as vector_from_rotation
+from posekit.geometry.units import FARTHEST_COORDINATE as FARTHEST_COORDINATE
+from posekit.geometry.units import PER_METRE as PER_METRE
+from posekit.geometry.units import UP_AXES as UP_AXES
+from posekit.geometry.units import from_metres as from_metres
+from posekit.geometry.units import to_metres as to_metres
+from posekit.geometry.units import up_vector as up_vector
+from posekit.geometry.vectors import Array as Array
+from posekit.geometry.vectors import Flags as Flags
+from posekit.geometry.vectors import Ints as Ints
 from posekit.geometry.vectors import cross as cross
 from posekit.geometry.vectors import dot as dot
 from posekit.geometry.vectors import perpendicular as perpendicular
+from posekit.geometry.vectors import runs as runs
 from posekit.geometry.vectors import unit as unit

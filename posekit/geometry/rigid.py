@@ -1,41 +1,19 @@
-"""The rotation that lays points onto others best."""
+"""Rotations and similarities that align points, and distances between postures."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from posekit.geometry.arrays import Array
+from posekit.geometry.vectors import Array, Flags
 
+#: Any two points align exactly with any two others: a distance needs three.
+MIN_ALIGNED_POINTS: Final = 3
 
-class CentredCovariance(NamedTuple):
-    """Two sets of weighted points about their means, and how they vary together.
-
-    Attributes
-    ----------
-    mean_x, mean_y : array (..., 3)
-        The weighted means.
-    x, y : array (..., P, 3)
-        The points about them.
-    covariance : array (..., 3, 3)
-        The weighted sum of y x^T.
-    """
-
-    mean_x: Array
-    mean_y: Array
-    x: Array
-    y: Array
-    covariance: Array
-
-
-def centred_covariance(x: Array, y: Array, weights: Array) -> CentredCovariance:
-    """Centre points x and y (..., P, 3) of weights (..., P) and return their covariance; finite numbers only."""
-    total = np.maximum(weights.sum(axis=-1), 1e-12)[..., None]  # no weight at all: means of zero
-    mean_x, mean_y = (np.einsum("...k,...ki->...i", weights, each) / total for each in (x, y))
-    x, y = x - mean_x[..., None, :], y - mean_y[..., None, :]
-    covariance = np.einsum("...ki,...kj->...ij", weights[..., None] * y, x)
-    return CentredCovariance(mean_x, mean_y, x, y, covariance)
+#: Spread of a set over its distance from the origin below which all its points coincide.
+NO_EXTENT: Final = 1e-12
 
 
 def best_rotation(matrix: Array) -> tuple[Array, Array]:
@@ -44,7 +22,7 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
     With :math:`M = U D V^T` the singular value decomposition, :math:`R = U S V^T` where
     :math:`S = diag(1, 1, \det U V^T)` keeps R from being a reflection (Kabsch 1976, Acta Cryst. A32; Umeyama 1991, IEEE
     Trans. PAMI 13(4), eqs. 40-43). For a covariance :math:`\sum_p y_p x_p^T` it turns the x onto the y with the least
-    squared distance; for a rotation that was rounded it is its polar factor (Higham 1989).
+    squared distance; for a rounded rotation it is the polar factor (Higham 1989).
 
     Parameters
     ----------
@@ -54,10 +32,10 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
     Returns
     -------
     rotation : array (..., 3, 3)
-        R; NaN where M is.
+        R; NaN if M is.
     values : array (..., 3)
-        The diagonal of D S: singular values in descending order, the last negative where M mirrors. The rotation is
-        the only best one where the last two add up to more than zero.
+        The diagonal of D S: singular values in descending order, the last negative if M mirrors. The best rotation
+        is unique if the sum of the last two is positive.
     """
     known = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
     if not known.any():
@@ -66,10 +44,8 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., 2] *= sign[..., None]
     values[..., 2] *= sign
-    return (
-        np.where(known[..., None, None], U @ Vt, np.nan),
-        np.where(known[..., None], values, np.nan),
-    )
+    rotation = np.where(known[..., None, None], U @ Vt, np.nan)
+    return rotation, np.where(known[..., None], values, np.nan)
 
 
 def fit_rotation(offsets: Array, turned: Array) -> Array:
@@ -80,11 +56,121 @@ def fit_rotation(offsets: Array, turned: Array) -> Array:
     offsets : array (P, 3)
         The x, in the body's frame.
     turned : array (N, P, 3)
-        The y, the same in the camera frame.
+        The y, the same vectors in the camera frame.
 
     Returns
     -------
     array (N, 3, 3)
-        NaN where a turned offset is NaN.
+        NaN if a turned offset is NaN.
     """
     return best_rotation(np.einsum("npi,pj->nij", turned, offsets))[0]
+
+
+class Alignment(NamedTuple):
+    r"""Similarities :math:`x \mapsto c\,R\,x + t`.
+
+    Attributes
+    ----------
+    rotation : array (..., 3, 3)
+        R, never a reflection. NaN if nothing can be aligned.
+    translation : array (..., 3)
+        t, in the target's unit.
+    scale : array (...)
+        c; one in a rigid alignment.
+    """
+
+    rotation: Array
+    translation: Array
+    scale: Array
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Map points (..., P, 3) onto the target; NaN if unknown or if nothing was aligned."""
+        turned = np.einsum("...ij,...pj->...pi", self.rotation, np.asarray(points, dtype=np.float64))
+        return np.asarray(self.scale[..., None, None] * turned + self.translation[..., None, :])
+
+
+def align(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Alignment:
+    r"""Find the similarity that minimises the squared distance of points from their targets.
+
+    .. math:: \min_{c, R, t} \sum_p |y_p - (c R x_p + t)|^2
+
+    With R and D S of `best_rotation` for the covariance about the means, :math:`c = tr(D S) / \sum_p |x_p|^2`
+    (Umeyama 1991, IEEE Trans. PAMI 13(4), eqs. 40-43).
+
+    Parameters
+    ----------
+    points, target : array (..., P, 3)
+        Corresponding points, in one unit; NaN marks an unknown point. Leading axes broadcast.
+    scale : bool
+        Fit c; otherwise it is one (rigid alignment).
+
+    Returns
+    -------
+    Alignment
+        NaN if fewer than three points are known in both sets, or if all points of either set coincide.
+    """
+    x, y, known = _paired(points, target)
+    used = known.sum(axis=-1)
+    weights = known / np.maximum(used, 1)[..., None]
+    x, y = (np.where(known[..., None], each, 0.0) for each in (x, y))
+    mean_x, mean_y = (np.einsum("...k,...ki->...i", weights, each) for each in (x, y))
+    x, y = x - mean_x[..., None, :], y - mean_y[..., None, :]
+    spread_x, spread_y = ((weights[..., None] * each**2).sum(axis=(-2, -1)) for each in (x, y))
+    possible = used >= MIN_ALIGNED_POINTS
+    for spread, mean in ((spread_x, mean_x), (spread_y, mean_y)):
+        possible &= np.sqrt(spread) > NO_EXTENT * np.linalg.norm(mean, axis=-1)
+    R, values = best_rotation(np.einsum("...ki,...kj->...ij", weights[..., None] * y, x))
+    c = values.sum(axis=-1) / np.where(possible, spread_x, 1.0) if scale else np.ones_like(spread_x)
+    c = np.where(possible, c, np.nan)
+    R = np.where(possible[..., None, None], R, np.nan)
+    return Alignment(R, mean_y - c[..., None] * np.einsum("...ij,...j->...i", R, mean_x), c)
+
+
+def mpjpe(points: ArrayLike, target: ArrayLike) -> Array:
+    r"""Return the mean per-joint position error, :math:`\sum_p d_p / P` (Ionescu et al. 2014, §5.1).
+
+    Parameters
+    ----------
+    points, target : array (..., P, 3)
+        Measured and true points, in one unit; points that are NaN in either are left out.
+
+    Returns
+    -------
+    array (...)
+        In their unit; NaN if no point is known in both.
+    """
+    return mean_known(np.sqrt(_squared(*_paired(points, target))))
+
+
+def pa_mpjpe(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Array:
+    """Return the mean per-joint position error after `align` ("Procrustes aligned"); parameters as for `mpjpe`."""
+    return mpjpe(align(points, target, scale=scale).apply(points), target)
+
+
+def rms_distance(points: ArrayLike, target: ArrayLike, *, aligned: bool = True) -> Array:
+    r"""Return the root mean square distance between corresponding points, :math:`\sqrt{\sum_p d_p^2 / P}`.
+
+    By default it is measured after "the rotation, translation and scale factor that best aligned the two data sets"
+    (Taylor 2000, §3.2); parameters as for `mpjpe`.
+    """
+    if aligned:
+        points = align(points, target).apply(points)
+    return np.sqrt(mean_known(_squared(*_paired(points, target))))
+
+
+def _paired(points: ArrayLike, target: ArrayLike) -> tuple[Array, Array, Flags]:
+    """Broadcast two sets of points, and tell which points (..., P) are known in both."""
+    x, y = np.broadcast_arrays(np.asarray(points, dtype=np.float64), np.asarray(target, dtype=np.float64))
+    return x, y, np.isfinite(x).all(axis=-1) & np.isfinite(y).all(axis=-1)
+
+
+def _squared(x: Array, y: Array, known: Flags) -> Array:
+    return np.where(known, ((x - y) ** 2).sum(axis=-1), np.nan)
+
+
+def mean_known(values: Array) -> Array:
+    """Return the mean of the known entries along the last axis (...); NaN if there are none."""
+    known = ~np.isnan(values)
+    count = known.sum(axis=-1)
+    total = np.where(known, values, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,19 +1,15 @@
-"""Rotations as matrices: from axes, angles and vectors, and back."""
+"""Rotations as matrices (..., 3, 3): from axes, angles and vectors, and back."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from posekit.geometry.arrays import Array
 from posekit.geometry.quaternions import quaternion_from_rotation, quaternion_log
-from posekit.geometry.vectors import cross, dot
-
-TIED_ANGLES_RADIANS = 1e-8
-"""Radians within which two ways to write a limb violate its limits equally, as both do where the hinge is the worst."""
+from posekit.geometry.vectors import Array, cross, dot
 
 
 def cross_matrix(vectors: Array) -> Array:
-    """Return the matrices (..., 3, 3) that take p to ``v x p``, of vectors v (..., 3)."""
+    """Return the matrices (..., 3, 3) that map p to ``v x p``, for vectors v (..., 3)."""
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
@@ -42,13 +38,13 @@ def rotation_about(axis: Array, angle: Array) -> Array:
 def rotation_from_vector(vectors: Array) -> Array:
     """Return the rotations (..., 3, 3) of rotation vectors (..., 3), axis times angle in radians (Rodrigues 1840)."""
     angle = np.linalg.norm(vectors, axis=-1)
-    # sin(angle) / angle, and (1 - cos(angle)) / angle^2 as half a square: neither divides by zero or cancels.
+    # sin(angle) / angle, and (1 - cos(angle)) / angle^2 as half a square: no division by zero, no cancellation.
     half = np.sinc(angle / (2 * np.pi))
     return _rodrigues(cross_matrix(vectors), np.sinc(angle / np.pi), half * half / 2)
 
 
 def vector_from_rotation(R: Array) -> Array:
-    """Return the rotation vectors (..., 3), no longer than pi, of rotations (..., 3, 3); by way of the quaternion."""
+    """Return the rotation vectors (..., 3), no longer than pi, of rotations (..., 3, 3)."""
     return quaternion_log(quaternion_from_rotation(R))
 
 
@@ -65,10 +61,10 @@ def coordinate_rotation(axis: int, angle: Array) -> Array:
 
 
 def frame_along(axis: Array) -> Array:
-    """Complete unit vectors (..., 3) to rotations (..., 3, 3) whose first column they are.
+    """Complete unit vectors (..., 3) to rotations (..., 3, 3) that have them as first column.
 
-    Without a branch that jumps but for the sign of z (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*,
-    JCGT 6(1), listing 3).
+    The basis is continuous except at z = 0 (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1),
+    listing 3).
     """
     x, y, z = axis[..., 0], axis[..., 1], axis[..., 2]
     sign = np.where(z >= 0.0, 1.0, -1.0)
@@ -83,21 +79,42 @@ def rotation_between(start: Array, end: Array) -> Array:
     """Return the shortest rotations (..., 3, 3) that turn unit vectors (..., 3) into others."""
     axis = cross(start, end)
     sine = np.linalg.norm(axis, axis=-1)
-    # Opposite vectors are joined by half a turn about any axis that is square to them.
-    safe = np.where(
-        sine[..., None] > 0.0, axis / np.where(sine, sine, 1.0)[..., None], frame_along(start)[..., 1]
-    )
+    # Opposite vectors are joined by half a turn about any perpendicular axis.
+    turning = axis / np.where(sine, sine, 1.0)[..., None]
+    safe = np.where(sine[..., None] > 0.0, turning, frame_along(start)[..., 1])
     return rotation_about(safe, np.arctan2(sine, dot(start, end)))
 
 
 def rotate_back(R: Array, vectors: Array) -> Array:
-    """Return R^T v, camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
+    """Return R^T v: camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
     return np.asarray(np.einsum("nji,nj->ni", R, vectors))
 
 
 def relative_rotation(R_a: Array, R_b: Array) -> Array:
-    """Return R_a^T R_b (N, 3, 3), how frames R_cam_b (N, 3, 3) stand in frames R_cam_a."""
+    """Return R_a^T R_b (N, 3, 3): frames R_cam_b (N, 3, 3) seen from frames R_cam_a."""
     return np.asarray(np.einsum("nji,njk->nik", R_a, R_b))
+
+
+def turned_near(angles: Array, middle: Array | float, *, half_turn: float = np.pi) -> Array:
+    """Add full turns so that angles lie within half a turn of a middle.
+
+    Parameters
+    ----------
+    angles : array (...)
+        Radians, or the unit of `half_turn`.
+    middle : array (...) or float
+        Centre of the returned interval; broadcast.
+    half_turn : float
+        Half a turn in their unit: 180 for degrees.
+
+    Returns
+    -------
+    array (...)
+        In [middle - half_turn, middle + half_turn).
+    """
+    # `floor` costs a fraction of `mod`.
+    turns = np.floor((angles - middle + half_turn) / (2 * half_turn))
+    return np.asarray(angles - 2 * half_turn * turns)
 
 
 def _rodrigues(cross_matrices: Array, first: Array, second: Array) -> Array:

@@ -1,0 +1,148 @@
+"""The points of the head: names, places in the head's frame, and whether they can determine a camera.
+
+The frame is the paper's, right-handed: x forward, y up, z to the person's right (Lee & Chen 1985, §2.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.errors import HeadError, nearest, refusal, shown
+from posekit.geometry import Array, Flags, Record
+from posekit.skeleton import HEAD_POINTS
+
+#: Points that a camera's eleven unknowns need (Lee & Chen 1985, §2.1).
+MIN_POINTS: Final = 6
+
+#: Fraction of the head's size below which two points coincide, and a set of points is a plane.
+DEGENERATE_EXTENT: Final = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class HeadPoints(Record):
+    """Six or more named points of a head, in the head's frame.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One a point, each once.
+    points : array (P, 3)
+        Metres. The origin of the frame is free: in Table A.2 the neck is at (-0.34, 0.52, 0).
+
+    Raises
+    ------
+    HeadError
+        If there are fewer than six, a coordinate is not finite, two coincide, or all lie in one plane.
+
+    Examples
+    --------
+    >>> TABLE_A2.names
+    ('neck', 'nose', 'right_eye', 'left_eye', 'right_ear', 'left_ear')
+    >>> TABLE_A2.with_points({"chin": [-0.302, 0.565, 0.0]}).points.shape
+    (7, 3)
+    """
+
+    names: tuple[str, ...]
+    points: Array
+
+    def __post_init__(self) -> None:
+        names, points = tuple(self.names), np.array(self.points, dtype=np.float64)
+        if points.shape != (len(names), 3) or not np.isfinite(points).all():
+            got = f"{len(names)} names and points of shape {points.shape}"
+            raise refusal("head_points", "", got, "three finite numbers for each name", error=HeadError)
+        if repeated := sorted({name for name in names if names.count(name) > 1}):
+            raise refusal("head_points", "", f"{repeated[0]} twice", "each name once", error=HeadError)
+        if reason := degeneracy(names, points, np.ones(len(names), dtype=np.bool_)):
+            raise HeadError(reason)
+        self._set("names", names)
+        self._set("points", points)
+
+    @classmethod
+    def from_mapping(cls, points: Mapping[str, ArrayLike]) -> HeadPoints:
+        """Make a head of points by name, any names, in the mapping's order; metres."""
+        for name, point in points.items():
+            if np.shape(point) != (3,):
+                raise refusal("head_points", name, shown(point), "three numbers x, y, z", error=HeadError)
+        places = np.array(list(points.values()), dtype=np.float64).reshape(-1, 3)
+        return cls(names=tuple(points), points=places)
+
+    def with_points(self, points: Mapping[str, ArrayLike]) -> HeadPoints:
+        """Replace points by name and append new ones."""
+        return HeadPoints.from_mapping({**dict(zip(self.names, self.points, strict=True)), **points})
+
+    def index(self, name: str) -> int:
+        """Return the row of a point; raise `HeadError` if there is none."""
+        if name not in self.names:
+            near = nearest(name, self.names)
+            raise refusal("head_points", "", shown(name), "a point", near, error=HeadError)
+        return self.names.index(name)
+
+
+def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
+    """Return why the points (P, 3) that are `seen` (P,) cannot determine a camera; empty if they can."""
+    count = int(seen.sum())
+    if count < MIN_POINTS:
+        missing = [name for name, visible in zip(names, seen, strict=True) if not visible]
+        listed = f"; missing: {', '.join(missing)}" if missing else ""
+        return f"{count} of {len(names)} head points are known, at least {MIN_POINTS} are needed{listed}"
+    known = points[seen]
+    size, _, thickness = np.linalg.svd(known - known.mean(axis=0), compute_uv=False) / np.sqrt(count)
+    gaps = np.linalg.norm(known[:, None] - known, axis=-1)
+    gaps[np.diag_indices(count)] = np.inf
+    if gaps.min() <= DEGENERATE_EXTENT * size:
+        first, second = np.flatnonzero(seen)[np.array(np.unravel_index(gaps.argmin(), gaps.shape))]
+        return (
+            f"head points {names[first]} and {names[second]} coincide ({gaps.min():.3g} m apart): "
+            "correct them or leave one out"
+        )
+    if thickness <= DEGENERATE_EXTENT * size:
+        return (
+            f"the {count} head points lie in one plane (off it {thickness:.3g} m, along it {size:.3g} m): "
+            "a plane does not determine a camera; add a point off it, the nose or the neck"
+        )
+    return ""
+
+
+def head_points_cam(R: Array, t: Array, points: ArrayLike | HeadPoints) -> Array:
+    """Place head points (P, 3) in the camera frame, ``R p + t``.
+
+    Parameters
+    ----------
+    R : array (..., 3, 3)
+        Rotation from the head's frame to the camera's.
+    t : array (..., 3)
+        The head frame's origin in the camera frame, metres.
+    points : HeadPoints or array (P, 3)
+        Metres, head frame.
+
+    Returns
+    -------
+    array (..., P, 3)
+        Metres, camera frame.
+    """
+    places = points.points if isinstance(points, HeadPoints) else np.asarray(points, dtype=np.float64)
+    return np.asarray(places @ np.swapaxes(R, -1, -2) + t[..., None, :])
+
+
+#: The head of Lee & Chen 1985, Table A.2(a), in metres.
+#:
+#: The right eye's x is printed as -32.168 cm. Only -31.168, the left eye's, gives the projection of Table A.2(b)
+#: and the depth of Table 2(d), so it stands here.
+TABLE_A2: Final = HeadPoints(
+    names=("neck", *HEAD_POINTS),
+    points=np.array(
+        [
+            [-0.34168, 0.52103, 0.0],
+            [-0.29168, 0.61603, 0.0],
+            [-0.31168, 0.65103, 0.055],
+            [-0.31168, 0.65103, -0.055],
+            [-0.35168, 0.60103, 0.085],
+            [-0.35168, 0.60103, -0.085],
+        ]
+    ),
+)

@@ -1,0 +1,344 @@
+"""What users call with a path, an array or an object: each door opens what it is given and hands it down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from posekit.errors import refusal, shown
+from posekit.settings import RecoverSettings, number
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+    from posekit.cameras import Detections, PinholeCamera, View
+    from posekit.recovery import Recovery
+
+#: A path, a `View`, `Detections` or a `Motion`.
+Source = Any
+
+
+def recover(
+    source: Source,
+    settings: RecoverSettings | None = None,
+    *,
+    camera: str | PathLike[str] | PinholeCamera | None = None,
+    stature: str | float | None = None,
+    person: str = "",
+    layout: str = "",
+    rate: float | None = None,
+    checks: Any = None,
+    ranges: str | None = None,
+    deviation: str | float | None = None,
+    length_deviation: str | float | None = None,
+    coverage: float | None = None,
+    group: str | float | None = None,
+    follow: int | None = None,
+    figure: Figure | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Recovery:
+    """Recover every posture behind a view that passes the checks.
+
+    Parameters
+    ----------
+    source : path, View, Detections
+        A view; a detector's file or folder of key points; or one of these objects.
+    settings : RecoverSettings, optional
+        All settings at once; the arguments below override single ones.
+    camera : path or PinholeCamera, optional
+        Calibration of the camera that key points were seen by, as ``FILE`` or ``FILE:NAME``. Without one the view is
+        scaled orthographic.
+    stature : float or str, optional
+        Height of the person: metres, or text with a unit such as ``"175cm"``.
+    person : str
+        Which person of the key points: ``largest``, ``surest``, ``first`` or the number of a track.
+    layout : str
+        Name of the key points' layout, or the path of a TOML layout.
+    rate : float, optional
+        Frames a second of key points that have no times.
+    checks, ranges, deviation, length_deviation, coverage, group, follow : optional
+        As the fields of `RecoverSettings`.
+    figure : Figure, optional
+        Body; the built-in figure by default.
+    progress : callable, optional
+        Called with the number of frames done since the last call.
+
+    Returns
+    -------
+    Recovery
+
+    Raises
+    ------
+    InputError
+        If the source is no view or key points, or the view contradicts itself.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> recovery = posekit.recover(posekit.builtin_view("seq1"))
+    >>> len(recovery)
+    5
+    """
+    from posekit.recovery.conductor import recover as recover_view
+
+    given = {
+        "checks": checks,
+        "ranges": ranges,
+        "deviation": deviation,
+        "length_deviation": length_deviation,
+        "coverage": coverage,
+        "group": group,
+        "follow": follow,
+        "stature": stature,
+    }
+    asked = (settings or RecoverSettings()).changed(
+        **{name: one for name, one in given.items() if one is not None}
+    )
+    view = view_of(source, camera=camera, person=person, layout=layout, rate=rate)
+    return recover_view(view, asked, figure=figure, progress=progress)
+
+
+def view_of(
+    source: Source,
+    *,
+    camera: str | PathLike[str] | PinholeCamera | None = None,
+    person: str = "",
+    layout: str = "",
+    unit: str | None = None,
+    rate: float | None = None,
+    stature: str | float | None = None,
+    size: tuple[int, int] | None = None,
+    fov: float | None = None,
+    min_confidence: float = 0.0,
+) -> View:
+    """Return the view of one person: as a file has it, or made from key points and a camera.
+
+    Parameters
+    ----------
+    source : path, View or Detections
+    camera : path or PinholeCamera, optional
+        ``FILE`` or ``FILE:NAME`` where a calibration has several cameras.
+    person, layout, unit, rate, stature
+        As in `recover`; `unit` is that of the calibration.
+    size : (int, int), optional
+        Width and height of the pictures, pixels, where neither file has them.
+    fov : float, optional
+        Guess of the horizontal field of view, degrees, in place of a calibration.
+    min_confidence : float
+        Key points with a lower confidence count as not seen.
+
+    Raises
+    ------
+    InputError
+        If the source holds no view and no key points, or the calibration does not fit.
+    """
+    from posekit.cameras import Detections, View
+    from posekit.formats import open as open_file
+
+    name = source if isinstance(source, str | PathLike) else getattr(source, "source", "") or "recover"
+    if isinstance(source, str | PathLike):
+        source = open_file(source, layout, rate=rate)
+    if isinstance(source, View):
+        return source
+    if not isinstance(source, Detections):
+        remedy = (
+            "judge motion and results with posekit validate; make a view of motion with posekit synth mocap"
+        )
+        raise refusal(name, "", kind_of(source), "a view or key points", remedy)
+    return detected_view(
+        source,
+        camera=opened_camera(camera, unit),
+        person=person,
+        rate=rate,
+        stature=None if stature is None else number(stature, "stature"),
+        size=size,
+        fov=fov,
+        min_confidence=min_confidence,
+    )
+
+
+def kind_of(held: Any) -> str:
+    """Say in words what an opened file holds."""
+    words = {"dict": "cameras", "Recovery": "a result", "Detections": "key points", "Motion": "motion"}
+    name = type(held).__name__
+    return words.get(name, f"a {name.lower()}")
+
+
+def detected_view(
+    detections: Detections,
+    *,
+    camera: PinholeCamera | None,
+    person: str = "",
+    rate: float | None = None,
+    stature: float | None = None,
+    size: tuple[int, int] | None = None,
+    fov: float | None = None,
+    min_confidence: float = 0.0,
+) -> View:
+    """Make the view of one person from key points: see `view_of`."""
+    from posekit.cameras import ScaledOrthographicCamera
+    from posekit.cameras.guesses import camera_from_fov
+
+    size = size or detections.size
+    taken: Any = camera
+    if taken is None and fov is not None:
+        if size is None:
+            raise refusal(
+                "", "fov", shown(fov), "the pictures' size, too", "give it with --set size=1280x720"
+            )
+        taken = camera_from_fov(size, fov, "horizontal")
+    return detections.view(
+        taken if taken is not None else ScaledOrthographicCamera(scale=None),
+        person=person,
+        rate=rate,
+        stature=stature,
+        min_confidence=min_confidence,
+    )
+
+
+def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str | None = None) -> Any:
+    """Return the camera of a calibration, given as ``FILE`` or ``FILE:NAME``.
+
+    Raises
+    ------
+    InputError
+        If the file holds no camera, or several and none is named.
+    """
+    if camera is None or not isinstance(camera, str | PathLike):
+        return camera
+    from posekit.formats import open as open_file
+
+    path, name = str(camera), ""
+    if not Path(path).exists() and ":" in path:
+        path, _, name = path.rpartition(":")
+    cameras = open_file(path, unit=unit)
+    if not isinstance(cameras, dict) or not cameras:
+        raise refusal(
+            path, "", f"a {type(cameras).__name__}", "the calibration of cameras", "give another file"
+        )
+    if name and name not in cameras:
+        raise refusal(path, "", f"no camera {name}", f"one of {', '.join(cameras)}", f"write {path}:NAME")
+    if not name and len(cameras) > 1:
+        raise refusal(
+            path, "", f"{len(cameras)} cameras", f"one of {', '.join(cameras)}", f"write {path}:NAME"
+        )
+    return cameras[name or next(iter(cameras))]
+
+
+def convert(
+    source: Source,
+    target: str | PathLike[str],
+    *,
+    layout: str = "",
+    which: str = "",
+    unit: str | None = None,
+    up: str | None = None,
+    rate: float | None = None,
+    urdf: str = "",
+) -> None:
+    """Convert a file, or write an object, in the format that the target's name says.
+
+    Parameters
+    ----------
+    source : path or object
+    target : path
+    layout : str
+        Layout of the source.
+    which : {"", "answer", "path", "all", "first"}
+        Postures of a result that motion files get; the followed path if there is one, else the answer.
+    unit, up, rate, urdf
+        Facts that the source does not state, as in `posekit.open`.
+
+    Raises
+    ------
+    InputError
+        If the source cannot be read or the target cannot hold it.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> posekit.convert(posekit.recover(posekit.builtin_view("seq1")), "walk.bvh")
+    """
+    from posekit.formats import open as open_file
+    from posekit.formats import save
+
+    if isinstance(source, str | PathLike):
+        source = open_file(source, layout, unit=unit, up=up, rate=rate, urdf=urdf)
+    save(source, target, **({"which": which} if which else {}))
+
+
+def render(
+    source: Source,
+    target: str | PathLike[str],
+    *,
+    layout: str = "",
+    urdf: str = "",
+    rate: float | None = None,
+    view: Source = None,
+    frame: int | tuple[int, int] | None = None,
+    which: str = "",
+    size: tuple[int, int] = (1280, 720),
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    over: str | PathLike[str] | None = None,
+) -> None:
+    """Draw a file or an object: a picture (.png), an animation (.gif, .mp4) or a page (.html).
+
+    Parameters
+    ----------
+    source : path, Motion, Recovery, View, Report or array (T, 14, 3)
+    target : path
+    layout, urdf, rate
+        As in `posekit.open`.
+    view : path or View, optional
+        What a result was recovered from: its image is drawn, too.
+    frame : int or (int, int), optional
+        Frame, or first and last frame, from 0.
+    which : {"", "answer", "path", "all", "first"} or str
+        Postures of a result, or their numbers as ``0,4``.
+    size : (int, int)
+        Pixels.
+    azimuth, elevation : float, optional
+        Direction of the look, degrees; from the front and slightly above by default.
+    over : path, optional
+        Picture, folder of pictures or film to draw over, through the view's camera.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to draw, or the target is none of these.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> posekit.render(posekit.recover(posekit.builtin_view("seq1")), "walk.html")
+    """
+    import numpy as np
+
+    from posekit.cameras import Detections, View
+    from posekit.formats import open as open_file
+    from posekit.viewer import draw
+
+    name = source if isinstance(source, str | PathLike) else "render"
+    if isinstance(source, str | PathLike):
+        source = open_file(source, layout, rate=rate, urdf=urdf)
+    if isinstance(view, str | PathLike):
+        view = open_file(view)
+    if isinstance(source, dict | Detections):
+        expected = "postures, motion, a result, a view or a report"
+        raise refusal(name, "", kind_of(source), expected, "recover key points first")
+    if isinstance(source, View) and not np.isfinite(source.truth).any():
+        view, source = source, recover(source)
+    draw(
+        source,
+        target,
+        view=view,
+        frame=frame,
+        which=which,
+        size=size,
+        azimuth=azimuth,
+        elevation=elevation,
+        over=over,
+        urdf=urdf,
+    )

@@ -1,0 +1,84 @@
+"""Base of the frozen dataclasses that users hold: a short repr and read-only arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import fields
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.geometry.vectors import Array
+
+MAX_REPR_CHARACTERS: Final = 240
+MAX_TEXT_CHARACTERS: Final = 40
+#: Members of a sequence that a repr lists; of a longer one it gives the number.
+MAX_LISTED: Final = 4
+
+
+class Record:
+    """Print a dataclass as one line: each array by its shape, None and empty fields left out.
+
+    A subclass is decorated with ``@dataclass(frozen=True, kw_only=True, eq=False, repr=False)``.
+    """
+
+    def __repr__(self) -> str:
+        """Return the line."""
+        return f"{type(self).__name__}({cut_text(', '.join(self._facts()), MAX_REPR_CHARACTERS)})"
+
+    def _facts(self) -> list[str]:
+        """List the entries of the line; a subclass may choose others."""
+        held = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)  # type: ignore[arg-type]
+        return [f"{name}={short(value)}" for name, value in held if not _is_empty(value)]
+
+    def _set(self, name: str, value: Any) -> None:
+        """Set a field of the frozen instance during its construction; an array is made read-only."""
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+        object.__setattr__(self, name, value)
+
+
+def read_only(values: ArrayLike) -> Array:
+    """Return a read-only copy in double precision."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def short(value: Any) -> str:
+    """Describe a value in a few characters.
+
+    Examples
+    --------
+    >>> short(np.zeros((3, 2))), short([1.0] * 50), short("front"), short(0.1 + 0.2)
+    ('(3, 2)', '[50 float]', "'front'", '0.3')
+    """
+    if isinstance(value, np.ndarray):
+        return str(value.shape)
+    if isinstance(value, str):
+        return repr(cut_text(value, MAX_TEXT_CHARACTERS))
+    if isinstance(value, float | np.floating):
+        return f"{float(value):.4g}"
+    if value is None or isinstance(value, bool | int | np.integer):
+        return str(value)
+    if isinstance(value, Mapping):
+        return f"{{{len(value)} {'entry' if len(value) == 1 else 'entries'}}}"
+    if isinstance(value, Sequence | Set):
+        plain = all(isinstance(one, str | int | float) for one in value)
+        if plain and len(value) <= MAX_LISTED:
+            listed = ", ".join(short(one) for one in value)
+            return f"({listed})" if isinstance(value, tuple) else f"[{listed}]"
+        kinds = {type(one).__name__ for one in value}
+        return f"[{len(value)} {kinds.pop() if len(kinds) == 1 else 'members'}]"
+    return type(value).__name__
+
+
+def cut_text(text: str, most: int) -> str:
+    """Return a text on one line, cut to a number of characters."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else f"{line[: most - 1]}…"
+
+
+def _is_empty(value: Any) -> bool:
+    return value is None or (isinstance(value, str | tuple | list | Mapping | Set) and not value)

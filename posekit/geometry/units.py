@@ -1,0 +1,40 @@
+"""Units of length of files; in memory every length is in metres."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.geometry.vectors import Array
+
+Unit = Literal["m", "cm", "mm"]
+
+#: Units in one metre. They are whole numbers, so that a division by them is correctly rounded.
+PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+
+#: Largest accepted coordinate, metres or pixels.
+FARTHEST_COORDINATE: Final = 1e9
+
+#: Names of the axes that can point up; an unknown axis is the empty string.
+UP_AXES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+def to_metres(values: ArrayLike, unit: str) -> Array:
+    """Convert values in a unit to metres; None becomes NaN."""
+    return np.asarray(np.asarray(values, dtype=np.float64) / PER_METRE[unit])
+
+
+def from_metres(values: ArrayLike, unit: str) -> Array:
+    """Convert values in metres to a unit."""
+    return np.asarray(np.asarray(values, dtype=np.float64) * PER_METRE[unit])
+
+
+def up_vector(up: str) -> Array:
+    """Return the unit vector (3,) of an axis name such as ``"-y"``; NaN if the name is empty."""
+    if not up:
+        return np.full(3, np.nan)
+    vector = np.zeros(3)
+    vector["xyz".index(up[1])] = 1.0 if up[0] == "+" else -1.0
+    return vector

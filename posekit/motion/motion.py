@@ -1,0 +1,246 @@
+"""`Motion`: the frames of one body, as named points, as configurations of a robot, or as both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError, refusal
+from posekit.geometry import UP_AXES, Array, Record, rotation_between, up_vector
+from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, POINTS
+
+NAMES: Final = (*POINTS, *FEET_POINTS)
+"""Names that a point of a motion can have: joints, head points, toes and heels."""
+
+PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
+"""Fields with one row a frame."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Motion(Record):
+    """T frames of one body, or of several recordings one after another. A posture is a motion of one frame.
+
+    Parameters
+    ----------
+    joints : array (T, J, 3), optional
+        Positions of named points, metres, in one world frame (or in the frame of `up`, see `in_world`). NaN marks an
+        unknown point.
+    joint_names : sequence of J str
+        Names of the points: `posekit.skeleton.JOINTS`, `HEAD_POINTS`, `FEET_POINTS`. The 14 joints by default.
+    q : array (T, nq), optional
+        Configurations of `robot` in Pinocchio's convention: metres, quaternion x, y, z, w, radians.
+    q_names : sequence of nq str
+        Name of each entry of `q`, as `posekit.robots.Robot.configuration_names` has them; empty for the robot's order.
+    robot : str
+        Name or path of the robot's URDF; ``figure`` for the built-in figure; empty where it is not known.
+    time : array (T,), optional
+        Seconds; NaN where it is not known. All NaN by default.
+    frame : int array (T,), optional
+        Number of each frame within its recording, from 0. Rows with the same number are alternative postures of one
+        frame. Consecutive by default.
+    clip : int array (T,), optional
+        Recording of each row, from 0.
+    clips : sequence of str
+        Names of the recordings; empty where they have none.
+    up : str
+        Axis that points up: ``+x`` … ``-z``; empty where it is not known.
+    unit : str
+        Unit of length of the file that the motion came from.
+    in_world : bool
+        Whether all frames share one origin. False if each frame has its own, such as the middle of the hips: then
+        nothing is known of the ground or of the way that the body travels.
+    source : str
+        File that the motion came from; empty where there is none.
+    layout : str
+        Name of the layout that gave the file's names their meaning.
+    notes : sequence of str
+        What was understood of the file, one sentence each.
+    warnings : sequence of str
+        Contradictions in the file that a person must see, one sentence each.
+    document : object, optional
+        The parsed file. A writer of the same container uses it to keep the user's hierarchy, names and channels.
+
+    Raises
+    ------
+    InputError
+        If a shape, a name or an axis is wrong, or a number is infinite.
+
+    Notes
+    -----
+    Arrays are copied and set read-only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> motion = Motion(joints=np.zeros((90, 14, 3)), time=np.arange(90) / 30, up="+z")
+    >>> len(motion), motion.rate
+    (90, 30.0)
+    """
+
+    joints: Array | None = None
+    joint_names: Sequence[str] = JOINTS
+    q: Array | None = None
+    q_names: Sequence[str] = ()
+    robot: str = ""
+    time: Array | None = None
+    frame: NDArray[np.intp] | None = None
+    clip: NDArray[np.intp] | None = None
+    clips: Sequence[str] = ()
+    up: str = ""
+    unit: str = "m"
+    in_world: bool = True
+    source: str = ""
+    layout: str = ""
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    document: Any = field(default=None)
+
+    def __post_init__(self) -> None:
+        for name in ("joint_names", "q_names", "clips", "notes", "warnings"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.joints is None and self.q is None:
+            raise refusal(
+                self._source, "joints", "neither joints nor q", "one of them", "give positions or q"
+            )
+        rows = len(self.joints) if self.joints is not None else len(self.q)  # type: ignore[arg-type]
+        self._store("joints", self.joints, (rows, len(self.joint_names), 3))
+        self._store("q", self.q, (rows, len(self.q_names) or None))
+        self._store("time", np.full(rows, np.nan) if self.time is None else self.time, (rows,))
+        clip = np.zeros(rows, dtype=np.intp) if self.clip is None else self.clip
+        self._store("clip", clip, (rows,), np.intp)
+        frame = self._counted() if self.frame is None else self.frame
+        self._store("frame", frame, (rows,), np.intp)
+        unknown = [name for name in self.joint_names if name not in NAMES]
+        if unknown or len(set(self.joint_names)) != len(self.joint_names):
+            got = unknown[0] if unknown else "a name twice"
+            raise refusal(
+                self._source, "joint_names", got, f"each once of {', '.join(NAMES)}", "name the points so"
+            )
+        if self.up and self.up not in UP_AXES:
+            raise refusal(
+                self._source, "up", repr(self.up), f"one of {', '.join(UP_AXES)}", "give it with --up"
+            )
+
+    @property
+    def _source(self) -> str:
+        return self.source or "motion"
+
+    def _store(self, name: str, given: Any, shape: tuple[int | None, ...], dtype: Any = np.float64) -> None:
+        """Store a read-only copy of an array after checking its shape; None stays None."""
+        if given is None:
+            return
+        try:
+            values = np.array(given, dtype=dtype)
+        except (TypeError, ValueError) as error:
+            raise refusal(self._source, name, str(error), "numbers", "give one row a frame") from None
+        fits = values.ndim == len(shape) and all(
+            want in (None, have) for want, have in zip(shape, values.shape, strict=False)
+        )
+        if not fits:
+            wanted = " x ".join("any" if extent is None else str(extent) for extent in shape)
+            got = " x ".join(map(str, values.shape))
+            raise refusal(self._source, name, f"shape {got}", f"shape {wanted}", "give one row a frame")
+        if np.isinf(values).any():
+            where = tuple(int(index) for index in np.argwhere(np.isinf(values))[0])
+            raise refusal(
+                self._source, f"{name}{list(where)}", "an infinite number", "a finite number or NaN"
+            )
+        self._set(name, values)
+
+    def _counted(self) -> NDArray[np.intp]:
+        """Count the rows of each recording from 0."""
+        clip = np.asarray(self.clip)
+        frame = np.zeros(len(clip), dtype=np.intp)
+        for index in np.unique(clip):
+            frame[clip == index] = np.arange((clip == index).sum())
+        return frame
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(np.asarray(self.time))
+
+    def _facts(self) -> list[str]:
+        return [
+            f"{len(self)} frames",
+            *([f"{len(self.clips)} clips"] if len(self.clips) > 1 else []),
+            *([f"{len(self.joint_names)} points"] if self.joints is not None else []),
+            *([f"q of {self.robot or 'a robot'} ({self.q.shape[1]})"] if self.q is not None else []),
+            *([f"{self.rate:g} Hz"] if self.rate else []),
+            *([f"up {self.up}"] if self.up else []),
+        ]
+
+    @property
+    def rate(self) -> float | None:
+        """Frames per second, from the median step of time; None if it is not known."""
+        step = np.diff(np.asarray(self.time))[np.diff(np.asarray(self.clip)) == 0]
+        step = step[np.isfinite(step) & (step > 0)]
+        return float(np.round(1.0 / np.median(step), 6)) if len(step) else None
+
+    @property
+    def in_time(self) -> bool:
+        """Whether every frame of a recording has one posture: alternative postures are no motion."""
+        pairs = np.column_stack([np.asarray(self.clip), np.asarray(self.frame)])
+        return len(self) > 1 and len(np.unique(pairs, axis=0)) == len(self)
+
+    def points(self, names: Sequence[str]) -> Array:
+        """Return positions (T, len(names), 3) of named points; NaN for those that the motion does not have."""
+        found = np.full((len(self), len(names), 3), np.nan)
+        if self.joints is not None:
+            place = {name: index for index, name in enumerate(self.joint_names)}
+            have = [index for index, name in enumerate(names) if name in place]
+            found[:, have] = self.joints[:, [place[names[index]] for index in have]]
+        return found
+
+    @property
+    def figure_joints(self) -> Array:
+        """Positions (T, 14, 3) of the joints in tree order, metres."""
+        return self.points(JOINTS)
+
+    @property
+    def head(self) -> Array:
+        """Positions (T, 5, 3) of nose, eyes and ears, metres."""
+        return self.points(HEAD_POINTS)
+
+    @property
+    def feet(self) -> Array:
+        """Positions (T, 4, 3) of toes and heels, metres."""
+        return self.points(FEET_POINTS)
+
+    @property
+    def up_vector(self) -> Array | None:
+        """Unit vector (3,) that points up; None if it is not known."""
+        return up_vector(self.up) if self.up else None
+
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice | Sequence[int]) -> Motion:
+        """Return some of the frames."""
+        kept = {name: getattr(self, name) for name in PER_FRAME if getattr(self, name) is not None}
+        return replace(self, document=None, **{name: values[rows] for name, values in kept.items()})
+
+    def recordings(self) -> Iterator[tuple[str, Motion]]:
+        """Yield the name and the motion of each recording."""
+        for index in np.unique(np.asarray(self.clip)):
+            name = self.clips[index] if index < len(self.clips) else ""
+            rows = self.clip == index
+            whole = bool(np.all(rows))
+            yield name, self if whole else replace(self.take(rows), clip=None, clips=(name,))
+
+    def rotated(self, up: str) -> Motion:
+        """Return the motion in a world whose `up` axis points up; configurations are left out.
+
+        Raises
+        ------
+        InputError
+            If the motion does not know which way is up.
+        """
+        if up == self.up or self.joints is None:
+            return self
+        if not self.up or up not in UP_AXES:
+            raise InputError(
+                f"{self._source}: up: got {self.up!r} to {up!r}; expected known axes; give it with --up"
+            )
+        R = rotation_between(up_vector(self.up), up_vector(up))
+        return replace(self, joints=self.joints @ R.T, up=up, q=None, q_names=(), robot="", document=None)

@@ -1,0 +1,367 @@
+"""Everything that a recovery or a validation is asked: one frozen record each, handed down whole.
+
+The command line makes its options from the fields of these records. Lengths and pixels can be given as numbers or as
+text with a unit.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Final, Literal, Self, get_args
+
+from posekit.errors import nearest, refusal, shown
+from posekit.geometry import PER_METRE, Record
+
+#: Units that a number may carry as text, and how many of them make a metre, pixel, degree, second or one.
+UNITS: Final = {**PER_METRE, "in": 1 / 0.0254, "ft": 1 / 0.3048, "px": 1.0, "deg": 1.0, "s": 1.0, "%": 100.0}
+
+#: Largest accepted relative standard deviation of lengths (dimensionless).
+MAX_LENGTH_DEVIATION: Final = 0.3
+
+#: Largest accepted standard deviation of image points, pixels.
+MAX_DEVIATION: Final = 1000.0
+
+Root = Literal["auto", "given", "head", "torso", "search"]
+Bodies = Literal["auto", "meshes", "capsules", "none"]
+Walkers = Literal["paper", "people", "paper-printed"]
+
+
+def number(
+    text: str | float,
+    name: str,
+    expected: str = "a number, with or without its unit",
+    remedy: str = "correct it",
+) -> float:
+    """Read a quantity such as ``1.75``, ``"175cm"`` or ``"2px"`` in metres, pixels, degrees or seconds.
+
+    Parameters
+    ----------
+    text : str or float
+        The quantity. A bare number is in the base unit.
+    name : str
+        Name of the argument, for the error.
+    expected, remedy : str
+        What the error says was expected, and what to do.
+
+    Raises
+    ------
+    InputError
+        If it is not a finite number with a known unit.
+
+    Examples
+    --------
+    >>> number("175cm", "stature"), number(2, "deviation")
+    (1.75, 2.0)
+    """
+    digits = str(text).strip()
+    unit = next((unit for unit in sorted(UNITS, key=len, reverse=True) if digits.endswith(unit)), "")
+    try:
+        value = float(digits.removesuffix(unit)) / UNITS.get(unit, 1.0)
+    except ValueError:
+        raise refusal("", name, shown(text), expected, remedy) from None
+    if not math.isfinite(value):
+        raise refusal("", name, shown(text), expected, "give a finite number")
+    return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerance:
+    """Allowed differences between a posture and the body, for lengths and image points that are not exact.
+
+    Parameters
+    ----------
+    rigid : float
+        Distances within torso and hips, metres.
+    tangent : float
+        Shortfall of a segment against its image, metres: its end is then put at the nearest point of the ray.
+    angle : float
+        Directions of segments and joint angles, degrees.
+    hips : float
+        Part of `rigid` that the distance between the hips may differ by, 0 to 1: the pelvis is bone.
+    """
+
+    rigid: float
+    tangent: float
+    angle: float = 1e-3
+    hips: float = 1.0
+
+    @property
+    def exact(self) -> bool:
+        """Whether only rounding is allowed."""
+        return self.rigid <= EXACT.rigid
+
+
+#: For exact image points: rounding only.
+EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9)
+
+#: For measured points and bodies: a real torso varies by centimetres (CMU motion capture, 16 clips).
+MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, angle=2.0, hips=0.25)
+
+#: For uncalibrated pictures: the scale differs by some percent between near and far limbs.
+PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.05, angle=10.0)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Settings(Record):
+    """What recoveries and validations have in common.
+
+    Parameters
+    ----------
+    checks : sequence of str or Check, optional
+        Checks by name, as ``module:Name``, or as objects. The usual ones by default.
+    ranges : str
+        Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML table.
+    rules : sequence of int
+        Rules of walking, 1 to 5, for the check ``walking``.
+    walkers : {"paper", "people", "paper-printed"}
+        Source of their thresholds: the paper, real walkers, or the paper as printed.
+    contact_margin : float
+        Distance that bodies must keep, metres; negative allows penetration.
+    rigid_tolerance : float, optional
+        Distances within rigid parts may differ by this, metres.
+    angle_tolerance : float, optional
+        Joint angles may exceed their range by this, degrees.
+    """
+
+    checks: Sequence[Any] | None = None
+    ranges: str = "anatomical"
+    rules: Sequence[int] = (1, 2)
+    walkers: Walkers = "paper"
+    contact_margin: float = 0.0
+    rigid_tolerance: float | None = None
+    angle_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.checks, str):
+            self._set("checks", tuple(name.strip() for name in self.checks.split(",") if name.strip()))
+        elif self.checks is not None:
+            self._set("checks", tuple(self.checks))
+        if isinstance(self.rules, str):
+            self._set("rules", tuple(int(rule) for rule in self.rules.split(",") if rule.strip().isdigit()))
+        self._set("rules", tuple(self.rules))
+        self._one_of("walkers", get_args(Walkers))
+        if not set(self.rules) <= {1, 2, 3, 4, 5}:
+            raise refusal("", "rules", shown(list(self.rules)), "some of 1, 2, 3, 4, 5", "give them as 1,2")
+        self._number("contact_margin", None)
+        for name in ("rigid_tolerance", "angle_tolerance"):
+            self._number(name, 0.0)
+
+    def changed(self, **fields_given: Any) -> Self:
+        """Return the settings with some fields changed.
+
+        Raises
+        ------
+        InputError
+            If a field is unknown or its value is impossible.
+        """
+        known = [one.name for one in fields(self)]
+        for name in fields_given:
+            if name not in known:
+                raise refusal(
+                    "settings",
+                    name,
+                    "an unknown field",
+                    f"a field of {type(self).__name__}",
+                    nearest(name, known),
+                )
+        return replace(self, **fields_given)
+
+    @classmethod
+    def from_toml(cls, path: str | Path, base: Self | None = None) -> Self:
+        """Read fields from a TOML file on top of `base`, or of the defaults.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or a field is wrong.
+        """
+        try:
+            found = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise refusal(path, "", str(error), "a TOML file of settings", "see `posekit settings`") from None
+        return (base or cls()).changed(**found)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields as JSON values; a check that is an object is given by its name."""
+        return {name: _plain(value) for name, value in asdict_shallow(self).items()}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Read what `to_json` wrote."""
+        return cls().changed(**document)
+
+    def _one_of(self, name: str, allowed: Sequence[str]) -> None:
+        if getattr(self, name) not in allowed:
+            raise refusal("", name, shown(getattr(self, name)), f"one of {', '.join(allowed)}", "correct it")
+
+    def _number(
+        self, name: str, lower: float | None, upper: float = math.inf, remedy: str = "correct it"
+    ) -> None:
+        """Replace a quantity that is given as text by its number, and refuse one outside its bounds."""
+        given = getattr(self, name)
+        if given is None:
+            return
+        expected = "a finite number" if lower is None else f"a number from {lower:g}"
+        expected += f" to {upper:g}" if math.isfinite(upper) else ""
+        value = number(given, name, expected, remedy)
+        if (lower is not None and value < lower) or value > upper:
+            raise refusal("", name, shown(given), expected, remedy)
+        self._set(name, value)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RecoverSettings(Settings):
+    """What a recovery is asked: the fields of `Settings`, and these.
+
+    Parameters
+    ----------
+    tangent_tolerance : float, optional
+        A segment may be too short for its image by this, metres.
+    deviation : float, optional
+        Standard deviation of the image points, pixels. The view's own by default.
+    length_deviation : float, optional
+        Relative standard deviation of the body's size and of each length, 0 to 0.3; 0 means exact lengths.
+    stature : float, optional
+        Height of the person, metres.
+    root : {"auto", "given", "head", "torso", "search"}
+        How the neck is placed: as the view gives it, from six head points, or from the body. ``search`` is ``auto``.
+    proportions : {"figure", "taylor"}
+        Relative lengths of an uncalibrated view: the figure's, or Taylor's Table 1.
+    scale : str, optional
+        Scale of an uncalibrated view: ``min``, ``likely``, a number in pixels a metre, ``stature:PX`` or constraints
+        such as ``closure:1,coplanar:0.5``.
+    nearer : mapping or sequence of mapping, optional
+        Flips given by hand: segment to the name of its nearer end, for all frames or one mapping a frame.
+    infer : bool
+        Complete joints that were not seen.
+    refine : bool, optional
+        Treat image points as noisy. By default wherever the points cannot be exact.
+    coverage : float
+        Share of the probability that the listed postures hold at least.
+    group : float, optional
+        Group survivors that are within this distance, metres.
+    follow : int
+        Number of paths through the frames to follow; 0 for none.
+    clip_lengths : bool
+        Estimate one set of lengths from all frames.
+
+    Examples
+    --------
+    >>> RecoverSettings(stature="175cm", coverage=1).stature
+    1.75
+    """
+
+    tangent_tolerance: float | None = None
+    deviation: float | None = None
+    length_deviation: float | None = None
+    stature: float | None = None
+    root: Root = "auto"
+    proportions: Literal["figure", "taylor"] = "figure"
+    scale: str | None = None
+    nearer: Any = None
+    infer: bool = True
+    refine: bool | None = None
+    coverage: float = 0.99
+    group: float | None = None
+    follow: int = 0
+    clip_lengths: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._one_of("root", get_args(Root))
+        if self.root == "search":  # the solver searches all depths anyway
+            self._set("root", "auto")
+        self._one_of("proportions", ("figure", "taylor"))
+        self._number("tangent_tolerance", 0.0, remedy="give metres, or write the unit as in 2cm")
+        self._number("deviation", 0.0, MAX_DEVIATION)
+        self._number("length_deviation", 0.0, MAX_LENGTH_DEVIATION)
+        self._number("stature", 0.1, 10.0, "give metres, or write the unit as in 175cm")
+        self._number("coverage", 0.0, 1.0)
+        self._number("group", 0.0)
+        self._number("follow", 0.0)
+        self._set("follow", int(self.follow))
+        if isinstance(self.scale, float | int):
+            self._set("scale", str(self.scale))
+
+    def tolerance(self, usual: Tolerance) -> Tolerance | None:
+        """Return the tolerance that is given, completed from the `usual` one; None if no part is given."""
+        given = (self.rigid_tolerance, self.tangent_tolerance, self.angle_tolerance)
+        if all(part is None for part in given):
+            return None
+        rigid, tangent, angle = (
+            own if part is None else part
+            for part, own in zip(given, (usual.rigid, usual.tangent, usual.angle), strict=True)
+        )
+        return Tolerance(rigid=rigid, tangent=tangent, angle=angle)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ValidateSettings(Settings):
+    """What a validation is asked: the fields of `Settings`, and these.
+
+    Parameters
+    ----------
+    noise : float, optional
+        Standard deviation of measured coordinates, metres. By default it is estimated from the limbs' lengths.
+    strict : bool
+        Judge postures as those of the model itself: its lengths, rounding alone.
+    ground : float, optional
+        Height of the ground along the up axis, metres. By default it is estimated from each clip.
+    profile : str
+        Checks over time and their thresholds: ``posekit``, ``phuma``, ``protomotions``, ``holomotion`` or the path of
+        a TOML table.
+    bodies : {"auto", "meshes", "capsules", "none"}
+        Collision bodies of a robot: those of its URDF, capsules, or none. ``auto`` takes capsules where no two bodies
+        of the URDF can touch.
+    srdf : str, optional
+        Path of the robot's SRDF, which lists pairs that are not checked.
+    package_dirs : sequence of str
+        Folders that hold the packages of the robot's meshes.
+    joint_map : str, optional
+        Name or path of the table of frames that stand for the joints.
+
+    Examples
+    --------
+    >>> ValidateSettings(checks="joint-range,collision", ground="0cm").checks
+    ('joint-range', 'collision')
+    """
+
+    noise: float | None = None
+    strict: bool = False
+    ground: float | None = None
+    profile: str = "posekit"
+    bodies: Bodies = "auto"
+    srdf: str | None = None
+    package_dirs: Sequence[str] = ()
+    joint_map: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._one_of("bodies", get_args(Bodies))
+        self._number("noise", 0.0)
+        self._number("ground", None)
+        dirs = (self.package_dirs,) if isinstance(self.package_dirs, str) else self.package_dirs
+        self._set("package_dirs", tuple(map(str, dirs)))
+
+
+def asdict_shallow(settings: Settings) -> dict[str, Any]:
+    """Return the fields by name without copying what they hold."""
+    return {one.name: getattr(settings, one.name) for one in fields(settings)}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    if isinstance(value, Path):
+        return str(value)
+    return (
+        value
+        if value is None or isinstance(value, str | int | float | bool)
+        else getattr(value, "name", str(value))
+    )
