@@ -3,45 +3,24 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import sys
-from dataclasses import dataclass
+import tomllib
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
-from posekit.robots.names import SHORT_NAMES
-from posekit.safe_io import cut, nearest, refusal, shown
-from posekit.safe_io.regular_file import check_file
-from posekit.safe_io.xml_file import MAX_BYTES
+from posekit.errors import cut, nearest, refusal, shown
 
-STICK_FIGURE: Final = "stick_figure"
+#: Names of the built-in figure.
+FIGURE: Final = ("figure", "stick_figure")
 ROBOT_PACKAGE: Final = "example-robot-data"
-FOLDERS_OF_URDFS: Final = frozenset(("urdf", "urdfs", "robot", "robots"))
-FOLDERS_OF_MESHES: Final = ("meshes", "mesh")
-"""A folder of the first kind beside one of the second is one of two in a package."""
+#: Folders above a URDF in which a ``package.xml`` is looked for.
 _PACKAGE_DEPTH: Final = 4
-_URDF: Final = (".urdf", ".xml")
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotFiles:
-    """The files of one robot.
-
-    Parameters
-    ----------
-    name : str
-        The name by which it was asked for, or the file's.
-    urdf : Path
-        The URDF.
-    srdf : Path or None
-        The SRDF that belongs to it.
-    package_dirs : tuple of Path
-        The only directories from which its meshes are taken.
-    built_in : bool
-        Whether it came with posekit or with example-robot-data.
-    """
+class RobotFiles(NamedTuple):
+    """Name, URDF, SRDF and package directories of a robot; whether example-robot-data or posekit has it."""
 
     name: str
     urdf: Path
@@ -50,152 +29,99 @@ class RobotFiles:
     built_in: bool
 
 
-def find(
-    name_or_path: str | Path,
-    *,
-    srdf: str | Path | None = None,
-    package_dirs: tuple[str | Path, ...] = (),
-) -> RobotFiles:
+def find(name_or_path: str | Path) -> RobotFiles:
     """Find a robot's URDF, its SRDF and the directories of its meshes.
 
     Parameters
     ----------
     name_or_path : str or path
-        A name of `robot_names` (``human``, ``g1``, ``talos``, ``ur5``, ``panda``, …), ``stick_figure``, or the path
-        of a URDF: what ends in ``.urdf`` or ``.xml``, holds a slash, or is no known name but a file.
-    srdf : path, optional
-        The SRDF; by default the published one, or that of the URDF's own name beside it.
-    package_dirs : sequence of path
-        Directories that hold its packages, besides the URDF's own. By default those are the URDF's folder, the
-        folder above where that holds ``urdf`` or ``robots`` beside ``meshes``, and the nearest one above with a
-        ``package.xml``.
+        A name of `robot_names`, or the path of a URDF. Names with a slash or a suffix are paths. The packages of a
+        path are its own folder, the folder above if that holds meshes, and the nearest one with ``package.xml``.
 
     Raises
     ------
     InputError
-        Where there is no such robot (the nearest names are listed), file or directory.
+        If there is no such robot; the nearest names are given.
     """
-    given = tuple(_directory(Path(folder)) for folder in package_dirs)
-    wanted = None if srdf is None else Path(srdf)
-    name = os.fspath(name_or_path)
-    found = _published(name) if isinstance(name_or_path, str) and not _is_path(name) else None
-    if found is None:
-        if not _is_path(name) and not (isinstance(name_or_path, Path) or _is_file(name)):
-            expected = "the name of a robot, or the path of a URDF"
-            raise refusal("", "robot", shown(name), expected, _suggestion(name))
-        found = _from_path(Path(name))
-    return RobotFiles(
-        name=found.name,
-        urdf=found.urdf,
-        srdf=wanted or found.srdf,
-        package_dirs=(*given, *found.package_dirs),
-        built_in=found.built_in,
-    )
+    name = str(name_or_path)
+    if name in FIGURE:
+        folder = Path(str(resources.files("posekit.urdf")))
+        urdf = folder / "stick_figure.urdf"
+        return RobotFiles(FIGURE[0], urdf, urdf.with_suffix(".srdf"), (folder,), True)
+    known = _published() if isinstance(name_or_path, str) else {}
+    if name in known:
+        urdf, srdf = known[name]
+        robots = urdf.parents[2]
+        return RobotFiles(name, urdf, srdf if srdf.is_file() else None, (robots.parent, robots), True)
+    if name.endswith(".xacro"):
+        raise refusal(name, "", "a xacro file", "a URDF", "expand it first: xacro FILE > FILE.urdf")
+    if not ("/" in name or name.lower().endswith((".urdf", ".xml")) or Path(name).is_file()):
+        some = nearest(name, known)
+        if not some.startswith("did"):
+            some = f"some names are {', '.join((FIGURE[0], 'human', *_short_names()))}"
+        remedy = some if known else f"install {ROBOT_PACKAGE}, or write ./ before a file's name"
+        raise refusal("", "robot", shown(name), "the name of a robot or the path of a URDF", remedy)
+    return _from_path(Path(name))
 
 
 def robot_names() -> tuple[str, ...]:
     """List the names that `find` knows in this environment."""
-    return (STICK_FIGURE, *sorted(_known_files()))
+    return (FIGURE[0], *sorted(_published()))
 
 
-def robots_folder() -> Path | None:
-    """Return the folder of example-robot-data's robots, None where it is not installed.
+def directory(path: str | Path) -> Path:
+    """Return a directory that holds packages, with symbolic links followed; refuse anything else."""
+    if not Path(path).is_dir():
+        raise refusal(cut(str(path)), "package_dirs", "no directory", "one that holds packages", "correct it")
+    return Path(path).resolve()
 
-    The distribution has data alone, under the prefix of its own packager; a system package puts it under
-    ``share``.
+
+@lru_cache(maxsize=1)
+def _short_names() -> dict[str, list[str]]:
+    text = (resources.files("posekit.urdf") / "robots.toml").read_text(encoding="utf-8")
+    table: dict[str, list[str]] = tomllib.loads(text)["robots"]
+    return table
+
+
+@lru_cache(maxsize=1)
+def _published() -> dict[str, tuple[Path, Path]]:
+    """Map names to the URDF and SRDF files of example-robot-data; empty if it is not installed.
+
+    The distribution has data alone, under the prefix of its packager; a system package puts them under ``share``.
     """
     places = [Path(sys.prefix) / "share" / ROBOT_PACKAGE / "robots"]
     try:
         files = importlib.metadata.distribution(ROBOT_PACKAGE)
+        places.insert(0, Path(str(files.locate_file(f"cmeel.prefix/share/{ROBOT_PACKAGE}/robots"))))
     except importlib.metadata.PackageNotFoundError:
         pass
-    else:
-        places.insert(0, Path(str(files.locate_file(f"cmeel.prefix/share/{ROBOT_PACKAGE}/robots"))))
-    return next((place for place in places if place.is_dir()), None)
-
-
-def _published(name: str) -> RobotFiles | None:
-    if name == STICK_FIGURE:
-        folder = Path(str(resources.files("posekit.urdf")))
-        return RobotFiles(
-            name=name,
-            urdf=folder / f"{name}.urdf",
-            srdf=folder / f"{name}.srdf",
-            package_dirs=(folder,),
-            built_in=True,
-        )
-    known, robots = _known_files(), robots_folder()
-    if name not in known or robots is None:
-        return None
-    urdf, srdf = known[name]
-    return RobotFiles(
-        name=name,
-        urdf=robots / urdf,
-        srdf=robots / srdf if srdf else None,
-        package_dirs=(robots.parent, robots),
-        built_in=True,
-    )
-
-
-@lru_cache(maxsize=1)
-def _known_files() -> dict[str, tuple[str, str]]:
-    """Map names to URDF and SRDF below the robots' folder: the short names, and those of the other files."""
-    robots = robots_folder()
+    robots = next((place for place in places if place.is_dir()), None)
     if robots is None:
         return {}
-    known: dict[str, tuple[str, str]] = {}
-    for path in sorted(robots.glob("*/*/*.urdf")):
-        srdf = path.parents[1] / "srdf" / f"{path.stem}.srdf"
-        beside = srdf.relative_to(robots).as_posix() if srdf.is_file() else ""
-        known.setdefault(path.stem, (path.relative_to(robots).as_posix(), beside))
-    return known | {name: files for name, files in SHORT_NAMES.items() if (robots / files[0]).is_file()}
+    known: dict[str, tuple[Path, Path]] = {}
+    for urdf in sorted(robots.glob("*/*/*.urdf")):
+        known.setdefault(urdf.stem, (urdf, urdf.parents[1] / "srdf" / f"{urdf.stem}.srdf"))
+    for name, (short, srdf) in _short_names().items():
+        urdf = robots / f"{short}.urdf"
+        if urdf.is_file():
+            known[name] = urdf, urdf.parents[1] / "srdf" / f"{srdf}.srdf"
+    return known
 
 
 def _from_path(path: Path) -> RobotFiles:
-    if path.name.endswith(".xacro"):
-        raise refusal(path, "", "a xacro file", "a URDF", "expand it first: xacro FILE > FILE.urdf")
-    check_file(path, limit=MAX_BYTES, too_large="name a robot's URDF")
     folder = path.resolve().parent
-    beside = path.with_suffix(".srdf")
-    robots = robots_folder()
-    built_in = robots is not None and path.resolve().is_relative_to(robots.resolve())
-    has_meshes = any((folder.parent / name).is_dir() for name in FOLDERS_OF_MESHES)
-    above = [folder.parent] if has_meshes and folder.name in FOLDERS_OF_URDFS else []
+    built_in = next((f for f in folder.parents if (f.parent.name, f.name) == (ROBOT_PACKAGE, "robots")), None)
+    has_meshes = any((folder.parent / name).is_dir() for name in ("meshes", "mesh"))
     ancestors = folder, *list(folder.parents)[:_PACKAGE_DEPTH]
     package = [place for place in ancestors if (place / "package.xml").is_file()][:1]
-    data = [robots.parent, robots] if built_in and robots is not None else []
+    places = [folder, *([folder.parent] if has_meshes else []), *package]
+    if built_in is not None:
+        places += [built_in.parent, built_in]
+    srdf = path.with_suffix(".srdf")
     return RobotFiles(
         name=path.stem,
         urdf=path,
-        srdf=beside if beside.is_file() else None,
-        package_dirs=tuple(dict.fromkeys((folder, *above, *package, *data))),
-        built_in=built_in,
+        srdf=srdf if srdf.is_file() else None,
+        package_dirs=tuple(dict.fromkeys(places)),
+        built_in=built_in is not None,
     )
-
-
-def _is_path(name: str) -> bool:
-    return os.sep in name or "/" in name or name.lower().endswith((*_URDF, ".xacro"))
-
-
-def _is_file(name: str) -> bool:
-    try:
-        return Path(name).is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def _suggestion(name: str) -> str:
-    if robots_folder() is None:
-        return f"install {ROBOT_PACKAGE} for the published robots, or write ./ before a file's name"
-    near = nearest(name, robot_names())
-    some = f"some names are {', '.join((STICK_FIGURE, 'human', 'simple_humanoid', *SHORT_NAMES))}"
-    return near if near.startswith("did") else some
-
-
-def _directory(path: Path) -> Path:
-    try:
-        if path.is_dir():
-            return path.resolve()
-    except (OSError, ValueError):
-        pass
-    raise refusal(cut(str(path)), "", "no directory", "one that holds packages", "correct package_dirs")

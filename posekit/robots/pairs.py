@@ -1,71 +1,70 @@
-"""Which pairs of bodies are checked for collision: those that an SRDF leaves, or those that can come together."""
+"""The pairs of bodies that are checked for collision."""
 
 from __future__ import annotations
+
+import re
+from collections.abc import Collection
 
 import numpy as np
 import pinocchio as pin
 
-from posekit.robots.geometry import link_of
-from posekit.robots.srdf import Srdf
+from posekit.geometry import Array
+from posekit.robots.bodies import link_of
+from posekit.robots.capsules import PARTS
+from posekit.robots.urdf import SrdfPairs
 
-Pair = tuple[int, int]
+#: Pairs of parts that are checked.
+Parts = Collection[frozenset[str]]
 
 
-def set_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: Srdf | None) -> None:
-    """Give a geometry model its pairs.
+def set_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: SrdfPairs | None, parts: Parts) -> None:
+    """Set the pairs of bodies to check.
 
-    With an SRDF: all pairs of bodies on different joints but those it takes out. Without: all but those of
-    neighbours, and those that touch in the neutral posture.
+    With an SRDF, all pairs of bodies on different joints that it leaves. Without, all pairs but those of neighbours,
+    and those that touch in the neutral configuration. Between capsules of a humanoid's parts, `parts` are checked
+    instead of those that are no neighbours.
     """
     geometry.addAllCollisionPairs()
     pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
     if srdf is not None:
         links = [link_of(model, body) for body in geometry.geometryObjects]
-        kept = [(a, b) for a, b in pairs if srdf.checks(links[a], links[b])]
+        kept = [(a, b) for a, b in pairs if srdf.checked(links[a], links[b])]
     else:
-        near = _neighbours(model, geometry)
-        joints = [body.parentJoint for body in geometry.geometryObjects]
-        touching = _touching(model, geometry)
-        kept = [
-            pair
-            for pair, touches in zip(pairs, touching, strict=True)
-            if not touches and frozenset((joints[pair[0]], joints[pair[1]])) not in near
-        ]
+        near, joints = _neighbours(model, geometry), [body.parentJoint for body in geometry.geometryObjects]
+        names = [re.sub(r"_\d+$", "", body.name) for body in geometry.geometryObjects]
+        data, geometry_data = model.createData(), geometry.createData()
+        pin.computeCollisions(model, data, geometry, geometry_data, neutral_inside(model), False)
+        kept = []
+        for (a, b), result in zip(pairs, geometry_data.collisionResults, strict=True):
+            ends = frozenset((names[a], names[b]))
+            wanted = ends in parts if parts and ends <= PARTS.keys() else {joints[a], joints[b]} not in near
+            if wanted and not result.isCollision():
+                kept.append((a, b))
     geometry.removeAllCollisionPairs()
     for a, b in kept:
         geometry.addCollisionPair(pin.CollisionPair(a, b))
 
 
-def neutral_inside_limits(model: pin.Model) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return the neutral configuration, each hinge and slide moved to the nearest of its limits where it is outside."""
-    q = pin.neutral(model)
+def neutral_inside(model: pin.Model) -> Array:
+    """Return the neutral configuration (nq,), each joint of one entry moved to its nearest limit if outside."""
+    q = np.array(pin.neutral(model))
     for joint in range(1, model.njoints):
         if model.nqs[joint] == 1:
             k = model.idx_qs[joint]
             q[k] = np.clip(q[k], model.lowerPositionLimit[k], model.upperPositionLimit[k])
-    return np.asarray(q)
+    return q
 
 
 def _neighbours(model: pin.Model, geometry: pin.GeometryModel) -> set[frozenset[int]]:
-    """Return pairs of joints with bodies, one above the other, with no body between them.
+    """Return the pairs of joints with bodies of which one carries the other, with no body between them.
 
-    A hip of three hinges has two links without a body between pelvis and thigh, which are neighbours all the
-    same.
+    A hip of three hinges has two links without a body: pelvis and thigh are neighbours.
     """
     carrying = {body.parentJoint for body in geometry.geometryObjects}
     near = set()
     for joint in carrying:
-        above = joint
-        while above:
-            above = model.parents[above]
-            if above in carrying:
-                near.add(frozenset((joint, above)))
-                break
+        above = int(model.parents[joint])
+        while above and above not in carrying:
+            above = int(model.parents[above])
+        near.add(frozenset((joint, above)))
     return near
-
-
-def _touching(model: pin.Model, geometry: pin.GeometryModel) -> list[bool]:
-    """Ask coal which of the pairs touch in the neutral posture; the data are made after the pairs."""
-    data, geometry_data = model.createData(), geometry.createData()
-    pin.computeCollisions(model, data, geometry, geometry_data, neutral_inside_limits(model), False)
-    return [result.isCollision() for result in geometry_data.collisionResults]

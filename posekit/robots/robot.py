@@ -1,209 +1,466 @@
-"""A robot: URDF and SRDF texts that were checked, and what Pinocchio makes of them."""
+"""A robot: Pinocchio's model of a checked URDF, with its limits, names, bodies and the places of the 14 joints."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Final, Literal
 from xml.etree import ElementTree
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from posekit.display.short_repr import ShortRepr
-from posekit.geometry import Array
-from posekit.robots.declared import BodyKind
-from posekit.robots.geometry import build_geometry, link_of
-from posekit.robots.meshes import with_resolved_meshes
-from posekit.robots.model import build_model, configuration_names
-from posekit.robots.pairs import set_pairs
-from posekit.robots.srdf import Srdf, check_srdf
-from posekit.robots.urdf import check_urdf
-from posekit.safe_io import nearest, refusal, shown
+from posekit.errors import cut, one_line, refusal, shown
+from posekit.geometry import Array, Record, read_only
+from posekit.robots.bodies import build_bodies, link_of
+from posekit.robots.capsules import capsule_bodies
+from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of, set_joint
+from posekit.robots.find import FIGURE, directory, find
+from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
+from posekit.robots.kinematics import SUFFIXES, Kinematics, configuration_names, rotation_entries
+from posekit.robots.pairs import neutral_inside, set_pairs
+from posekit.robots.urdf import SrdfPairs, check_srdf, check_urdf, need, read_text
+from posekit.skeleton import JOINTS, POINTS
+
+if TYPE_CHECKING:
+    from posekit.robots.collision import Contacts, SelfCollision
+
+Bodies = Literal["meshes", "capsules", "none"]
+
+#: Distance from 1 up to which the length of a quaternion is normalised: files are written with few digits.
+ROUNDED: Final = 1e-2
+#: Names of the floating joint that is added; the first one that no joint of the URDF has.
+ROOT_NAMES: Final = ("root_joint", "free_flyer", "posekit_root_joint")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Robot(ShortRepr):
-    """A robot, made from texts; `posekit.robots.load_robot` makes one from files.
-
-    Everything is loaded and checked at construction. A pickle holds the texts alone; a robot with meshes reads
-    them again.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Robot(Record):
+    """A robot, made from texts; `load_robot` makes one from files.
 
     Parameters
     ----------
     urdf : str
-        The URDF.
+        The URDF. It is parsed and checked once; Pinocchio is given the checked elements.
     srdf : str or None
-        The SRDF, which says what pairs of links are not checked for collision.
+        The SRDF, which names pairs of links that are not checked for collision.
     name, source : str
-        What to call it; the file it came from, for errors.
+        The robot's name, and the file it came from, for errors.
     package_dirs : tuple of Path
-        The only directories from which meshes are taken.
-    free_flyer : bool
-        Whether the root moves freely (as people do), or is fixed (as arms are).
-    with_geometry : bool
-        Whether collision bodies are loaded, meshes with them.
-    with_visuals : bool
-        Whether visual bodies are loaded too.
+        The only directories from which meshes are read.
+    fixed_base : bool
+        Fix the root, as for an arm; otherwise it moves freely, by the URDF's own floating joint if there is one.
+    bodies : {"meshes", "capsules", "none"}
+        Collision bodies: those of the URDF; the same with capsules in place of meshes, or along the limbs if it has
+        no bodies; or none.
+    joint_map_file : str
+        Name or TOML file of the joint map; see `joint_map`.
     shared_srdf : bool
-        Whether the SRDF is one for several variants of the robot, as published ones are: links that it knows and
-        the robot has not are passed over then, and listed in `unknown_links`.
-    mesh_copies : mapping of str to Path, optional
-        Files that are read, once, in place of the meshes that the URDF names: see
-        `posekit.robots.meshes.private_copies`.
+        Pass over links in the SRDF that the robot lacks; published robots share one among variants.
 
     Raises
     ------
     InputError
-        Where a text, a mesh or what Pinocchio makes of them is wrong.
+        If a text or a mesh is not as it should be; one line that names the place.
+
+    Examples
+    --------
+    >>> from posekit.robots import load_robot
+    >>> panda = load_robot("panda", bodies="none")
+    >>> panda.joint_names[1]
+    'panda_joint1'
     """
 
     urdf: str = field(repr=False)
     srdf: str | None = field(default=None, repr=False)
     name: str = "robot"
     source: str = "URDF"
-    package_dirs: tuple[Path, ...] = ()
-    free_flyer: bool = True
-    with_geometry: bool = True
-    with_visuals: bool = False
-    shared_srdf: bool = False
-    mesh_copies: Mapping[str, Path] | None = field(default=None, repr=False)
+    package_dirs: tuple[Path, ...] = field(default=(), repr=False)
+    fixed_base: bool = False
+    bodies: Bodies = "meshes"
+    joint_map_file: str = field(default="", repr=False)
+    shared_srdf: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
-        _ = self.model, self._srdf, self.geometry, self.visuals
+        _ = self.model, self.geometry
 
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the texts and the settings: a model is built from them in milliseconds."""
-        settings = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return _robot, ({**settings, "mesh_copies": None},)
+    def __getstate__(self) -> dict[str, object]:
+        """Pickle the texts and settings: a model is built from them in milliseconds."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     @cached_property
     def tree(self) -> ElementTree.Element:
-        """The URDF's elements, checked; not to be changed."""
+        """The checked elements of the URDF; not to be changed."""
         return check_urdf(self.urdf, self.source)
 
     @cached_property
     def model(self) -> pin.Model:
-        """Pinocchio's model. Joints that mimic others move on their own, as Pinocchio has it by default."""
-        return build_model(self.tree, self.source, free_flyer=self.free_flyer)
+        """Pinocchio's model. Mimicking joints have entries of q of their own: see `mimics`."""
+        moving = [str(one.get("name")) for one in self.tree.findall("joint") if one.get("type") != "fixed"]
+        text = ElementTree.tostring(self.tree, encoding="unicode")
+        root = next(name for name in ROOT_NAMES if name not in moving)
+        added = [] if self.fixed_base or _floats(self.tree) else [root]
+        try:
+            if added:
+                model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer(), root)
+            else:
+                model = pin.buildModelFromXML(text)
+        except (ValueError, RuntimeError) as error:
+            got = f"a URDF that Pinocchio cannot read ({cut(one_line(str(error).splitlines()[0]))})"
+            raise refusal(self.source, "", got, "a URDF", "correct it") from None
+        got, expected = f"{model.njoints - 1} joints read by Pinocchio", f"{len(moving)} of the text"
+        read = sorted(list(model.names)[1:]) == sorted([*added, *moving])
+        need(self.source, read, "", got, expected, "give the joints other names")
+        return model
+
+    @cached_property
+    def free_flyer(self) -> bool:
+        """Whether the root moves freely."""
+        return bool(self.model.njoints > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer")
 
     @cached_property
     def geometry(self) -> pin.GeometryModel | None:
-        """Pinocchio's geometry model of the collision bodies, with the pairs to check; None where not wanted."""
-        if not self.with_geometry:
+        """Pinocchio's collision bodies and the pairs to check; None without bodies."""
+        if self.bodies == "none":
             return None
-        geometry = self._built("collision")
-        set_pairs(self.model, geometry, self._srdf)
+        if self.bodies == "meshes":
+            geometry = build_bodies(self.model, self.tree, self.package_dirs, self.source, "collision")
+            set_pairs(self.model, geometry, self._srdf, ())
+            return geometry
+        figure = load_robot(FIGURE[0])
+        links = dict(zip(figure.body_names, figure.body_links, strict=True))
+        geometry = capsule_bodies(self, figure)
+        parts = {frozenset(links[name] for name in pair) for pair in figure.collision_pairs}
+        set_pairs(self.model, geometry, self._srdf, parts)
         return geometry
 
     @cached_property
-    def visuals(self) -> pin.GeometryModel | None:
-        """Pinocchio's geometry model of the visual bodies; None where not wanted."""
-        return self._built("visual") if self.with_visuals else None
-
-    def _built(self, kind: BodyKind) -> pin.GeometryModel:
-        robot = with_resolved_meshes(self.tree, self.package_dirs, self.source, kind, self.mesh_copies)
-        return build_geometry(self.model, robot, self.source, kind)
+    def visuals(self) -> pin.GeometryModel:
+        """Pinocchio's visual bodies, loaded at first use."""
+        return build_bodies(self.model, self.tree, self.package_dirs, self.source, "visual")
 
     @cached_property
     def lower(self) -> Array:
-        """Lower limits of q (nq,), radians and metres, -inf where there are none; see `configuration_names`."""
-        return _read_only(self.model.lowerPositionLimit)
+        """Lower limits of q (nq,), rad and m; -inf if there are none."""
+        return self._limits(self.model.lowerPositionLimit, -np.inf)
 
     @cached_property
     def upper(self) -> Array:
-        """Upper limits of q (nq,)."""
-        return _read_only(self.model.upperPositionLimit)
+        """Upper limits of q (nq,), rad and m; inf if there are none."""
+        return self._limits(self.model.upperPositionLimit, np.inf)
+
+    @cached_property
+    def neutral(self) -> Array:
+        """The neutral configuration (nq,): zero, or the nearest limit, with mimicking joints in place."""
+        return read_only(self.with_mimics(neutral_inside(self.model)[None])[0])
 
     @cached_property
     def configuration_names(self) -> tuple[str, ...]:
-        """A name for each entry of q: the joint's, with ``.cos`` and the like where a joint has several."""
+        """Name of each entry of q: the joint's; x, y, z, qx, qy, qz, qw of the root; ``.cos``, ``.sin``."""
         return configuration_names(self.model)
 
     @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each entry of q: ``rad``, ``m``, or empty for quaternions, cosines and sines."""
+        slides = {one.get("name") for one in self.tree.findall("joint") if one.get("type") == "prismatic"}
+        units = []
+        for joint in range(1, self.model.njoints):
+            own = "m" if self.model.names[joint] in slides else "rad"
+            ends = SUFFIXES.get(self.model.joints[joint].shortname())
+            units += [own] if ends is None else ["m" if end in ("x", "y", "z") else "" for end in ends]
+        return tuple(units)
+
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """The moving joints, in Pinocchio's order, the free-flying root first where there is one."""
+        """The moving joints in Pinocchio's order, the floating root first."""
         return tuple(self.model.names)[1:]
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
-        """The links, in Pinocchio's order."""
+        """The links in Pinocchio's order."""
         return tuple(frame.name for frame in self.model.frames if frame.type == pin.FrameType.BODY)
 
     @cached_property
-    def frame_names(self) -> tuple[str, ...]:
-        """The names that `frame_id` takes: links first, then joints."""
-        return tuple(
-            dict.fromkeys((*self.link_names, *(frame.name for frame in list(self.model.frames)[1:])))
-        )
-
-    def frame_id(self, name: str) -> int:
-        """Return the index of a frame: a link's, or a joint's where no link has the name.
-
-        Raises
-        ------
-        InputError
-            Where there is none; Pinocchio would return an index past the end, and crash on its use.
-        """
-        kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
-        for kind in kinds:
-            if self.model.existFrame(name, kind):
-                return int(self.model.getFrameId(name, kind))
-        raise refusal(
-            self.source, "", f"the frame {shown(name)}", "a link or a joint", nearest(name, self.frame_names)
-        )
+    def mimics(self) -> tuple[Mimic, ...]:
+        """The joints that follow others; a joint comes after the one that it follows."""
+        return mimics_of(self.tree)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """The collision bodies, as Pinocchio names them: link and number."""
-        return () if self.geometry is None else tuple(body.name for body in self.geometry.geometryObjects)
+        return tuple(body.name for body in self._objects)
 
     @cached_property
     def body_links(self) -> tuple[str, ...]:
-        """The link of each of `body_names`."""
-        if self.geometry is None:
-            return ()
-        return tuple(link_of(self.model, body) for body in self.geometry.geometryObjects)
+        """The link of each collision body."""
+        return tuple(link_of(self.model, body) for body in self._objects)
 
     @cached_property
     def collision_pairs(self) -> tuple[tuple[str, str], ...]:
         """The pairs of bodies that are checked, by name."""
-        if self.geometry is None:
-            return ()
-        names = self.body_names
-        return tuple((names[pair.first], names[pair.second]) for pair in self.geometry.collisionPairs)
-
-    @property
-    def pairs_from(self) -> str:
-        """Where the pairs come from: ``srdf``, or ``neutral posture``."""
-        return "neutral posture" if self._srdf is None else "srdf"
-
-    @property
-    def unknown_links(self) -> tuple[str, ...]:
-        """Links that the SRDF names and the robot has not; empty unless the SRDF is shared."""
-        return () if self._srdf is None else self._srdf.unknown
+        pairs = () if self.geometry is None else self.geometry.collisionPairs
+        return tuple((self.body_names[pair.first], self.body_names[pair.second]) for pair in pairs)
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of URDF and SRDF: what a report names to say which robot it used."""
+        """SHA-256 of URDF and SRDF, by which a report identifies the robot."""
         return hashlib.sha256(f"{self.urdf}\0{self.srdf or ''}".encode()).hexdigest()
 
     @cached_property
-    def _srdf(self) -> Srdf | None:
+    def joint_map(self) -> JointMap:
+        """The frames that stand for the 14 joints: a built-in or a given map, or one from the names of the joints.
+
+        Raises
+        ------
+        InputError
+            If the robot is no humanoid, or the given map does not fit.
+        """
+        if self.joint_map_file:
+            return load_joint_map(self.joint_map_file, self.model)
+        return find_joint_map(self.model, self.source)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """The kinematics of the mapped points."""
+        return self.joint_map.kinematics(self.model)
+
+    def checked(self, q: ArrayLike, source: str = "q") -> Array:
+        """Check configurations: Pinocchio accepts quaternions of any length.
+
+        Parameters
+        ----------
+        q : array (nq,) or (N, nq)
+        source : str
+            Their name in errors.
+
+        Returns
+        -------
+        array (N, nq)
+            A copy; quaternions, and cosines and sines, of unit length.
+
+        Raises
+        ------
+        InputError
+            If the shape is another, a number is not finite, or a quaternion's length is more than 0.01 from 1.
+        """
+        q, check = np.atleast_2d(np.array(q, dtype=np.float64)), partial(need, source)
+        remedy = "give a row a configuration, in the order of configuration_names"
+        check(q.shape[1:] == (self.model.nq,), "", f"shape {q.shape}", f"(N, {self.model.nq})", remedy)
+        for row, column in np.argwhere(~np.isfinite(q))[:1]:
+            place = f"row {row}: {self.configuration_names[column]}"
+            check(False, place, shown(float(q[row, column])), "a finite number", "leave the row out")
+        for first, last, joint in rotation_entries(self.model):
+            length = np.linalg.norm(q[:, first:last], axis=1)
+            for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
+                what = "a quaternion" if last - first == 4 else "a cosine and sine"
+                got, remedy = f"{what} of length {length[row]:.4g}", "check the order of q, and normalise it"
+                check(False, f"row {row}: {joint}", got, "length 1", remedy)
+            q[:, first:last] /= length[:, None]
+        return q
+
+    def with_mimics(self, q: Array) -> Array:
+        """Return configurations (N, nq) whose mimicking joints have the values of their targets."""
+        q = q.copy()
+        for mimic in self.mimics:
+            set_joint(self.model, q, mimic.joint, mimic.value(joint_values(self.model, q, mimic.target)))
+        return q
+
+    def mimic_errors(self, q: Array) -> Array:
+        """Return the deviations (N, M) of mimicking joints from their targets' values, rad or m; see `mimics`."""
+        out = np.zeros((len(q), len(self.mimics)))
+        for k, mimic in enumerate(self.mimics):
+            value, target = (joint_values(self.model, q, joint) for joint in mimic[:2])
+            out[:, k] = value - mimic.value(target)
+            if self.units[self.model.idx_qs[self.model.getJointId(mimic.joint)]] != "m":
+                out[:, k] = (out[:, k] + np.pi) % (2 * np.pi) - np.pi
+        return out
+
+    def q_from_columns(self, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
+        """Order the columns of a table as q.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Names of the columns: entries of `configuration_names`, or joints; a continuous joint is one angle in
+            radians, or its cosine and sine. Case and an ending ``_joint`` do not matter.
+        values : array (N, len(names))
+            Radians and metres.
+
+        Returns
+        -------
+        q : array (N, nq)
+            Joints without a column follow the joint that they mimic, or have their neutral value.
+        notes : tuple of str
+            Joints without a column, and columns that were ignored.
+
+        Raises
+        ------
+        InputError
+            If less than half of the columns are the robot's, or a name is given twice.
+        """
+        return from_columns(self, names, values)
+
+    def points(self, q: ArrayLike) -> Array:
+        """Return the 14 joints (N, 14, 3) of configurations (N, nq), metres, world; NaN for joints it lacks.
+
+        Raises
+        ------
+        InputError
+            If the robot has no joint map, or q is not as `checked` requires.
+        """
+        out = np.full((len(q := self.checked(q)), len(POINTS), 3), np.nan)
+        out[:, self.joint_map.columns] = self.kinematics.positions(q)
+        return out[:, : len(JOINTS)]
+
+    def velocities(self, q: Array, time: Array) -> Array:
+        """Return the joint velocities (T - 1, nv) between configurations (T, nq) at times (T,): rad/s and m/s.
+
+        The difference is `pinocchio.difference`: the twist of a floating root in its own frame, linear first.
+        """
+        steps = [pin.difference(self.model, a, b) for a, b in itertools.pairwise(q)]
+        return np.array(steps).reshape(-1, self.model.nv) / np.diff(time)[:, None]
+
+    def collisions(self, q: ArrayLike, *, margin: float = 0.0) -> Contacts:
+        """Return the collisions of configurations.
+
+        Parameters
+        ----------
+        q : array (N, nq)
+        margin : float
+            Metres below which pairs are listed; touching pairs alone by default.
+
+        Returns
+        -------
+        Contacts
+            ``hit`` (N,), and ``frame``, ``pair`` (index into `collision_pairs`) and signed ``distance`` of each
+            listed pair.
+
+        Examples
+        --------
+        >>> robot = load_robot("figure")
+        >>> robot.collisions(robot.neutral).hit
+        array([False])
+        """
+        return self._collision.contacts(self.checked(q), margin)
+
+    def configurations(
+        self, joints: ArrayLike, *, start: ArrayLike | None = None, in_time: bool = False
+    ) -> tuple[Array, Array]:
+        """Return configurations that place the joints, inside the limits: see `posekit.robots.inverse.solve`.
+
+        Parameters
+        ----------
+        joints : array (14, 3) or (N, 14, 3)
+            Metres, world; NaN is unknown.
+        start : array (N, nq), optional
+            Configurations near the solution.
+        in_time : bool
+            The postures are frames in order; each is solved from the one before.
+
+        Returns
+        -------
+        q : array (N, nq)
+        distance : array (N,)
+            Largest distance of a known joint from its place, metres.
+        """
+        from posekit.robots.inverse import solve
+
+        return solve(self, joints, start=start, in_time=in_time)
+
+    def scaled(self, joints: ArrayLike) -> Robot:
+        """Return the robot with the segment lengths of a person: see `posekit.robots.scaling`."""
+        from posekit.robots.scaling import scaled
+
+        return scaled(self, joints)
+
+    @property
+    def _objects(self) -> list[pin.GeometryObject]:
+        return [] if self.geometry is None else list(self.geometry.geometryObjects)
+
+    @cached_property
+    def _collision(self) -> SelfCollision:
+        from posekit.robots.collision import SelfCollision
+
+        return SelfCollision(self.model, self.geometry or pin.GeometryModel())
+
+    @cached_property
+    def _srdf(self) -> SrdfPairs | None:
+        """Pairs of the SRDF; None if there is none, or if it disables no pair and so was not written for collisions."""
         if self.srdf is None:
             return None
         links = [link.get("name", "") for link in self.tree.findall("link")]
         srdf = check_srdf(self.srdf, f"{self.source}, SRDF", links, strict=not self.shared_srdf)
-        return None if srdf.says_nothing else srdf
+        return srdf if srdf.disabled or srdf.alone else None
+
+    def _limits(self, limits: Array, none: float) -> Array:
+        """Return limits (nq,) with none for joints of several entries."""
+        single = [self.model.idx_qs[j] for j in range(1, self.model.njoints) if self.model.nqs[j] == 1]
+        out = np.full(self.model.nq, none)
+        out[single] = limits[single]
+        return read_only(out)
 
 
-def _robot(settings: dict[str, Any]) -> Robot:
-    return Robot(**settings)
+def load_robot(
+    name_or_path: str | Path,
+    *,
+    srdf: str | Path | None = None,
+    bodies: Bodies = "meshes",
+    package_dirs: Sequence[str | Path] = (),
+    fixed_base: bool = False,
+    joint_map: str | Path = "",
+) -> Robot:
+    """Load a robot by name or from files.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A published robot (``g1``, ``human``, ``talos``, ``panda``, …), ``figure``, or the path of a URDF.
+    srdf : path, optional
+        Its SRDF; by default the published one, or the one of the same name beside the URDF.
+    bodies : {"meshes", "capsules", "none"}
+        Collision bodies: see `Robot`. Capsules need no mesh files.
+    package_dirs : sequence of path
+        Directories that hold the packages of its meshes, besides its own.
+    fixed_base : bool
+        Fix the root, as for an arm.
+    joint_map : str or path
+        Name or TOML file of the joint map; by default the one that fits.
+
+    Raises
+    ------
+    InputError
+        One line that says what is wrong with the name, a file, a mesh or a number.
+
+    Examples
+    --------
+    >>> robot = load_robot("figure")
+    >>> robot.points(robot.neutral).shape
+    (1, 14, 3)
+    """
+    files = find(name_or_path)
+    own_srdf = files.srdf if srdf is None else Path(srdf)
+    return Robot(
+        urdf=read_text(files.urdf),
+        srdf=None if own_srdf is None else read_text(own_srdf),
+        name=files.name,
+        source=str(files.urdf),
+        package_dirs=(*map(directory, package_dirs), *files.package_dirs),
+        fixed_base=fixed_base,
+        bodies=bodies,
+        joint_map_file=str(joint_map),
+        shared_srdf=files.built_in and srdf is None,
+    )
 
 
-def _read_only(values: Array) -> Array:
-    values = values.copy()
-    values.flags.writeable = False
-    return values
+def _floats(tree: ElementTree.Element) -> bool:
+    """Return whether the URDF's root link carries a floating joint."""
+    children = {child.get("link") for child in tree.findall("joint/child")}
+    return any(
+        joint.get("type") == "floating" and parent.get("link") not in children
+        for joint in tree.findall("joint")
+        for parent in joint.findall("parent")
+    )

@@ -1,158 +1,212 @@
-"""A model with the segment lengths of a person: joint placements, geometry and centres of mass move along."""
+"""A robot with the segment lengths of a person: the origins of its URDF joints are moved."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from posekit.errors import InputError
-from posekit.geometry import Array
-from posekit.robots.kinematics import Kinematics
-from posekit.robots.stretching import EXACT_METRES, ModelStretching, shoulders_are_behind
-from posekit.safe_io import nearest
-from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS, segment_name
+from posekit.errors import refusal
+from posekit.geometry import Array, cross, rotation_between
+from posekit.robots.urdf import SIZES, Element, numbers
+from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS
 
-__all__ = ["ScaledRobot", "model_lengths", "scaled", "segment_lengths", "shoulders_are_behind"]
+if TYPE_CHECKING:
+    from posekit.robots.robot import Robot
 
-MAX_PASSES = 30
-STUCK_METRES = 1e-10
-"""Metres by which a pass must change the largest miss: where it does not, the lengths cannot be met."""
-
-SAME_LENGTH = 1e-9
-"""Relative difference of a length below which it is left alone."""
-
-RATIO_BOUNDS = (0.05, 20.0)
-"""Ratios of a new length to the model's that are believed; beyond them the unit is wrong."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ScaledRobot:
-    """A model with other lengths.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-        The new model and its points: offsets of points have moved along.
-    geometry : pinocchio.GeometryModel or None
-        The new geometry, where one was given.
-    lengths : mapping
-        The distances between mapped points at the neutral configuration, metres, by segment name.
-    residual : mapping
-        By how much a demanded length was missed (what it has become minus what was asked for), metres. Not zero where
-        the model's structure does not allow it, or where no torso has such lengths.
-    """
-
-    kinematics: Kinematics
-    geometry: pin.GeometryModel | None
-    lengths: Mapping[str, float]
-    residual: Mapping[str, float]
+#: Ratios of a person's length to the robot's that are plausible; beyond them the unit is wrong.
+RATIO: Final = (0.05, 20.0)
+#: Metres within which two places are one.
+SAME: Final = 1e-9
+#: Gauss-Newton steps that lay shoulders or hips; each takes the shortest way.
+PASSES: Final = 30
+#: Metres that a point moves at most in a step.
+MAX_STEP: Final = 0.05
 
 
-def segment_lengths(postures: Array) -> dict[str, float]:
-    """Return the median length of each of the 17 segments over postures (N, 14, 3) or (N, 19, 3), metres.
+def scaled(robot: Robot, joints: ArrayLike) -> Robot:
+    """Return the robot with the median segment lengths of postures.
 
-    Segments that are never seen whole are left out.
-    """
-    lengths = {}
-    for name, (a, b) in zip(SEGMENT_NAMES, SEGMENTS, strict=True):
-        distance = np.linalg.norm(postures[:, a] - postures[:, b], axis=-1)
-        known = distance[np.isfinite(distance)]
-        if known.size:
-            lengths[name] = float(np.median(known))
-    return lengths
-
-
-def model_lengths(kinematics: Kinematics) -> dict[str, float]:
-    """Return the distances between a model's mapped joints at its neutral configuration, metres, by segment name."""
-    place = dict(zip(kinematics.names, kinematics.positions(kinematics.neutral[None])[0], strict=True))
-    return {
-        segment_name(segment): float(np.linalg.norm(place[a] - place[b]))
-        for segment in SEGMENTS
-        for a, b in [(JOINTS[segment[0]], JOINTS[segment[1]])]
-        if a in place and b in place
-    }
-
-
-def scaled(
-    kinematics: Kinematics,
-    lengths: Mapping[str, float],
-    geometry: pin.GeometryModel | None = None,
-    *,
-    behind: bool | None = None,
-) -> ScaledRobot:
-    """Copy a model so that its mapped segments have given lengths at the neutral configuration.
-
-    What lies between the two joints of a limb's segment is scaled by one ratio: the distance then has that ratio
-    in every configuration. The spine, from pelvis to neck, is scaled likewise; what else its bodies carry is
-    scaled along the spine by that ratio and across it by the shoulders'. Shoulders and hips are then set to the
-    place that their distances give. Hands, feet and head keep their size; masses and inertias stay, centres of
-    mass move with their body.
+    At the neutral configuration the mapped joints have the person's distances. Limbs have them in every
+    configuration. Bodies grow with their segments; hands, feet and head keep their size.
 
     Parameters
     ----------
-    kinematics : Kinematics
-        From `JointMap.kinematics`: its points are named after the joints.
-    lengths : mapping
-        Metres, by segment name ``a-b``, a before b in tree order. Segments that are not named, or whose joints the
-        model has not, are not asked for.
-    geometry : pinocchio.GeometryModel, optional
-        Scaled with it.
-    behind : bool, optional
-        Whether the shoulders lie behind the line from neck to pelvis or in front, which lengths do not tell (see
-        `shoulders_are_behind`); on the model's own side unless told otherwise.
+    robot : Robot
+        With a joint map.
+    joints : array (N, 14, 3) or (14, 3)
+        Metres; NaN is unknown. Lengths that are never seen stay the robot's.
 
     Returns
     -------
-    ScaledRobot
+    Robot
+        Made of a URDF with other joint origins; its name is the robot's.
 
     Raises
     ------
     InputError
-        Where a segment is unknown, or a length is not positive or beyond 20 times the model's, up or down.
+        If the robot has no joint map, or a length is beyond 20 times the robot's, up or down.
     """
-    own = model_lengths(kinematics)
-    wanted = _check(lengths, own)
-    work = ModelStretching(kinematics, behind)
-    turned = behind is not None and work.behind() not in (behind, None)
-    if turned or any(abs(length / own[name] - 1) > SAME_LENGTH for name, length in wanted.items()):
-        last = math.inf
-        for _ in range(MAX_PASSES):
-            work.scale(wanted)
-            reached = model_lengths(work.kinematics)
-            missed = max((abs(reached[name] - length) for name, length in wanted.items()), default=0.0)
-            if missed < EXACT_METRES or abs(last - missed) < STUCK_METRES:
-                break
-            last = missed
-    new_geometry = None if geometry is None else work.geometry(geometry)
-    reached = model_lengths(work.kinematics)
-    return ScaledRobot(
-        kinematics=work.kinematics,
-        geometry=new_geometry,
-        lengths=MappingProxyType(reached),
-        residual=MappingProxyType({name: reached[name] - length for name, length in wanted.items()}),
-    )
+    given = np.asarray(joints, dtype=np.float64).reshape(-1, *np.shape(joints)[-2:])[:, : len(JOINTS)]
+    model, tree, data = robot.model, copy.deepcopy(robot.tree), robot.model.createData()
+    wanted = _wanted(robot.points(pin.neutral(model))[0], given, robot.source)
+    joints_of = {end.get("link", ""): one for one in tree.findall("joint") for end in one.findall("child")}
+    child_of = {joint.get("name", ""): link for link, joint in joints_of.items()}
+    links = {link.get("name", ""): link for link in tree.findall("link")}
+    root = next(name for name in links if name not in joints_of)
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    frames = enumerate(model.frames)
+    place = {str(frame.name): data.oMf[k] for k, frame in frames if frame.type == pin.FrameType.BODY}
+    moved, grown = set[str](), set[str]()
+    for name in ("pelvis", *JOINTS):
+        if name in robot.joint_map.points and np.isfinite(wanted[JOINT[name]]).all():
+            site = robot.joint_map.points[name][0]
+            link = child_of.get(str(model.names[site.joint]), root)
+            end = wanted[JOINT[name]] - place[link].rotation @ np.array(site.offset)
+            path = []
+            while link in joints_of and link not in moved:
+                path.append(link)
+                link = _parent(joints_of[link])
+            if path:
+                moved |= _stretch(joints_of, place, path, end, links, grown)
+    return replace(robot, urdf=ElementTree.tostring(tree, encoding="unicode"))
 
 
-def _check(lengths: Mapping[str, float], own: Mapping[str, float]) -> dict[str, float]:
-    """Refuse unknown segments and impossible lengths; keep those that the model has."""
-    wanted = {}
-    for name, given in lengths.items():
-        if name not in SEGMENT_NAMES:
-            raise InputError(f"lengths: {name!r} is not a segment; {nearest(name, SEGMENT_NAMES)}")
-        length = float(given)
-        if not (math.isfinite(length) and length > 0):
-            raise InputError(f"lengths: {name} is {length:g} m; expected positive and finite")
-        if name not in own or own[name] <= 0:
-            continue
-        if not RATIO_BOUNDS[0] < length / own[name] < RATIO_BOUNDS[1]:
-            raise InputError(
-                f"lengths: {name} is {length:g} m, the model's is {own[name]:g}; expected {RATIO_BOUNDS[0]:g} to "
-                f"{RATIO_BOUNDS[1]:g} times that; give metres"
-            )
-        wanted[name] = length
+def _stretch(
+    joints: Mapping[str, Element],
+    place: Mapping[str, pin.SE3],
+    path: Sequence[str],
+    end: Array,
+    links: Mapping[str, Element],
+    grown: set[str],
+) -> set[str]:
+    """Scale and turn the origins of a chain of links, the last one first, so that it ends at a place at neutral.
+
+    Links that carry the chain grow with it, once each. Returns the links whose origins were changed: those of the
+    chain, and those that start where one of them did, as the second of two clavicles.
+    """
+    base = _parent(joints[path[-1]])
+    old, new = place[path[0]].translation - place[base].translation, end - _origin(base, joints, place)
+    size, length = float(np.linalg.norm(old)), float(np.linalg.norm(new))
+    stretched = min(size, length) > SAME
+    ratio = length / size if stretched else 1.0
+    turn = rotation_between(old / size, new / length) if stretched else np.eye(3)
+    changed = set()
+    for link in path:
+        above, before = _parent(joints[link]), _xyz(joints[link])
+        R = place[above].rotation
+        after = ratio * R.T @ turn @ R @ before
+        if not stretched and link == path[-1]:
+            after = R.T @ new
+        twins = [other for other, joint in joints.items() if _parent(joint) == above]
+        for other in twins:
+            if other == link or np.allclose(_xyz(joints[other]), before, atol=SAME):
+                changed.add(other)
+                if joints[other].find("origin") is None:
+                    ElementTree.SubElement(joints[other], "origin")
+                _set(joints[other].findall("origin")[0], "xyz", after)
+        if above in joints and above not in grown:
+            grown.add(above)
+            _grow(links[above], ratio)
+    return changed
+
+
+def _grow(link: Element, ratio: float) -> None:
+    """Scale the bodies and the centre of mass of a link."""
+    for origin in link.findall("*/origin"):
+        _set(origin, "xyz", ratio * np.array(numbers(origin, "xyz", "0 0 0")))
+    for shape in link.findall("*/geometry/*"):
+        for attribute in SIZES[shape.tag] or ("scale",):
+            _set(shape, attribute, ratio * np.array(numbers(shape, attribute, "1 1 1")))
+
+
+def _origin(link: str, joints: Mapping[str, Element], place: Mapping[str, pin.SE3]) -> Array:
+    """Return the new origin of a link at neutral: rotations there do not change."""
+    if link not in joints:
+        return np.array(place[link].translation)
+    above = _parent(joints[link])
+    return np.array(_origin(above, joints, place) + place[above].rotation @ _xyz(joints[link]))
+
+
+def _parent(joint: Element) -> str:
+    return next(parent.get("link", "") for parent in joint.findall("parent"))
+
+
+def _xyz(joint: Element) -> Array:
+    return np.array(next((numbers(one, "xyz", "0 0 0") for one in joint.findall("origin")), [0.0] * 3))
+
+
+def _set(element: Element, attribute: str, values: Array) -> None:
+    element.set(attribute, " ".join(repr(float(value)) for value in values))
+
+
+def segment_lengths(joints: Array) -> Array:
+    """Return the median length of each segment of `posekit.skeleton.SEGMENTS` (17,), metres; NaN if never seen."""
+    gaps = np.linalg.norm(joints[:, [a for a, _ in SEGMENTS]] - joints[:, [b for _, b in SEGMENTS]], axis=2)
+    seen = np.isfinite(gaps).any(axis=0)
+    out = np.full(len(SEGMENTS), np.nan)
+    out[seen] = np.nanmedian(gaps[:, seen], axis=0)
+    return out
+
+
+def _wanted(own: Array, joints: Array, source: str) -> Array:
+    """Return places (14, 3) of the joints at neutral that have the lengths of postures, near the robot's own."""
+    lengths, kept = segment_lengths(joints), segment_lengths(own[None])
+    ratio = lengths / kept
+    lengths = np.where(np.isfinite(lengths), lengths, kept)
+    if (wrong := np.isfinite(ratio) & ((ratio < RATIO[0]) | (ratio > RATIO[1]))).any():
+        a, b = SEGMENTS[int(np.argmax(wrong))]
+        got = f"{lengths[wrong][0]:g} m from {JOINTS[a]} to {JOINTS[b]}, where the robot has {kept[wrong][0]:g} m"
+        raise refusal(source, "lengths", got, "a similar length", "give the joints in metres")
+    of = dict(zip(SEGMENTS, lengths, strict=True))
+    wanted, (neck, right, left, pelvis) = own.copy(), range(4)
+    ratio = of[neck, pelvis] / kept[SEGMENTS.index((neck, pelvis))]
+    wanted[neck] = own[pelvis] + (own[neck] - own[pelvis]) * ratio
+    wanted[[right, left]] += wanted[neck] - own[neck]
+    if _forward(joints) * _forward(own[None]) < 0:  # lengths do not tell a trunk from its mirror image
+        normal = cross(own[neck] - own[pelvis], own[left] - own[right])
+        normal /= np.linalg.norm(normal)
+        for k in (right, left):
+            wanted[k] -= 2 * ((wanted[k] - wanted[neck]) @ normal) * normal
+    _lay_pair(wanted, (right, left), (neck, pelvis), of)
+    _lay_pair(wanted, (JOINT["right_hip"], JOINT["left_hip"]), (pelvis,), of)
+    for start, end in LIMB_SEGMENTS:
+        along = own[end] - own[start]
+        wanted[end] = wanted[start] + along * of[start, end] / np.linalg.norm(along)
     return wanted
+
+
+def _lay_pair(
+    points: Array, pair: tuple[int, ...], anchors: tuple[int, ...], of: Mapping[tuple[int, int], float]
+) -> None:
+    """Move two points, in place and as little as possible, to given distances from each other and from anchors."""
+    if not np.isfinite(points[[*pair, *anchors]]).all():
+        return
+    middle, half = points[list(pair)].mean(axis=0), (points[pair[1]] - points[pair[0]]) / 2
+    half *= of[pair[0], pair[1]] / (2 * np.linalg.norm(half))
+    points[pair[0]], points[pair[1]] = middle - half, middle + half
+    links = [(a, b, of[a, b]) for a, b in of if {a, b} <= {*pair, *anchors} and {a, b} & {*pair}]
+    for _ in range(PASSES):
+        rows, misses = np.zeros((len(links), 6)), np.zeros(len(links))
+        for k, (a, b, length) in enumerate(links):
+            gap = points[a] - points[b]
+            misses[k] = length - np.linalg.norm(gap)
+            for point, sign in ((a, 1.0), (b, -1.0)):
+                if point in pair:
+                    at = 3 * pair.index(point)
+                    rows[k, at : at + 3] += sign * gap / np.linalg.norm(gap)
+        step = np.linalg.lstsq(rows, misses, rcond=1e-6)[0].reshape(2, 3)
+        points[list(pair)] += step * min(1.0, MAX_STEP / max(float(np.abs(step).max()), 1e-12))
+
+
+def _forward(joints: Array) -> float:
+    """Return how far the shoulders lie in front of the line from neck to pelvis; NaN if unseen."""
+    neck, right, left, pelvis = (joints[:, k] for k in range(4))
+    ahead = np.einsum("ni,ni->n", cross(pelvis - neck, left - right), (left + right) / 2 - neck)
+    return float(np.nanmedian(ahead)) if np.isfinite(ahead).any() else float("nan")

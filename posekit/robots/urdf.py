@@ -1,76 +1,364 @@
-"""Check a URDF text, of any robot, before a native library reads it.
+"""URDF and SRDF texts: parsed once, checked, and reduced to the elements that a model is made of.
 
-Pinocchio's reader drops a collision body or an inertia that it does not understand with a line on stderr, takes
-radii below zero, limits in the wrong order and axes of no length, and overflows its stack on a long chain.
+Pinocchio's reader drops bodies and inertias that it does not understand, accepts reversed limits and axes of zero
+length, and overflows its stack on long chains. All of these are refused here, with one line that names the place.
 """
 
 from __future__ import annotations
 
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
 
-from posekit.robots.declared import check_bodies
-from posekit.robots.urdf_joints import check_joints
-from posekit.robots.urdf_numbers import check_numbers
-from posekit.robots.urdf_tree import check_tree
-from posekit.safe_io import cut, parse_xml, read_text, refusal, shown
-from posekit.safe_io.xml_file import MAX_BYTES
+import defusedxml
+from defusedxml.ElementTree import DefusedXMLParser
 
+from posekit.errors import cut, nearest, one_line, refusal, shown
+
+Element = ElementTree.Element
+
+#: Bytes of a URDF or SRDF; published ones have at most 0.3 MB.
+MAX_BYTES: Final = 10_000_000
+MAX_ELEMENTS, MAX_NESTING = 100_000, 64
+#: Links of a robot; the largest published ones have about 150.
 MAX_LINKS: Final = 1000
-"""The largest published robots have some 150."""
-URDF_VERSIONS: Final = ("1.0", "1.1", "1.2")
+#: Links from the root to a leaf; Pinocchio's reader overflows its stack at about 5000.
+MAX_CHAIN: Final = 250
+#: Degrees of freedom; Pinocchio's data grow with their cube and have 0.3 GB at this number.
+MAX_FREEDOM: Final = 200
+#: Bodies of one kind; the largest published robots have 112.
+MAX_BODIES: Final = 500
+#: Metres or radians; products of larger numbers overflow.
+MAX_NUMBER: Final = 1e6
+#: Range of the largest limit of a revolute joint (rad) that is read as degrees if two joints have it.
+#:
+#: Published robots have limits of at most 10 rad, or of 1e16 for rotors without limits.
+DEGREES: Final = (15.0, 720.0)
+
+#: Degrees of freedom of each joint type.
+FREEDOM: Final = {"fixed": 0, "revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
+#: Shapes, and the attributes of each that must be positive.
+SIZES: Final[dict[str, tuple[str, ...]]] = {
+    **{"box": ("size",), "sphere": ("radius",), "mesh": ()},
+    **dict.fromkeys(("cylinder", "capsule"), ("radius", "length")),
+}
+MOMENTS: Final = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_SINGLE: Final = ("lower", "upper", "effort", "velocity", "multiplier", "offset", "value", "radius", "length")
+#: Numbers that an attribute holds.
+_COUNTS: Final = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, **dict.fromkeys((*_SINGLE, *MOMENTS), 1)}
+#: Elements with numbers.
+_NUMERIC: Final = ("origin", "axis", "limit", "mimic", "mass", "inertia", *SIZES)
+_BOUNDED: Final = ("xyz", "rpy", "size", "radius", "length", "scale")
+#: Children of links and joints that a model is made of; others, as of simulators, are removed.
+_KEPT: Final = {
+    "link": ("inertial", "collision", "visual", "collision_checking"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+}
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+
+#: Refuses unless a condition is true: condition, place, got, expected, remedy.
+Need = Callable[[object, str, str, str, str], None]
 
 
-def read_urdf(path: str | Path) -> str:
-    """Read a URDF or SRDF file as text: UTF-8, at most 10 MB, without a byte order mark."""
-    return read_text(
-        path, limit=MAX_BYTES, too_large="name a robot's URDF: those that are published have 0.3 MB"
-    )
+class SrdfPairs(NamedTuple):
+    """Pairs of links in an SRDF: disabled ones, enabled ones, links without default pairs, unknown links."""
+
+    disabled: frozenset[frozenset[str]]
+    enabled: frozenset[frozenset[str]]
+    alone: frozenset[str]
+    unknown: tuple[str, ...]
+
+    def checked(self, link: str, other: str) -> bool:
+        """Return whether a pair of links is left to be checked."""
+        pair = frozenset((link, other))
+        return pair in self.enabled or not (pair in self.disabled or self.alone & pair)
 
 
-def check_urdf(text: str, source: str) -> ElementTree.Element:
-    """Parse a URDF and check all that a model is made of.
+def need(source: str | Path, ok: object, place: str, got: str, expected: str, remedy: str) -> None:
+    """Raise a refusal unless a condition is true."""
+    if not ok:
+        raise refusal(source, place, got, expected, remedy)
 
-    Links and joints are one tree of at most 1000 links, 250 levels and 200 degrees of freedom, with names that
-    are there once; joints are of known types, with limits in order and axes that have a direction; numbers are
-    finite, sizes positive, masses not negative; collision bodies are spelled so that Pinocchio reads them.
+
+def read_text(path: str | Path) -> str:
+    """Read a URDF or SRDF file: a regular file in UTF-8 of at most 10 MB.
+
+    Raises
+    ------
+    InputError
+        If it is missing, not a regular file, empty, larger, or not text.
+    """
+    path = Path(path)
+    try:
+        got = "no regular file" if path.exists() else "no such file"
+        need(path, path.is_file(), "", got, "a URDF file", "check the name")
+        size = path.stat().st_size
+        need(path, 0 < size <= MAX_BYTES, "", f"{size:,} bytes", f"1 to {MAX_BYTES:,} bytes", "name a URDF")
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise refusal(path, f"byte {error.start}", "no UTF-8", "text in UTF-8", "save it as UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise refusal(path, "", cut(str(error)), "a readable file", "check its permissions") from None
+
+
+def parse_xml(text: str, source: str | Path) -> Element:
+    """Parse XML without DOCTYPE and entities, of bounded depth and size.
+
+    Raises
+    ------
+    InputError
+        If it is malformed (line and column are given), declares a DOCTYPE or an entity, or exceeds a bound.
+    """
+    parser = DefusedXMLParser(target=_BoundedBuilder(source), forbid_dtd=True)
+    try:
+        parser.feed(text)
+        root: Element = parser.close()
+    except defusedxml.DefusedXmlException:
+        raise refusal(source, "", "a DOCTYPE or entities", "XML without them", "remove them") from None
+    except (ElementTree.ParseError, ValueError) as error:
+        got = f"no well-formed XML ({cut(one_line(str(error)))})"
+        raise refusal(source, "", got, "XML in UTF-8", "correct the file there") from None
+    return root
+
+
+class _BoundedBuilder(ElementTree.TreeBuilder):
+    """Build the tree; stop if it is too deep or too large."""
+
+    def __init__(self, source: str | Path) -> None:
+        super().__init__()
+        self._need, self._depth, self._count = partial(need, source), 0, 0
+
+    def start(self, tag: str, attrs: Mapping[Any, Any]) -> Element:
+        self._depth, self._count = self._depth + 1, self._count + 1
+        ok = self._depth <= MAX_NESTING and self._count <= MAX_ELEMENTS
+        got = f"element {self._count:,} at depth {self._depth}"
+        self._need(ok, "", got, f"at most {MAX_ELEMENTS:,} elements, {MAX_NESTING} deep", "simplify the file")
+        return super().start(tag, dict(attrs))
+
+    def end(self, tag: str) -> Element:
+        self._depth -= 1
+        return super().end(tag)
+
+
+def check_urdf(text: str, source: str) -> Element:
+    """Parse a URDF and check everything that a model is made of.
 
     Parameters
     ----------
     text : str
         The URDF.
     source : str
-        What to call it in errors.
+        Its name in errors.
 
     Returns
     -------
     Element
-        The root; its numbers are separated by single blanks.
+        ``<robot>`` with its checked links and joints alone. Pinocchio is given this tree, not the text.
 
     Raises
     ------
     InputError
-        With the place that is wrong.
+        If links and joints are not one tree of at most 1000 links; a name is repeated; a number is missing, not
+        finite, or of impossible size; limits are reversed, absent or in degrees; a body has no size.
     """
-    return check_robot(parse_xml(text, source), source)
-
-
-def check_robot(robot: ElementTree.Element, source: str) -> ElementTree.Element:
-    """Check a URDF that was parsed: see `check_urdf`."""
-    if robot.tag != "robot":
-        got = f"the root element is <{cut(robot.tag)}>"
-        raise refusal(source, "", got, "<robot>", "name a URDF")
-    links = len(robot.findall("link"))
-    if not 0 < links <= MAX_LINKS:
-        raise refusal(source, "", f"{links:,} links", f"at most {MAX_LINKS}, and one at least", "simplify it")
-    if not robot.get("name"):
-        raise refusal(source, "<robot>", "no name", 'a name, as <robot name="mine">', "add it")
-    version = robot.get("version", "1.0")
-    if version not in URDF_VERSIONS:
-        raise refusal(source, "<robot version=…>", shown(version), " or ".join(URDF_VERSIONS), "correct it")
-    check_tree(robot, source)
-    check_numbers(robot, source)
-    check_joints(robot, source)
-    check_bodies(robot, source)
+    robot, check = parse_xml(text, source), partial(need, source)
+    check(robot.tag == "robot", "", f"the root element <{cut(robot.tag)}>", "<robot>", "name a URDF")
+    for part in list(robot):
+        if part.tag not in (*_KEPT, "material"):
+            robot.remove(part)
+        for child in list(part):
+            if part.tag in _KEPT and child.tag not in _KEPT[part.tag]:
+                part.remove(child)
+    links = robot.findall("link")
+    check(0 < len(links) <= MAX_LINKS, "", f"{len(links):,} links", f"1 to {MAX_LINKS}", "simplify the robot")
+    _check_tree(robot, check)
+    for part in chain(links, robot.findall("joint")):
+        _check_numbers(part, f"{part.tag} {part.get('name')!r}", check)
+    _check_joints({joint.get("name", ""): joint for joint in robot.findall("joint")}, check)
+    for kind in ("collision", "visual"):
+        count = len(robot.findall(f"link/{kind}"))
+        check(count <= MAX_BODIES, "", f"{count:,} {kind} bodies", f"at most {MAX_BODIES}", "simplify it")
+    materials = {material.get("name") for material in robot.findall("material")}
+    for link in links:
+        _check_link(link, materials, f"link {link.get('name')!r}", check)
+    robot.set("name", robot.get("name") or "robot")
+    robot.set("version", "1.1")  # readers of URDF 1.0 drop capsules
     return robot
+
+
+def check_srdf(text: str, source: str, links: Collection[str], *, strict: bool = True) -> SrdfPairs:
+    """Parse an SRDF and check that it names links of the robot.
+
+    Parameters
+    ----------
+    text, source : str
+        The SRDF and its name in errors.
+    links : collection of str
+        The robot's links.
+    strict : bool
+        Refuse unknown links. Published robots share one SRDF among variants; its foreign pairs are passed over.
+
+    Raises
+    ------
+    InputError
+        If the text is no SRDF or names an unknown link.
+    """
+    robot, known, check = parse_xml(text, source), set(links), partial(need, source)
+    check(robot.tag == "robot", "", f"the root element <{cut(robot.tag)}>", "<robot>", "name an SRDF")
+    found: dict[str, frozenset[frozenset[str]]] = {}
+    unknown: dict[str, None] = {}
+    for tag in ("disable_collisions", "enable_collisions", "disable_default_collisions"):
+        ends = ("link",) if tag == "disable_default_collisions" else ("link1", "link2")
+        named = [frozenset(element.get(end, "") for end in ends) for element in robot.findall(tag)]
+        for name in sorted(frozenset[str]().union(*named) - known):
+            unknown[name] = None
+            remedy = nearest(name, sorted(known)) if len(known) < 50 else "name this robot's SRDF"
+            check(not strict, f"<{tag}>", f"the link {shown(name)}", "a link of the robot", remedy)
+        found[tag] = frozenset(names for names in named if names <= known)
+    disabled, enabled, alone = found.values()
+    return SrdfPairs(disabled, enabled, frozenset(chain.from_iterable(alone)), tuple(unknown))
+
+
+def numbers(element: Element, attribute: str, default: str = "") -> list[float]:
+    """Return the numbers of a checked attribute."""
+    return [float(word) for word in element.get(attribute, default).split()]
+
+
+def shapes(robot: Element, kind: str) -> Iterator[tuple[str, Element]]:
+    """List the bodies of a kind: the link's name and the element of the shape."""
+    for link in robot.findall("link"):
+        yield from ((link.get("name", ""), shape) for shape in link.findall(f"{kind}/geometry/*"))
+
+
+def _check_tree(robot: Element, check: Need) -> None:
+    """Refuse repeated and unprintable names, and links and joints that are not one tree."""
+    for kind in _KEPT:
+        for name, times in Counter(part.get("name", "") for part in robot.findall(kind)).items():
+            got = f"{kind} {shown(name)} {times} times"
+            check(times == 1, "", got, "each name once", "rename or remove the others")
+            good = name and name.isprintable() and (kind, name) != ("joint", "universe")
+            check(good, "", f"a {kind} named {shown(name)}", "a printable name", "rename it")
+    known = {link.get("name", "") for link in robot.findall("link")}
+    parents: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        place = f"joint {joint.get('name')!r}"
+        ends = [element.get("link", "") for tag in ("parent", "child") for element in joint.findall(tag)]
+        ok = len(ends) == 2 and known.issuperset(ends)
+        check(ok, place, f"the links {shown(ends)}", "a parent and a child of this file", "correct the names")
+        got = f"link {ends[1]!r}, which already hangs on another joint"
+        check(ends[1] not in parents, place, got, "a tree", "remove one of the joints")
+        parents[ends[1]] = ends[0]
+    roots = sorted(known - parents.keys())
+    got = f"{len(roots)} links that hang on no joint ({', '.join(roots[:5]) or 'a cycle'})"
+    check(len(roots) == 1, "", got, "one root link", "join the parts to one tree")
+    for link in parents:
+        steps, above = 1, link
+        while above in parents and steps <= MAX_CHAIN:
+            steps, above = steps + 1, parents[above]
+        got = f"link {link!r} at the end of a cycle or of more than {MAX_CHAIN} links"
+        check(steps <= MAX_CHAIN, "", got, "a tree", "remove the cycle, or merge fixed links")
+
+
+def _check_numbers(part: Element, place: str, check: Need) -> None:
+    for element in part.iter():
+        check("quat_xyzw" not in element.attrib, place, "a rotation as quat_xyzw", "rpy", "write it as rpy")
+        for attribute, text in element.items():
+            if attribute in _COUNTS and element.tag in _NUMERIC:
+                count, words = _COUNTS[attribute], text.split()
+                field = f"{place}: <{element.tag} {attribute}=…>"
+                good = len(words) == count and all(map(_NUMBER.fullmatch, words))
+                good = good and all(math.isfinite(float(word)) for word in words)
+                expected = "a finite number" if count == 1 else f"{count} finite numbers"
+                remedy = "expand the xacro first" if "${" in text else "correct it"
+                check(good, field, shown(text), expected, remedy)
+                small = attribute not in _BOUNDED or max(abs(float(word)) for word in words) <= MAX_NUMBER
+                check(small, field, shown(text), f"at most {MAX_NUMBER:,.0f}", "write metres and radians")
+                element.set(attribute, " ".join(words))
+
+
+def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
+    large: dict[str, float] = {}
+    for name, joint in joints.items():
+        place, kind = f"joint {name!r}", joint.get("type", "")
+        check(kind in FREEDOM, place, f"the type {shown(kind)}", f"one of {', '.join(FREEDOM)}", "correct it")
+        for tag in _KEPT["joint"]:
+            check(len(joint.findall(tag)) < 2, place, f"two <{tag}>", "one", "remove one: readers differ")
+        largest = _check_limit(joint, kind, place, check)
+        if kind == "revolute" and DEGREES[0] < largest < DEGREES[1]:
+            large[name] = largest
+        for axis in joint.findall("axis"):
+            length = math.hypot(*numbers(axis, "xyz", "1 0 0"))
+            good = (length > 1e-6 and (kind != "prismatic" or abs(length - 1) < 1e-3)) or FREEDOM[kind] in (
+                0,
+                6,
+            )
+            check(good, place, f"an axis of length {length:g}", "length 1", "correct it")
+        target, followed = name, set[str]()
+        while (mimic := joints[target].find("mimic")) is not None:
+            followed.add(target)
+            target = mimic.get("joint", "")
+            good = target in joints and FREEDOM.get(joints[target].get("type", "")) == 1
+            check(good, place, f"a mimic of {shown(target)}", "a moving joint", nearest(target, joints))
+            check(target not in followed, place, "a mimic of itself", "a mimic of another joint", "remove it")
+    if len(large) > 1:
+        name, value = max(large.items(), key=lambda item: item[1])
+        got = f"a limit of {value:g} rad, and {len(large) - 1} more beyond {DEGREES[0]:g} rad"
+        remedy = f"if they are degrees, write radians ({value:g} degrees are {math.radians(value):.4g} rad)"
+        check(False, f"joint {name!r}", got, "limits in radians", remedy)
+    freedom = sum(FREEDOM[joint.get("type", "")] for joint in joints.values())
+    got = f"{freedom} degrees of freedom"
+    check(freedom <= MAX_FREEDOM, "", got, f"at most {MAX_FREEDOM}", "fix some joints")
+
+
+def _check_limit(joint: Element, kind: str, place: str, check: Need) -> float:
+    """Return the largest limit in size; 0 if there is none."""
+    limit = joint.find("limit")
+    if limit is None:
+        remedy = 'add <limit lower="…" upper="…" effort="…" velocity="…"/>, or make it continuous'
+        check(kind not in ("revolute", "prismatic"), place, "no <limit>", "limits in rad or m", remedy)
+        return 0.0
+    missing = [key for key in ("effort", "velocity") if key not in limit.attrib]
+    check(not missing, f"{place}: <limit>", f"no {' and no '.join(missing)}", "both numbers", "add them")
+    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    got = f"lower limit {lower:g} above upper limit {upper:g}"
+    check(lower <= upper, place, got, "lower <= upper", "exchange them")
+    return max(abs(lower), abs(upper))
+
+
+def _check_link(link: Element, materials: set[str | None], place: str, check: Need) -> None:
+    check(len(link.findall("inertial")) < 2, place, "two <inertial>", "one", "remove the other")
+    for inertial in link.findall("inertial"):
+        parts = [*inertial.findall("mass"), *inertial.findall("inertia")]
+        held = {name for element in parts for name in element.keys()}
+        expected = f"<mass value=…> and <inertia> with {', '.join(MOMENTS)}"
+        check(held.issuperset(("value", *MOMENTS)), place, "parts of <inertial>", expected, "complete it")
+        mass = next(float(element.get("value", "0")) for element in inertial.findall("mass"))
+        check(mass >= 0, place, f"a mass of {mass:g} kg", "at least 0", "correct it")
+    capsules = {capsule.get("name") for capsule in link.findall("collision_checking/capsule")}
+    for body in (*link.findall("collision"), *link.findall("visual")):
+        where, found = f"{place}: <{body.tag}>", body.findall("geometry/*")
+        got = f"{', '.join(cut(one.tag) for one in found[:4]) or 'no shape'}"
+        ok = len(found) == 1 == len(body.findall("geometry")) and found[0].tag in SIZES
+        check(ok, where, got, f"one of {', '.join(SIZES)}", "give each shape a body of its own")
+        check(len(body.findall("origin")) < 2, where, "two <origin>", "one", "remove the other")
+        shape = found[0]
+        for attribute in SIZES[shape.tag]:
+            got = f"a {shape.tag} with {attribute} {shown(shape.get(attribute))}"
+            least = min(numbers(shape, attribute), default=0)
+            check(least > 0, where, got, f"a positive {attribute}", "correct it")
+        if shape.tag == "mesh":
+            good = shape.get("filename") and 0.0 not in numbers(shape, "scale", "1 1 1")
+            check(good, where, "a mesh without file or of scale 0", '<mesh filename="…"/>', "correct it")
+        if body.tag == "collision" and shape.tag == "cylinder" and body.get("name") in capsules:
+            shape.tag = "capsule"  # <collision_checking> is the spelling of URDF 1.0; radius and length stay
+        for material in body.findall("material"):
+            if not material.get("name") or not (len(material) or material.get("name") in materials):
+                body.remove(material)  # the reader would refuse the whole robot
+    for element in link.findall("collision_checking"):
+        link.remove(element)

@@ -1,0 +1,176 @@
+"""Collision and visual bodies of a robot, and their meshes, which come from its own directories alone."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final, Literal
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from posekit.errors import cut, refusal, shown
+from posekit.robots.urdf import Element, need, parse_xml, shapes
+
+Kind = Literal["collision", "visual"]
+
+#: Bytes of one mesh; those of published robots have at most 29 MB.
+MAX_MESH_BYTES: Final = 64_000_000
+#: Bytes of all meshes of a robot: about two million triangles of STL.
+MAX_MESHES_BYTES: Final = 100_000_000
+#: Triangles of one mesh; published robots have at most 350,000.
+MAX_TRIANGLES: Final = 500_000
+#: Largest coordinate of a mesh; coal accepts NaN silently.
+MAX_COORDINATE: Final = 1e6
+#: Bytes of a line of an OBJ file; the time to triangulate a face grows with the square of its corners.
+MAX_LINE: Final = 65_536
+STL_HEADER, STL_TRIANGLE = 84, 50
+
+
+def build_bodies(
+    model: pin.Model, robot: Element, package_dirs: Sequence[Path], source: str, kind: Kind
+) -> pin.GeometryModel:
+    """Load the bodies of a checked URDF.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+        Made of the same URDF.
+    robot : Element
+        The checked URDF.
+    package_dirs : sequence of Path
+        The only directories from which meshes are read.
+    source : str
+        Name of the URDF in errors.
+    kind : {"collision", "visual"}
+        The bodies to load.
+
+    Raises
+    ------
+    InputError
+        If a mesh is outside of `package_dirs`, missing, too large or damaged, or a body was not loaded.
+    """
+    resolved = copy.deepcopy(robot)
+    sizes: dict[Path, int] = {}
+    for link, shape in shapes(resolved, kind):
+        if shape.tag == "mesh":
+            path = resolve_mesh(shape.get("filename", ""), package_dirs, source, f"link {link!r}")
+            if path not in sizes:
+                sizes[path] = _check_mesh_file(path)
+            shape.set("filename", str(path))
+    total, most = sum(sizes.values()) / 1e6, MAX_MESHES_BYTES / 1e6
+    need(source, total <= most, "", f"meshes of {total:,.0f} MB", f"at most {most:,.0f} MB", "simplify them")
+    text = ElementTree.tostring(resolved, encoding="unicode")
+    wanted = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, text, wanted)
+    except (ValueError, RuntimeError) as error:
+        _, _, message = str(error).rpartition("message: ")
+        lines = [line.rpartition("/")[2] for line in message.splitlines() if not line.startswith("Hint")]
+        got = f"a {kind} mesh that coal cannot load ({cut(', '.join(lines[:2]))})"
+        raise refusal(source, "", got, "a mesh of triangles", "export the mesh again") from None
+    _check_loaded(model, geometry, resolved, source, kind)
+    return geometry
+
+
+def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: str) -> Path:
+    """Find a mesh inside the package directories.
+
+    Parameters
+    ----------
+    name : str
+        As in the URDF: ``package://PACKAGE/…``, ``file:///…``, absolute or relative. A package is a folder of that
+        name in a package directory, or such a directory itself.
+    package_dirs : sequence of Path
+        The only directories from which meshes are read.
+    source, place : str
+        The file and the link, for errors.
+
+    Returns
+    -------
+    Path
+        The file, with symbolic links followed.
+
+    Raises
+    ------
+    InputError
+        If no such file lies inside of them once links and ``..`` are followed.
+    """
+    scheme, mark, rest = name.partition("://")
+    check, field = partial(need, source), f"{place}: mesh {shown(name)}"
+    known = scheme in ("package", "file") or not mark
+    check(known, field, f"{cut(scheme)}://", "package://, file:// or a path", "copy the mesh beside the URDF")
+    rest = name if not mark else rest.lstrip("/") if scheme == "package" else "/" + rest.lstrip("/")
+    package, _, inner = rest.partition("/")
+    homes = [folder for folder in package_dirs if mark and inner and folder.name == package]
+    why = "no such file there"
+    try:
+        for path in (*(folder / inner for folder in homes), *(folder / rest for folder in package_dirs)):
+            if path.is_file():
+                found = path.resolve()
+                if any(found.is_relative_to(folder.resolve()) for folder in package_dirs):
+                    return found
+                why = "a file outside of them"
+    except (OSError, ValueError) as error:
+        why = cut(str(error))
+    remedy = 'name the directory of the package (package_dirs), or load with bodies="capsules" or "none"'
+    raise refusal(source, field, why, "a file inside the robot's package directories", remedy)
+
+
+def _check_mesh_file(path: Path) -> int:
+    """Return the size of a mesh file; refuse files that would exhaust a native reader or lead it elsewhere."""
+    check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
+    ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESH_BYTES
+    expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESH_BYTES / 1e6:.0f} MB"
+    check(ok, "", f"{size:,} bytes of {suffix or 'no kind'}", expected, "convert or simplify it")
+    data = path.read_bytes()
+    if suffix == ".stl":
+        declared = int.from_bytes(data[80:STL_HEADER], "little")
+        ok = STL_HEADER + declared * STL_TRIANGLE <= size and declared > 0
+        got = f"{declared:,} triangles in {size:,} bytes"
+        check(ok or data.lstrip().startswith(b"solid"), "", got, "an STL file", "export the mesh again")
+    elif suffix == ".dae":
+        tags = [part.tag for part in parse_xml(data.decode("utf-8", "replace"), path).iter()]
+        nested = any(tag.endswith("instance_node") for tag in tags)
+        check(not nested, "", "nodes that place other nodes", "a mesh", "export it with its nodes resolved")
+    else:
+        longest = max(map(len, re.split(rb"[\r\n]+", data)))
+        check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
+    # The native reader goes by the content: any file may name a material library, which it would open.
+    for line in re.findall(rb"^[ \t]*mtllib([^\r\n]*)", data, re.MULTILINE):
+        library = line.strip().decode("utf-8", "replace").removeprefix("./")
+        plain = library.isprintable() and not set("/\\") & set(library) and library not in ("", "..")
+        beside = path.parent / library if plain else path.parent
+        ok = plain and not beside.is_symlink() and (beside.is_file() or not beside.exists())
+        check(ok, "", f"mtllib {shown(library)}", "the name of a file beside the mesh", "remove the line")
+    return size
+
+
+def _check_loaded(model: pin.Model, bodies: pin.GeometryModel, tree: Element, name: str, kind: Kind) -> None:
+    """Compare the loaded bodies with the declared ones, and refuse meshes that cannot be used."""
+    check, loaded = partial(need, name), Counter[tuple[str, str]]()
+    for body in bodies.geometryObjects:
+        mesh, link, shape = body.geometry, link_of(model, body), type(body.geometry).__name__
+        loaded[link, "mesh" if shape.startswith(("BVHModel", "Convex")) else shape.lower()] += 1
+        if isinstance(mesh, coal.BVHModelBase):
+            got = f"a mesh of {mesh.num_tris:,} triangles"
+            few, most = mesh.num_tris <= MAX_TRIANGLES, f"at most {MAX_TRIANGLES:,}"
+            check(few, f"link {link!r}", got, most, "simplify it")
+            ok = (np.abs(mesh.vertices()) <= MAX_COORDINATE).all()
+            expected = f"coordinates within {MAX_COORDINATE:,.0f}"
+            check(ok, f"link {link!r}", "a mesh with other vertices", expected, "export it again")
+    declared = Counter((link, shape.tag) for link, shape in shapes(tree, kind))
+    for link, shape in (declared - loaded) | (loaded - declared):
+        got = f"{loaded[link, shape]} of {declared[link, shape]} {shape} bodies loaded"
+        check(False, f"link {link!r}", got, "every declared body", "check its spelling and its mesh")
+
+
+def link_of(model: pin.Model, body: pin.GeometryObject) -> str:
+    """Return the link that carries a body."""
+    return str(model.frames[body.parentFrame].name)

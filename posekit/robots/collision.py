@@ -1,0 +1,236 @@
+"""Self-collision for batches of configurations: bounding capsules, then convex hulls, then the bodies themselves."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from posekit.geometry import Array, Flags, Ints, cross, dot
+from posekit.robots.kinematics import Kinematics
+
+#: Configurations worked on at once: their squared distances stay in the processor's cache.
+BLOCK: Final = 128
+#: Metres that hulls and capsules are taken larger, above the tolerance of coal's GJK.
+ROOM: Final = 1e-6
+#: Metres within which the depth of a penetration is computed.
+DEPTH: Final = 1e-5
+#: Least extent of a mesh over its size below which it is flat.
+FLAT: Final = 1e-6
+#: Squared sine of the angle of two segments below which they are parallel.
+PARALLEL: Final = 1e-30
+
+
+class Contacts(NamedTuple):
+    """Collisions of N configurations.
+
+    Attributes
+    ----------
+    hit : bool array (N,)
+        Whether any pair touches, as `pinocchio.computeCollisions` has it.
+    frame, pair : int arrays (K,)
+        Row of the configuration and index of the pair, for each pair nearer than the margin; sorted.
+    distance : array (K,)
+        Signed distance in metres, negative for penetration. Two meshes have the distance or the depth of their
+        convex hulls: they are at least so far apart, and at most so deep in each other. If the hulls overlap and
+        the meshes do not touch, it is the distance of the meshes.
+    """
+
+    hit: Flags
+    frame: Ints
+    pair: Ints
+    distance: Array
+
+
+class SelfCollision:
+    """Collision queries of one model.
+
+    Pairs that keep apart are recognised in NumPy by the balls and the boxes around the bodies (Gottschalk, Lin and
+    Manocha 1996, §5); two capsules or spheres are measured there exactly. The other pairs are tested by their convex
+    hulls, and by their meshes only if these touch.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+    geometry : pinocchio.GeometryModel
+        Bodies and the pairs to check.
+    """
+
+    def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
+        self.model, self._kinematics = model, Kinematics(model)
+        self._meshes, self._hulls = geometry, geometry.copy()
+        bodies = list(self._hulls.geometryObjects)
+        hulls: dict[int, coal.CollisionGeometry] = {}
+        for body in bodies:
+            if isinstance(body.geometry, coal.BVHModelBase):
+                key = body.geometry.id()
+                hulls[key] = hulls[key] if key in hulls else _hull(body.geometry)
+                body.geometry = hulls[key]
+        self._joint = np.array([body.parentJoint for body in bodies], dtype=np.intp)
+        shapes, places = [body.geometry for body in bodies], [body.placement for body in bodies]
+        self._exact = np.array(
+            [isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_
+        )
+        self._half = self._exact * np.array([getattr(one, "halfLength", 0.0) for one in shapes])
+        boxes = [(M, *_box(one)) for M, one in zip(places, shapes, strict=True)]
+        self._axes = np.array([M.rotation @ R for M, R, *_ in boxes]).reshape(-1, 3, 3)
+        self._centre = np.array([M.act(centre) for M, _, centre, *_ in boxes]).reshape(-1, 3)
+        self._size = np.array([box[3] for box in boxes]).reshape(-1, 3)
+        radius = np.array([box[4] for box in boxes])
+        self._pair = np.full((len(bodies), len(bodies)), -1)
+        for k, pair in enumerate(geometry.collisionPairs):
+            self._pair[pair.first, pair.second] = k
+        self._reach = radius[:, None] + radius
+        self._data, self._mesh_data = model.createData(), geometry.createData()
+        self._hull_data = self._hulls.createData()
+        for request in self._hull_data.collisionRequests:
+            request.security_margin = ROOM
+            request.enable_contact = True  # computes the depth
+            request.epa_tolerance = DEPTH
+
+    def contacts(self, q: Array, margin: float = 0.0) -> Contacts:
+        """Return the pairs nearer than a margin.
+
+        Parameters
+        ----------
+        q : array (N, nq)
+            Configurations, checked.
+        margin : float
+            Metres, at least 0; only touching pairs by default.
+        """
+        rows, pairs, distances = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+        for start in range(0, len(q), BLOCK):
+            row, pair, distance = self._near(q[start : start + BLOCK], margin)
+            self._measure(q[start : start + BLOCK], row, pair, distance, margin)
+            kept = distance <= margin
+            rows.append(row[kept] + start)
+            pairs.append(pair[kept])
+            distances.append(distance[kept])
+        frame, found = np.concatenate(rows), np.concatenate(distances)
+        hit = np.zeros(len(q), dtype=np.bool_)
+        hit[frame[found <= 0]] = True
+        return Contacts(hit, frame, np.concatenate(pairs), found)
+
+    def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
+        """Return the pairs that can be nearer than the margin: rows, pairs, and distances of capsules, else NaN."""
+        rotation, origin = self._kinematics.place(q)
+        axes = np.einsum("bijn,bjk->ikbn", rotation[self._joint], self._axes)
+        # Positions near the robot, so that their squares keep their digits.
+        turned = np.einsum("bijn,bj->bin", rotation[self._joint], self._centre)
+        centre = (origin - origin[-1:])[self._joint] + turned
+        points = np.ascontiguousarray(centre.transpose(2, 0, 1))
+        squared, one = dot(points, points)[..., None], np.ones((*points.shape[:2], 1))
+        left = np.concatenate([points, squared, one], axis=2)
+        right = np.concatenate([-2 * points, one, squared], axis=2)
+        apart = left @ right.transpose(0, 2, 1)  # squared distances: |a|^2 - 2 a b + |b|^2
+        reach = np.where(self._pair >= 0, (self._reach + margin + ROOM) ** 2, -np.inf)
+        row, a, b = np.unravel_index(np.flatnonzero(apart <= reach), apart.shape)
+        exact = self._exact[a] & self._exact[b]
+        near, distance = np.ones(len(row), dtype=np.bool_), np.full(len(row), np.nan)
+        i, j, n = a[exact], b[exact], row[exact]
+        half_a, half_b = ((axes[:, 2, k, n] * self._half[k]).T for k in (i, j))
+        between = segment_distance(points[n, j] - points[n, i], half_a, half_b)
+        distance[exact] = between - self._size[i, 0] - self._size[j, 0]
+        near[exact] = distance[exact] <= margin
+        i, j, n = a[~exact], b[~exact], row[~exact]
+        A, B, t = axes[:, :, i, n], axes[:, :, j, n], (points[n, j] - points[n, i]).T
+        A_B = np.abs(A[0][:, None] * B[0] + A[1][:, None] * B[1] + A[2][:, None] * B[2])
+        size_A, size_B = self._size.T[:, i], self._size.T[:, j]
+        gap_A = np.abs(np.einsum("kin,kn->in", A, t)) - np.einsum("ijn,jn->in", A_B, size_B) - size_A
+        gap_B = np.abs(np.einsum("kjn,kn->jn", B, t)) - np.einsum("ijn,in->jn", A_B, size_A) - size_B
+        near[~exact] = np.maximum(gap_A, gap_B).max(axis=0) <= margin + ROOM
+        return row[near], self._pair[a, b][near], distance[near]
+
+    def _measure(self, q: Array, row: Ints, pair: Ints, distance: Array, margin: float) -> None:
+        """Fill in the distances that are NaN and within the margin, with coal."""
+        model, data, meshes, mesh_data = self.model, self._data, self._meshes, self._mesh_data
+        hulls, hull_data = self._hulls, self._hull_data
+        rows, pairs, placed, placed_meshes = row.tolist(), pair.tolist(), -1, -1
+        for k in np.flatnonzero(np.isnan(distance)).tolist():
+            n, p = rows[k], pairs[k]
+            if n != placed:
+                pin.forwardKinematics(model, data, q[n])
+                pin.updateGeometryPlacements(model, data, hulls, hull_data)
+                placed = n
+            if not pin.computeCollision(hulls, hull_data, p):
+                if margin > 0:
+                    distance[k] = max(pin.computeDistance(hulls, hull_data, p).min_distance, ROOM)
+                continue
+            if n != placed_meshes:
+                pin.updateGeometryPlacements(model, data, meshes, mesh_data)
+                placed_meshes = n
+            if pin.computeCollision(meshes, mesh_data, p):
+                distance[k] = min(hull_data.collisionResults[p].distance_lower_bound + ROOM, -ROOM)
+            elif margin > 0:
+                distance[k] = max(pin.computeDistance(meshes, mesh_data, p).min_distance, ROOM)
+
+
+def _hull(mesh: coal.BVHModelBase) -> coal.CollisionGeometry:
+    """Return the convex hull of a mesh; the mesh itself if it is flat, for which coal has no hull."""
+    vertices = np.array(mesh.vertices())
+    if np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)[-1] < FLAT * np.abs(vertices).max():
+        return mesh
+    try:
+        mesh.buildConvexHull(True, "Qt")
+    except RuntimeError:  # of qhull
+        return mesh
+    return mesh.convex or mesh
+
+
+def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, Array, float]:
+    """Return a box around a shape: axes (3, 3), centre, half sides; and the radius of a ball about its centre.
+
+    A mesh has the smaller one of the boxes along its own axes and along the principal axes of its vertices.
+    """
+    shape.computeLocalAABB()
+    corners = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
+    points, found = np.stack(np.meshgrid(*corners.T), axis=-1).reshape(-1, 3), [np.eye(3)]
+    if isinstance(shape, coal.ConvexBase | coal.BVHModelBase):
+        hull = isinstance(shape, coal.ConvexBase)
+        points = np.array([shape.point(k) for k in range(shape.num_points)] if hull else shape.vertices())
+        found.append(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T)
+    axes = min(found, key=lambda R: float(np.prod(np.ptp(points @ R, axis=0))))
+    low, high = (points @ axes).min(axis=0), (points @ axes).max(axis=0)
+    centre = axes @ (low + high) / 2
+    ball = float(np.linalg.norm(points - centre, axis=1).max())
+    if isinstance(shape, coal.Sphere | coal.Capsule):
+        ball = float(shape.radius + getattr(shape, "halfLength", 0.0))
+    return axes, centre, (high - low) / 2, ball
+
+
+def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
+    r"""Return the distance between two segments, in closed form.
+
+    Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained minimum is
+    clamped in s, t follows and is clamped, and s follows that (Ericson 2005, *Real-Time Collision Detection*, §5.1.9).
+    If the segments are nearly parallel that minimum is ill-conditioned; the four ends, each against the other segment,
+    are tried as well.
+
+    Parameters
+    ----------
+    gap : array (N, 3)
+        From a's middle to b's, metres.
+    half_a, half_b : array (N, 3)
+        From each middle to one end, metres; zero for a point.
+
+    Returns
+    -------
+    array (N,)
+    """
+    aa, bb, ab = dot(half_a, half_a), dot(half_b, half_b), dot(half_a, half_b)
+    ag, bg, normal = dot(half_a, gap), dot(half_b, gap), cross(half_a, half_b)
+    determinant = dot(normal, normal)
+    parallel = determinant <= PARALLEL * aa * bb
+    aa, bb = np.where(aa > 0, aa, 1.0), np.where(bb > 0, bb, 1.0)
+    # Lagrange's identity: the products of cross products keep the digits that aa bb - ab^2 cancels.
+    s = np.where(parallel, 0.0, dot(normal, cross(gap, half_b)) / np.where(parallel, 1.0, determinant))
+    inner, one = np.clip((np.clip(s, -1.0, 1.0) * ab - bg) / bb, -1.0, 1.0), np.ones(len(gap))
+    least = np.full(len(gap), np.inf)
+    tried = [(np.clip((ag + t * ab) / aa, -1.0, 1.0), t) for t in (inner, -one, one)]
+    tried += [(s, np.clip((s * ab - bg) / bb, -1.0, 1.0)) for s in (-one, one)]
+    for s, t in tried:
+        apart = gap + t[:, None] * half_b - s[:, None] * half_a
+        least = np.minimum(least, dot(apart, apart))
+    return np.asarray(np.sqrt(least))

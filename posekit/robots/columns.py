@@ -1,0 +1,114 @@
+"""Values of joints in q: mimicking joints, and tables whose columns are named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from posekit.errors import nearest, shown
+from posekit.geometry import Array
+from posekit.robots.urdf import FREEDOM, Element, need, numbers
+
+if TYPE_CHECKING:
+    from posekit.robots.robot import Robot
+
+
+class Mimic(NamedTuple):
+    """A joint that follows another one: value = multiplier * value of target + offset (rad or m)."""
+
+    joint: str
+    target: str
+    multiplier: float
+    offset: float
+
+    def value(self, target: Array) -> Array:
+        """Return the joint's values for those of its target."""
+        return self.multiplier * target + self.offset
+
+
+def mimics_of(robot: Element) -> tuple[Mimic, ...]:
+    """List the mimics of a checked URDF, each after the one that its target is."""
+    found: dict[str, Mimic] = {}
+    for joint in robot.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            if FREEDOM[joint.get("type", "")] == 1:
+                factor, offset = (numbers(mimic, *one)[0] for one in (("multiplier", "1"), ("offset", "0")))
+                name = joint.get("name", "")
+                found[name] = Mimic(name, mimic.get("joint", ""), factor, offset)
+
+    def depth(mimic: Mimic) -> int:
+        return 1 + depth(found[mimic.target]) if mimic.target in found else 0
+
+    return tuple(sorted(found.values(), key=depth))
+
+
+def joint_values(model: pin.Model, q: Array, joint: str) -> Array:
+    """Return the values (N,) of a joint of one degree of freedom, rad or m; a continuous one within -pi and pi."""
+    index = model.getJointId(joint)
+    at = model.idx_qs[index]
+    return np.arctan2(q[:, at + 1], q[:, at]) if model.nqs[index] == 2 else q[:, at]
+
+
+def set_joint(model: pin.Model, q: Array, joint: str, values: Array) -> None:
+    """Set a joint of one degree of freedom, in place."""
+    index = model.getJointId(joint)
+    at = model.idx_qs[index]
+    if model.nqs[index] == 2:
+        q[:, at], q[:, at + 1] = np.cos(values), np.sin(values)
+    else:
+        q[:, at] = values
+
+
+def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
+    """Order the columns of a table as q: see `Robot.q_from_columns`."""
+    table, check, model = np.asarray(values, dtype=np.float64), partial(need, ""), robot.model
+    ok = table.ndim == 2 and table.shape[1] == len(names)
+    check(ok, "values", f"shape {table.shape}", f"(N, {len(names)})", "give each column a name")
+    q = np.tile(robot.neutral, (len(table), 1))
+    own: dict[str, tuple[int, ...]] = {_key(n): (k,) for k, n in enumerate(robot.configuration_names)}
+    joints = {}
+    for index in range(1, model.njoints):
+        if model.nvs[index] == 1:
+            at, width = int(model.idx_qs[index]), int(model.nqs[index])
+            joints[_key(model.names[index])] = str(model.names[index])
+            own[_key(model.names[index])] = tuple(range(at, at + width))
+    placed, ignored = list[int](), list[str]()
+    for column, name in zip(table.T, names, strict=True):
+        key = _key(name)
+        if key not in own:
+            ignored.append(str(name))
+            continue
+        check(not {*own[key]} & {*placed}, "columns", f"{shown(name)} twice", "each once", "remove one")
+        placed += own[key]
+        if key in joints:
+            set_joint(model, q, joints[key], column)
+        else:
+            q[:, own[key][0]] = column
+    remedy = nearest(ignored[0], robot.configuration_names) if ignored else "name the columns"
+    ok = bool(placed) and len(ignored) <= len(names) / 2
+    check(ok, "columns", shown(ignored), f"joints of {robot.name}", remedy)
+    left = [name for k, name in enumerate(robot.configuration_names) if k not in placed]
+    for mimic in robot.mimics:
+        if mimic.joint in left:
+            left.remove(mimic.joint)
+            set_joint(model, q, mimic.joint, mimic.value(joint_values(model, q, mimic.target)))
+    notes = []
+    if left:
+        notes.append(f"{len(left)} of {model.nq} entries have no column and are neutral: {_listed(left)}.")
+    if ignored:
+        notes.append(f"Columns that are no joint of {robot.name} are ignored: {_listed(ignored)}.")
+    return q, tuple(notes)
+
+
+def _key(name: str) -> str:
+    """Return a name of a column without case and without ``_joint`` at the end of the joint's name."""
+    return str(name).strip().lower().replace("_joint.", ".").removesuffix("_joint")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:6]) + (", …" if len(names) > 6 else "")

@@ -1,0 +1,269 @@
+"""Inverse kinematics: joint positions to configurations inside the limits, for a batch of postures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from posekit.errors import refusal
+from posekit.geometry import Array, Ints, align, quaternion_from_rotation, rotation_from_quaternion
+from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, POINTS
+
+if TYPE_CHECKING:
+    from posekit.robots.robot import Robot
+
+#: Metres: a posture is met if no known point is farther off; otherwise other starts are tried.
+MET: Final = 1e-3
+#: m^2/rad^2: pull toward the start; chooses among configurations that place the points alike.
+PULL: Final = 1e-10
+STEPS: Final = 40
+#: Relative decrease of the cost below which a search ends.
+PRECISION: Final = 1e-4
+#: Ratio of costs up to which a solution near the frame before is preferred.
+SAME_COST: Final = 1.05
+#: m^2: a smaller decrease ends the search in any case; distances are then below a nanometre.
+LEAST: Final = 1e-19
+#: Postures searched side by side, whose Jacobians have about 15 MB.
+BLOCK: Final = 256
+#: Levenberg-Marquardt: first, smallest and largest damping, and its factors after good and bad steps.
+DAMPING: Final = (1e-3, 1e-12, 1e6, 0.1, 8.0)
+#: m^2/rad^2 added to the diagonal that scales the damping, for entries that move no point.
+FLOOR: Final = 1e-6
+#: Times that entries beyond a limit are set on it and the others are solved again in one step.
+CLAMPINGS: Final = 3
+#: Other starts that are tried: the middles of the limits, and random configurations.
+SEEDS: Final = 4
+#: Times that unmet frames are started from the frames beside them.
+SWEEPS: Final = 3
+
+
+class _Problem:
+    """Least squares of one robot: targets of its points, limits, and the entries of v that move."""
+
+    def __init__(self, robot: Robot, targets: Array) -> None:
+        model = robot.model
+        self.robot, self.model, self.kinematics, self.targets = robot, model, robot.kinematics, targets
+        self.known = np.asarray(np.isfinite(targets).all(axis=2))
+        self.pull = np.full(model.nv, PULL)
+        # Entries of q and v of the joints that have limits: hinges and slides.
+        single = [j for j in range(1, model.njoints) if model.nqs[j] == 1]
+        self.at_q = np.array([model.idx_qs[j] for j in single], dtype=np.intp)
+        self.at_v = np.array([model.idx_vs[j] for j in single], dtype=np.intp)
+        if robot.free_flyer:
+            self.pull[:6] = 0.0
+        # A mimicking joint moves with its target: v = S u, u the entries of the other joints.
+        self.follow = np.eye(model.nv)
+        for mimic in robot.mimics:
+            one, other = (model.idx_vs[model.getJointId(name)] for name in (mimic.joint, mimic.target))
+            self.follow[one] = mimic.multiplier * self.follow[other]
+        self.free = np.flatnonzero(self.follow.any(axis=0))
+        rows = [int(model.idx_vs[model.getJointId(one.joint)]) for one in robot.mimics if one.multiplier]
+        self.mimicking = [(k, int(np.argmax(self.follow[k] != 0))) for k in rows if self.follow[k].any()]
+
+    def cost(self, q: Array, start: Array, rows: Ints) -> Array:
+        """Return half the sum of squared distances, and of the pull toward the start (n,)."""
+        gap = np.where(self.known[rows, :, None], self.kinematics.positions(q) - self.targets[rows], 0.0)
+        away = self.difference(start, q)
+        return np.asarray(0.5 * (gap**2).sum(axis=(1, 2)) + 0.5 * (away**2 @ self.pull))
+
+    def step(self, q: Array, start: Array, rows: Ints, damping: Array) -> Array:
+        """Return damped Gauss-Newton steps (n, nv) inside the limits."""
+        positions, jacobian = self.kinematics.jacobians(q)
+        known = self.known[rows, :, None]
+        gap = np.where(known, positions - self.targets[rows], 0.0).reshape(len(q), -1)
+        J = (jacobian * known[..., None]).reshape(len(q), gap.shape[1], -1)
+        away = self.difference(start, q)
+        gradient = (gap[:, None] @ J)[:, 0] + away * self.pull
+        H = J.transpose(0, 2, 1) @ J + np.diag(self.pull)
+        lowest, highest = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
+        lowest[:, self.at_v] = self.robot.lower[self.at_q] - q[:, self.at_q]
+        highest[:, self.at_v] = self.robot.upper[self.at_q] - q[:, self.at_q]
+        for one, other in self.mimicking:  # limits of a mimicking joint bound its target
+            ends = lowest[:, one] / self.follow[one, other], highest[:, one] / self.follow[one, other]
+            lowest[:, other] = np.maximum(lowest[:, other], np.minimum(np.minimum(*ends), 0.0))
+            highest[:, other] = np.minimum(highest[:, other], np.maximum(np.maximum(*ends), 0.0))
+        S = self.follow[:, self.free]
+        gradient, H = gradient @ S, S.T @ H @ S
+        lowest, highest = lowest[:, self.free], highest[:, self.free]
+        diagonal = np.arange(len(self.free))
+        H[:, diagonal, diagonal] += damping[:, None] * (H[:, diagonal, diagonal] + FLOOR)
+        return limited_step(H, gradient, lowest, highest) @ S.T
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """Take steps (n, nv); rounding does not pass a limit."""
+        out = np.array([pin.integrate(self.model, a, b) for a, b in zip(q, step, strict=True)])
+        out = out.reshape(len(q), self.model.nq)
+        return self.robot.with_mimics(np.clip(out, self.robot.lower, self.robot.upper))
+
+    def difference(self, start: Array, q: Array) -> Array:
+        """Return the steps (n, nv) from configurations to others."""
+        steps = [pin.difference(self.model, a, b) for a, b in zip(start, q, strict=True)]
+        return np.array(steps, dtype=np.float64).reshape(len(q), self.model.nv)
+
+    def worst(self, q: Array) -> Array:
+        """Return the largest distance of a known point from its target (N,), metres."""
+        gap = np.linalg.norm(self.kinematics.positions(q) - self.targets, axis=2)
+        return np.asarray(np.where(self.known, gap, 0.0).max(axis=1, initial=0.0))
+
+    def laid(self, q: Array) -> Array:
+        """Move the floating root so that the trunk lies best on its targets (Kabsch 1976)."""
+        if not self.robot.free_flyer:
+            return q
+        columns = self.robot.joint_map.columns
+        trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
+        chosen = trunk if len(trunk) > 2 else list(range(len(columns)))
+        points = self.kinematics.positions(q)[:, chosen]
+        found = align(points, self.targets[:, chosen], scale=False)
+        lost = np.asarray(np.isnan(found.rotation).any(axis=(1, 2)))
+        R = np.where(lost[:, None, None], np.eye(3), found.rotation)
+        gap = np.nan_to_num(self.targets[:, chosen] - points)  # if too few points are known to turn it
+        off = gap.sum(axis=1) / np.maximum(self.known[:, chosen].sum(axis=1), 1)[:, None]
+        t = np.where(lost[:, None], off, found.translation)
+        fixed, q = self.model.jointPlacements[1], q.copy()
+        world = q[:, :3] @ fixed.rotation.T + fixed.translation
+        q[:, :3] = (np.einsum("nij,nj->ni", R, world) + t - fixed.translation) @ fixed.rotation
+        turn = fixed.rotation.T @ R @ fixed.rotation @ rotation_from_quaternion(q[:, 3:7])
+        q[:, 3:7] = quaternion_from_rotation(turn)
+        return q
+
+
+def solve(
+    robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None, in_time: bool = False
+) -> tuple[Array, Array]:
+    r"""Find configurations that place the mapped joints, inside the limits.
+
+    Minimises :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, all
+    postures side by side. Postures that are not met are tried from other starts and from the frames beside them.
+
+    Parameters
+    ----------
+    robot : Robot
+    joints : array (N, 14, 3) or (N, 19, 3)
+        Metres, world; joints, and head points after them. NaN is unknown.
+    start : array (N, nq), optional
+        Configurations near the solution. What the points do not determine stays near them, by default near the
+        neutral configuration.
+    in_time : bool
+        The postures are frames in order: each is solved again from the one before, so that joints that the points do
+        not determine do not jump.
+
+    Returns
+    -------
+    q : array (N, nq)
+        Mimicking joints follow their targets.
+    distance : array (N,)
+        Largest distance of a known joint from its place, metres. NaN if no joint is known.
+
+    Raises
+    ------
+    InputError
+        If the robot has no joint map, or an array has another shape.
+    """
+    given = np.asarray(joints, dtype=np.float64)
+    given = given[None] if given.ndim == 2 else given
+    if given.ndim != 3 or given.shape[1] not in (len(JOINTS), len(POINTS)) or given.shape[2] != 3:
+        expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
+        raise refusal("", "joints", f"shape {given.shape}", expected, "give them in the order of JOINTS")
+    padded = np.full((len(given), len(POINTS), 3), np.nan)
+    padded[:, : given.shape[1]] = given
+    problem = _Problem(robot, padded[:, robot.joint_map.columns])
+    every = np.arange(len(given))
+    if start is None:
+        first = problem.laid(np.tile(robot.neutral, (len(given), 1)))
+    else:
+        first = robot.with_mimics(np.clip(robot.checked(start, "start"), robot.lower, robot.upper))
+    q, cost = _descend(problem, first, first, every)
+    worst = problem.worst(q)
+    for seed in range(SEEDS if len(given) else 0):
+        unmet = np.flatnonzero(worst > MET)
+        other = problem.laid(np.tile(_seed(robot, seed), (len(given), 1)))[unmet]
+        _improve(problem, q, cost, worst, first, unmet, other)
+    for sweep in range(SWEEPS):
+        beside = every + (1 if sweep % 2 else -1)
+        beside = np.clip(beside, 0, len(every) - 1)
+        unmet = np.flatnonzero((worst > MET) & (worst[beside] < worst / 2))
+        _improve(problem, q, cost, worst, first, unmet, q[beside[unmet]])
+    for n in range(1, len(q) if in_time else 0):
+        found, new = _descend(problem, q[n - 1 : n], q[n - 1 : n], every[n : n + 1])
+        if new[0] <= SAME_COST * cost[n] + MET**2 / 2:
+            q[n], cost[n] = found[0], new[0]
+    worst = problem.worst(q)
+    return q, np.where(problem.known.any(axis=1), worst, np.nan)
+
+
+def limited_step(H: Array, gradient: Array, lowest: Array, highest: Array) -> Array:
+    r"""Minimise :math:`g^T d + d^T H d / 2` over steps d between limits, by projected Newton (Bertsekas 1982).
+
+    Parameters
+    ----------
+    H : array (N, m, m)
+        Positive definite.
+    gradient : array (N, m)
+    lowest, highest : array (N, m)
+        Limits of the step, lowest <= 0 <= highest.
+
+    Returns
+    -------
+    array (N, m)
+        Entries at a limit and pushed against it stay; those beyond a limit are set on it.
+    """
+    held = ((lowest >= 0) & (gradient > 0)) | ((highest <= 0) & (gradient < 0))
+    value = np.zeros_like(gradient)
+    diagonal = np.arange(H.shape[1])
+    for _ in range(CLAMPINGS):
+        free = (~held).astype(np.float64)
+        matrix = H * free[:, :, None] * free[:, None]
+        matrix[:, diagonal, diagonal] += 1.0 - free
+        right = free * (gradient + (H @ value[..., None])[..., 0])
+        step = np.where(held, value, -np.linalg.solve(matrix, right[..., None])[..., 0])
+        beyond = ~held & ((step < lowest) | (step > highest))
+        if not beyond.any():
+            break
+        held |= beyond
+        value = np.where(held, np.clip(step, lowest, highest), 0.0)
+    return np.clip(step, lowest, highest)
+
+
+def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Array, Array]:
+    """Search from configurations (n, nq) of some rows; return where it ended, and the cost (n,)."""
+    q, damping = q.copy(), np.full(len(q), DAMPING[0])
+    cost = problem.cost(q, start, rows)
+    for first in range(0, len(q), BLOCK):
+        active = np.arange(first, min(first + BLOCK, len(q)))
+        for _ in range(STEPS):
+            here, at = rows[active], start[active]
+            moved = problem.moved(q[active], problem.step(q[active], at, here, damping[active]))
+            new = problem.cost(moved, at, here)
+            better = new < cost[active]
+            settled = better & (cost[active] - new < PRECISION * cost[active] + LEAST)
+            q[active[better]], cost[active[better]] = moved[better], new[better]
+            damping[active] = np.clip(damping[active] * np.where(better, *DAMPING[3:]), *DAMPING[1:3])
+            active = active[~settled & (damping[active] < DAMPING[2])]
+            if not active.size:
+                break
+    return q, cost
+
+
+def _improve(
+    problem: _Problem, q: Array, cost: Array, worst: Array, start: Array, rows: Ints, other: Array
+) -> None:
+    """Search again from other configurations, and keep in place what is better."""
+    if not rows.size:
+        return
+    found, new = _descend(problem, other, start[rows], rows)
+    better = rows[new < cost[rows]]
+    q[better], cost[better] = found[new < cost[rows]], new[new < cost[rows]]
+    worst[better] = problem.worst(q)[better]
+
+
+def _seed(robot: Robot, seed: int) -> Array:
+    """Return another start (nq,): the middle of the limits, or a random configuration inside them."""
+    q = robot.neutral.copy()
+    bounded = np.flatnonzero(np.isfinite(robot.lower) & np.isfinite(robot.upper))
+    low, high = np.maximum(robot.lower[bounded], -np.pi), np.minimum(robot.upper[bounded], np.pi)
+    share = np.random.default_rng(seed).uniform(0.2, 0.8, len(bounded)) if seed else 0.5
+    q[bounded] = low + share * (high - low)
+    return np.array(robot.with_mimics(q[None])[0])
