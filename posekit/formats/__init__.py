@@ -1,1 +1,4 @@
-"""Every file format: key points, motion, cameras, layouts of key points, and the files of posekit itself."""
+"""Files: `open` reads any once, `save` writes one; layouts in ``urdf/layouts`` say which name is which joint."""
+
+from posekit.formats.open import open as open
+from posekit.formats.save import save as save

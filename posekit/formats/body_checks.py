@@ -1,0 +1,450 @@
+"""From named points to a motion: missing values, layout, unit, up axis and times, each checked against the body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import InputError, refusal, shown
+from posekit.formats.layout import LIMBS, Layout, by_names, by_order, load_layout, plain
+from posekit.formats.options import Options
+from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints, up_vector
+from posekit.motion import Motion
+from posekit.skeleton import JOINT, JOINTS, SIDES
+
+#: Sentences, to which functions add theirs.
+Lines = list[str]
+
+#: Metres in each unit that can be stated.
+METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+#: Words for units in files, in lower case.
+UNIT_WORDS: Final = {
+    **{name: name for name in METRES},
+    **{"meters": "m", "metres": "m", "meter": "m", "centimeters": "cm", "centimetres": "cm"},
+    **{"millimeters": "mm", "millimetres": "mm", "inches": "in", "inch": "in"},
+}
+
+#: Lengths as shares of stature: Drillis & Contini 1966, in Winter 2009, *Biomechanics and Motor Control of Human
+#: Movement*, fig. 4.1.
+LIMB_SHARES: Final = {
+    **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
+    **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
+}
+#: Statures of nearly all who are recorded: a body of 67 is one of inches, and no toddler in centimetres.
+USUAL_METRES: Final = (1.2, 2.2)
+#: Statures by which a unit is recognised: of a toddler or a small robot, and of a giant.
+BODY_METRES: Final = (0.4, 2.5)
+#: Statures that are read as metres: they are nearer to a body in metres than in another unit.
+POSSIBLE_METRES: Final = (0.2, 5.0)
+
+#: Component of the mean direction from ankles to shoulders along an axis above which a body stands along it.
+CLEAR_UP_SHARE: Final = 0.7
+#: Rise of the lowest joint along an axis: below the first the ground is level (an ankle's rise in a step), above the
+#: second it is not (more than from a crouch to the tips of the toes).
+FLAT_METRES, STEEP_METRES = 0.15, 0.6
+#: Ratio of rises by which one axis is level more clearly than all others.
+CLEAR_RATIO: Final = 2.0
+#: Share by which a stated rate and the times must differ to be a contradiction.
+RATE_DISAGREES: Final = 0.1
+#: Share by which limbs of both sides may differ in length in an order of points that fits.
+SIDES_SHARE: Final = 0.25
+#: Distance of a stated middle from the middle of its two joints, share of a leg's length, in an order that fits.
+MIDDLE_SHARE: Final = 0.25
+
+
+def points_motion(
+    points: Array,
+    names: Sequence[str],
+    source: str,
+    options: Options,
+    *,
+    layout: Layout | None = None,
+    time: Array | None = None,
+    rate: float | None = None,
+    unit: str = "",
+    metres: float | None = None,
+    up: str = "",
+    up_by_custom: str = "",
+    notes: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    partial: bool = False,
+    **fields: Any,
+) -> Motion:
+    """Make a motion of a file's points in space.
+
+    Parameters
+    ----------
+    points : array (T, P, 3)
+        In the file's unit.
+    names : sequence of str (P,)
+        The file's names of the points; empty if it has none.
+    source : str
+        The file.
+    options : Options
+        What the user states; it goes before what the file says.
+    layout : Layout, optional
+        Meaning of the names, if the reader knows it.
+    time : array (T,), optional
+        Seconds, as the file has them; they go before any rate.
+    rate : float, optional
+        Frames a second, as the file says.
+    unit, up : str
+        Stated by the file; empty if it does not.
+    metres : float, optional
+        Metres in the file's unit, if the reader has found it.
+    up_by_custom : str
+        Axis that points up by the format's custom.
+    notes, warnings : sequence of str
+        Of the reader.
+    partial : bool
+        Whether files of this format are of markers, of which some sets have no joints: these are read without joints,
+        with a warning.
+    **fields
+        Further fields of `Motion`.
+
+    Raises
+    ------
+    InputError
+        If no layout fits, or a stated fact is wrong.
+    """
+    notes, warnings = list(notes), list(warnings)
+    points = np.array(points, dtype=np.float64)
+    if points.ndim != 3 or points.shape[2] != 3 or not len(points):
+        raise refusal(source, "points", f"shape {points.shape}", "frames x points x 3", "check the file")
+    layout = _layout_of(points, names, source, options, layout, notes, warnings if partial else None)
+    if not names:
+        points, names = points[:, : len(layout.points)], layout.points
+    _mark_missing(points, names, layout, notes)
+    placed, joints, derived = layout.place(names, points)
+    if layout.name and not set(placed) & set(JOINTS):
+        expected = f"some of {', '.join(part for parts in layout.sources.values() for part in parts)[:200]}"
+        raise refusal(source, "points", f"no point of {layout.name}", expected, "choose another layout")
+    if derived:
+        notes.append(f"{' and '.join(derived)} placed from shoulders and hips")
+    missing = [limb for limb in LIMBS if limb not in placed]
+    if missing and layout.name:
+        warnings.append(f"{', '.join(missing)} are not in the file: what needs them stays undecided")
+    body = _tree(placed, joints)
+    _check_depth(_tree(placed, joints, without=derived), source)
+    unit = options.unit or unit or layout.fields.get("unit", "")
+    if metres is None:
+        unit, metres = body_unit(body, unit, notes, warnings)
+    joints, body = joints * metres, body * metres
+    clip, frame = fields.get("clip"), fields.get("frame")
+    stated = options.up or up or layout.fields.get("up", "")
+    up = body_up(body, clip, stated, up_by_custom, notes, warnings)
+    time = times(len(points), time, rate, options, notes, warnings, clip, frame)
+    fields.setdefault("in_world", not _is_rooted(body))
+    if not fields["in_world"]:
+        notes.append("every frame is relative to its own hips: nothing is known of the ground and of travel")
+    fields |= {"source": source, "layout": layout.name, "notes": notes, "warnings": warnings}
+    return Motion(joints=joints, joint_names=placed, time=time, up=up, unit=unit, **fields)
+
+
+def _layout_of(
+    points: Array,
+    names: Sequence[str],
+    source: str,
+    options: Options,
+    layout: Layout | None,
+    notes: list[str],
+    warnings: list[str] | None,
+) -> Layout:
+    """Return the stated layout, or the one that names or points fit; an empty one for markers without joints."""
+    if options.layout:
+        layout = load_layout(options.layout)
+        if layout.kind != "points":
+            raise refusal(source, "layout", shown(layout.name), "a layout of points", "choose another layout")
+    if layout is None and not names:
+        layout = unnamed(points, source, notes)
+    if layout is None:
+        try:
+            return by_names(names, source)
+        except InputError as error:
+            if warnings is None:
+                raise
+            warnings.append(f"no joints among {len(names)} markers: {str(error).partition('got ')[2]}")
+            return Layout(name="", points=tuple(names))
+    if not names and not 0 < len(layout.points) <= points.shape[1]:
+        got = f"{points.shape[1]} points without names"
+        expected = f"the {len(layout.points)} of {layout.name}" if layout.points else "names of the points"
+        raise refusal(source, "points", got, expected, "choose another layout")
+    return layout
+
+
+def unnamed(points: Array, source: str, notes: list[str]) -> Layout:
+    """Find the layout of points (T, P, 3) without names, by their number and by how the body hangs together.
+
+    Raises
+    ------
+    InputError
+        If no layout has so many points, or the body hangs together in none that has.
+    """
+    candidates = by_order(points.shape[1])
+    fits = [one for one in candidates if _misfit(one, points) < 1.0]
+    if len(candidates) == 1 and not fits:
+        notes.append(f"points are in the order of {candidates[0].name}, which has {points.shape[1]}")
+        return candidates[0]
+    if not fits:
+        counts = sorted({(len(one.points), one.name) for k in range(1, 200) for one in by_order(k)})
+        known = ", ".join(f"{name} ({count})" for count, name in counts)
+        named = ", ".join(one.name for one in candidates)
+        why = " in which no body hangs together" if candidates else ""
+        got = f"{points.shape[1]} points without names{why}"
+        remedy = f"name their order with --layout {named or 'NAME'}, or a TOML file of your own"
+        raise refusal(source, "points", got, named or f"as many as {known}", remedy)
+    layout = min(fits, key=lambda one: _misfit(one, points))
+    notes.append(f"points are in the order of {layout.name}: so the body hangs together")
+    return layout
+
+
+def _misfit(layout: Layout, points: Array) -> float:
+    """Return how badly limbs of both sides agree and stated middles lie, 1 at the bounds."""
+    found = layout.gather(points[:, : len(layout.points)])
+    if not set(LIMBS) <= set(found):
+        return np.inf
+    worst: list[float] = []
+    leg = 0.0
+    for start, end in LIMB_SHARES:
+        right, left = (_apart(found[f"{side}_{start}"], found[f"{side}_{end}"]) for side in SIDES)
+        if not min(right, left) > 0:
+            return np.inf
+        lengths = np.linalg.norm(found[f"left_{end}"] - found[f"left_{start}"], axis=-1)
+        low, high = np.nanpercentile(lengths, (25, 75))
+        worst += [abs(right - left) / max(right, left) / SIDES_SHARE, (high - low) / left / SIDES_SHARE]
+        leg += left if start in ("hip", "knee") else 0.0
+    middles = {"mid_hips": "hip", "pelvis": "hip", "mid_shoulders": "shoulder", "neck": "shoulder"}
+    for name in set(middles) & set(found):
+        middle = (found[f"right_{middles[name]}"] + found[f"left_{middles[name]}"]) / 2
+        worst.append(_apart(found[name], middle) / leg / MIDDLE_SHARE)
+    return float(max(worst))
+
+
+def _apart(a: Array, b: Array) -> float:
+    distance = np.linalg.norm(a - b, axis=-1)
+    distance = distance[np.isfinite(distance)]
+    return float(np.median(distance)) if len(distance) else float("nan")
+
+
+def _mark_missing(points: Array, names: Sequence[str], layout: Layout, notes: list[str]) -> None:
+    """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing one.
+
+    A point whose three coordinates are the same number in some frames and others in the rest is missing there: zeros,
+    -1, 999. One that is zero in all frames is a root where it is the pelvis or the middle of the hips, else missing.
+    """
+    points[~(np.abs(points) <= FARTHEST_COORDINATE).all(axis=-1)] = np.nan
+    alike = (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
+    roots = {plain(part) for ours in ("pelvis", "mid_hips") for part in layout.landmarks.get(ours, ())}
+    roots |= {"root", "hips", "pelvis", "hip"}
+    for k in np.flatnonzero(alike.any(axis=0)).tolist():
+        known = np.isfinite(points[:, k, 0])
+        if alike[known, k].all() and (len(points) == 1 or points[:, k].any()):
+            continue  # one posture, or a point that lies on the diagonal in every frame
+        if alike[known, k].all() and plain(names[k]) in roots:
+            continue
+        values, counts = np.unique(points[alike[:, k], k, 0], return_counts=True)
+        sentinels = [value for value, count in zip(values, counts, strict=True) if value == 0 or count > 1]
+        gone = alike[:, k] & np.isin(points[:, k, 0], sentinels)
+        if gone.any():
+            points[gone, k] = np.nan
+            written = ", ".join(f"{value:g}" for value in sentinels)
+            notes.append(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames: {written}")
+
+
+def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> Array:
+    """Return the 14 joints (T, 14, 3) in tree order, NaN where a name is absent or left out."""
+    body = np.full((len(points), len(JOINTS), 3), np.nan)
+    for k, name in enumerate(names):
+        if name in JOINT and name not in without:
+            body[:, JOINT[name]] = points[:, k]
+    return body
+
+
+def _check_depth(body: Array, source: str) -> None:
+    """Refuse frames of which one coordinate is one constant for all joints: the points are not in space."""
+    known = body[np.isfinite(body).all(axis=-1)]
+    if len(body) > 1 and len(known) > len(body) * 4:
+        for k in range(3):
+            if np.ptp(known[:, k]) == 0:
+                got = f"{known[0, k]:g} for every joint in every frame"
+                remedy = "these are points in a picture: recover them, and give the result"
+                raise refusal(source, f"{'xyz'[k]} coordinate", got, "points in space", remedy)
+
+
+def stature(body: Array) -> float:
+    """Return the stature of joints (T, 14, 3) by the median limb's share of it, in their unit; NaN without a limb."""
+    found = []
+    for (start, end), share in LIMB_SHARES.items():
+        for side in SIDES:
+            length = _apart(body[:, JOINT[f"{side}_{start}"]], body[:, JOINT[f"{side}_{end}"]])
+            if np.isfinite(length):
+                found.append(length / share)
+    return float(np.median(found)) if found else float("nan")
+
+
+def body_unit(body: Array, stated: str, notes: Lines, warnings: Lines) -> tuple[str, float]:
+    """Find the unit of joints (T, 14, 3): the stated one, unless a body has its size only in another.
+
+    Returns
+    -------
+    unit : str
+    metres : float
+        Metres in one unit.
+    """
+    if stated and stated not in METRES:
+        raise refusal("", "unit", shown(stated), f"one of {', '.join(METRES)}", "give it with --unit")
+    size = stature(body)
+    metres = METRES[stated or "m"]
+    if not size > 0 or POSSIBLE_METRES[0] <= size * metres <= POSSIBLE_METRES[1]:
+        return stated or "m", metres
+    usual, fitting = (
+        [name for name, scale in METRES.items() if low <= size * scale <= high]
+        for low, high in (USUAL_METRES, BODY_METRES)
+    )
+    fitting = usual if len(usual) == 1 else fitting
+    if len(fitting) == 1:
+        found = fitting[0]
+        finding = f"lengths are in {found}: a body is {size * METRES[found]:.2f} m tall by its limbs"
+        if stated:
+            warnings.append(f"{finding}; in {stated}, as stated, it would be {size * metres:.3g} m")
+        else:
+            notes.append(finding)
+        return found, METRES[found]
+    basis = f"in {stated}, as stated" if stated else "in metres"
+    warnings.append(f"a body is {size * metres:.3g} m tall by its limbs {basis}: check the unit (--unit)")
+    return stated or "m", metres
+
+
+def stands_along(body: Array) -> str:
+    """Return the axis along which shoulders lie above hips and hips above ankles, over all frames; empty if none is."""
+    shoulders = body[:, [JOINT["right_shoulder"], JOINT["left_shoulder"]]].mean(axis=1)
+    ankles = body[:, [JOINT["right_ankle"], JOINT["left_ankle"]]].mean(axis=1)
+    hips = body[:, [JOINT["right_hip"], JOINT["left_hip"]]].mean(axis=1)
+    way = shoulders - ankles
+    way = np.where(np.isfinite(way), way, 2 * (shoulders - hips))
+    length = np.linalg.norm(way, axis=1)
+    known = length > 0
+    if not known.any():
+        return ""
+    mean = (way[known] / length[known, None]).mean(axis=0)
+    axis = int(np.argmax(np.abs(mean)))
+    return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}" if abs(mean[axis]) >= CLEAR_UP_SHARE else ""
+
+
+def body_up(body: Array, clip: Ints | None, stated: str, custom: str, notes: Lines, warnings: Lines) -> str:
+    """Find the axis that points up of joints (T, 14, 3): the stated one, else how bodies stand, the ground, the custom.
+
+    A stated axis that bodies contradict stays, with a warning; so does one found that points against the custom.
+    """
+    if stated and stated not in UP_AXES:
+        raise refusal("", "up", shown(stated), f"one of {', '.join(UP_AXES)}", "give it with --up")
+    stands = stands_along(body)
+    rise = {name: _rise(body, clip, name) for name in UP_AXES}
+    if stated:
+        level = bool(stands) and rise[stated] < FLAT_METRES and rise[stands] > STEEP_METRES
+        if stands and stands != stated and not level:
+            how = "upside down" if stands[1] == stated[1] else "lying"
+            warnings.append(
+                f"the person is {how} in most frames if {stated} is up, as stated: bodies stand along {stands} (--up)"
+            )
+        return stated
+    if stands and not (rise[stands] > STEEP_METRES and min(rise.values()) < FLAT_METRES):
+        finding = f"{stands} is up by how bodies stand"
+        if custom and stands != custom:
+            warnings.append(f"{finding}, against {custom} by custom: if people lie, state the axis (--up)")
+        elif stands[0] == "-":
+            warnings.append(f"{finding}: the head is below the feet along +{stands[1]}")
+        elif stands != custom:
+            notes.append(finding)
+        return stands
+    best = min(UP_AXES, key=lambda name: rise[name])
+    others = min(rise[name] for name in UP_AXES if name[1] != best[1])
+    if rise[best] < FLAT_METRES and CLEAR_RATIO * rise[best] < others:
+        best = custom if custom[1:] == best[1] else f"+{best[1]}"
+        notes.append(f"{best} is up by the ground: the lowest joint stays level along it")
+        return best
+    if not custom:
+        notes.append("which axis is up is not known: nobody stands, and no ground is level (--up)")
+    return custom
+
+
+def _rise(body: Array, clip: Ints | None, up: str) -> float:
+    """Return the rise of the lowest joint along an axis, from the 5th to the 95th percentile; median over clips."""
+    lowest = np.fmin.reduce(body @ up_vector(up), axis=1)
+    spreads = []
+    for index in [0] if clip is None else np.unique(clip):
+        known = lowest[np.isfinite(lowest) & (True if clip is None else clip == index)]
+        if len(known):
+            low, high = np.percentile(known, (5, 95))
+            spreads.append(float(high - low))
+    return float(np.median(spreads)) if spreads else float("inf")
+
+
+def _is_rooted(body: Array) -> bool:
+    """Tell whether the hips (their middle, or the pelvis) are at the origin in every frame of several."""
+    if len(body) < 2:
+        return False
+    middle = (body[:, JOINT["right_hip"]] + body[:, JOINT["left_hip"]]) / 2
+    for root in (middle, body[:, JOINT["pelvis"]]):
+        known = root[np.isfinite(root).all(axis=-1)]
+        if len(known) > 1 and np.abs(known).max() < 1e-4:  # 0.1 mm: what is left of float32 and of rounding
+            return True
+    return False
+
+
+def times(
+    frames: int,
+    time: Array | None,
+    rate: float | None,
+    options: Options,
+    notes: list[str],
+    warnings: list[str],
+    clip: Ints | None = None,
+    frame: Ints | None = None,
+) -> Array | None:
+    """Return seconds of each frame: the file's times, else the user's rate or the file's; None if none is known.
+
+    Contradictions between times and rates are added to `warnings`. Rows of one frame are alternative postures.
+    """
+    stated = rate if rate is not None and 0 < rate < np.inf else None
+    clip = np.zeros(frames, dtype=np.intp) if clip is None else clip
+    if time is not None and np.isfinite(time).any():
+        counted = (np.diff(clip) == 0) & (True if frame is None else np.diff(frame) != 0)
+        steps = np.diff(time)[counted]
+        step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        for given, whose in ((stated, "the file's rate"), (options.rate, "--rate")):
+            if given and step and abs(step * given - 1) > RATE_DISAGREES:
+                contradiction = f"times are {step:.4g} s apart and contradict {whose} {given:g} a second"
+                warnings.append(f"{contradiction}: times are kept")
+        if step or not len(steps) or not (stated or options.rate):
+            if (steps <= 0).any():
+                warnings.append(f"times stand still or go back at {(steps <= 0).sum()} of {len(steps)} steps")
+            return _unrounded(time, stated, notes) if counted.all() else time
+        warnings.append("times stand still: the rate is used instead")
+    if stated and options.rate and abs(stated / options.rate - 1) > 1e-6:
+        warnings.append(f"--rate {options.rate:g} is used in place of the file's {stated:g} a second")
+    used = options.rate or stated
+    if used is None:
+        if frames > 1:
+            notes.append("the file says no times and no rate above 0 (--rate)")
+        return None
+    first = np.concatenate([[True], np.diff(clip) != 0])
+    number = np.arange(frames) - np.flatnonzero(first)[np.cumsum(first) - 1]
+    return np.asarray((number if frame is None else frame) / used)
+
+
+def _unrounded(time: Array, stated: float | None, notes: list[str]) -> Array:
+    """Return even times (T,) if a file's are even but for rounding to at most 3 decimals, as 0.017, 0.033, 0.05."""
+    digits = next((d for d in range(4) if np.array_equal(np.round(time, d), time)), None)
+    if digits is None or len(time) < 3 or not time[-1] > time[0]:
+        return time
+    whole = (len(time) - 1) / (time[-1] - time[0])
+    for rate in (stated or whole, float(round(whole)), whole):
+        even = time[0] + np.arange(len(time)) / (rate or np.nan)
+        if np.abs(even - time).max() <= 0.51 * 10.0**-digits:
+            if np.abs(even - time).max() > 1e-9:
+                notes.append(f"times are rounded to {digits} decimals: even steps of 1/{rate:g} s are used")
+            return np.asarray(even)
+    return time

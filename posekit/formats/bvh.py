@@ -1,0 +1,372 @@
+"""BVH: a skeleton's hierarchy and its channels over time, as animation programs write it.
+
+Three sections of text: HIERARCHY with ROOT, JOINT and End Site, each with OFFSET and CHANNELS; MOTION with Frames and
+Frame Time; a line of values a frame, degrees. Meredith & Maddock 2001, *Motion Capture File Formats Explained*
+(University of Sheffield, CS-01-11). The file names no unit and no axis: y is up by custom, centimetres are frequent.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from posekit.errors import refusal, shown
+from posekit.formats.body_checks import METRES, points_motion
+from posekit.formats.files import text
+from posekit.formats.options import Options
+from posekit.geometry import Array, coordinate_rotation
+
+if TYPE_CHECKING:
+    from posekit.motion import Motion
+
+MAX_JOINTS: Final = 2000
+MAX_DEPTH: Final = 250
+#: Largest length, position or angle that is read, in any unit.
+LARGEST_VALUE: Final = 1e9
+#: Channel in lower case to whether it rotates, and its axis.
+KINDS: Final = ("position", "rotation")
+CHANNELS: Final = {f"{a}{kind}": (kind == "rotation", k) for kind in KINDS for k, a in enumerate("xyz")}
+
+#: Metres in a unit of the CMU database, inches times 0.45 (mocap.cs.cmu.edu, FAQs): also in its BVH conversions.
+CMU_METRES: Final = 0.0254 / 0.45
+UNITS: Final = {**METRES, "0.45 in": CMU_METRES}
+#: Metres along the bones between the two ends of a body that are farthest apart: skeletons of CMU, LAFAN1 and
+#: Bandai-Namco have 1.9 to 2.3.
+CHAIN_METRES: Final = 2.0
+#: Metres along the bones of a small child, and of a giant.
+CHAIN_BOUNDS: Final = (0.9, 4.5)
+#: Frames that the unit is found from.
+FRAMES_SAMPLED: Final = 200
+#: Share of the largest offset below which an offset tells nothing about its position channels.
+SMALL_OFFSET_SHARE: Final = 1e-3
+_MOTION: Final = re.compile(r"^[ \t]*MOTION[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+_HEAD: Final = re.compile(r"\s*Frames\s*:\s*(\S+)\s+Frame\s*Time\s*:\s*(\S+)", re.IGNORECASE)
+_TOKEN: Final = re.compile(r"[{}]|[^\s{}]+")
+_NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Bvh:
+    """A BVH file as it stands: joints and End Sites in the file's order, parents first.
+
+    Attributes
+    ----------
+    text : str
+        The whole file.
+    names : tuple of str (P,)
+        An End Site is named after its joint, ``LeftHand_end``.
+    parents : tuple of int (P,)
+        -1 for a root.
+    offsets : array (P, 3)
+        In the file's unit.
+    channels : tuple (P,) of tuple of (bool, int)
+        Whether each channel rotates, and its axis 0 to 2.
+    sites : tuple of bool (P,)
+        True for End Sites.
+    frame_time : float
+        Seconds from frame to frame; NaN if the file says none.
+    values : array (T, C)
+        The channels of all joints one after the other, file's unit and degrees.
+    frames : int
+        Number of frames that the file states.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array
+    channels: tuple[tuple[tuple[bool, int], ...], ...]
+    sites: tuple[bool, ...]
+    frame_time: float
+    values: Array
+    frames: int
+
+    @property
+    def columns(self) -> list[slice]:
+        """Columns of each joint's channels in `values`."""
+        ends = np.cumsum([len(channels) for channels in self.channels]).tolist()
+        return [slice(end - len(channels), end) for end, channels in zip(ends, self.channels, strict=True)]
+
+
+def parse(data: bytes, source: str) -> Bvh:
+    """Parse a BVH file.
+
+    Raises
+    ------
+    InputError
+        If it is damaged or cut off, with the line that is wrong.
+    """
+    document = text(data, source)
+    motion = _MOTION.search(document)
+    if motion is None:
+        remedy = "the file is cut off, or is no BVH file"
+        raise refusal(source, "", "no line MOTION", "HIERARCHY, then MOTION", remedy)
+    joints = _hierarchy(document[: motion.start()], source)
+    head = _HEAD.match(document, motion.end())
+    if head is None:
+        line = document.count("\n", 0, motion.end()) + 2
+        raise refusal(source, f"line {line}", "others", "Frames: and Frame Time:", "add both after MOTION")
+    if not (head[1].isascii() and head[1].isdigit() and 0 < int(head[1][:13]) < 10**12):
+        raise refusal(source, "Frames", shown(head[1]), "a positive whole number")
+    seconds = float(head[2]) if _NUMBER.fullmatch(head[2]) else np.nan
+    names, parents, offsets, channels, sites = zip(*joints, strict=True)
+    width = sum(map(len, channels))
+    if width == 0:
+        raise refusal(source, "CHANNELS", "none", "channels of one joint at least", "nothing moves in it")
+    return Bvh(
+        text=document,
+        names=names,
+        parents=parents,
+        offsets=np.array(offsets, dtype=np.float64),
+        channels=channels,
+        sites=sites,
+        frame_time=seconds if 1e-6 <= seconds <= 1e6 else np.nan,
+        values=_values(document, head.end(), width, source),
+        frames=int(head[1]),
+    )
+
+
+def _hierarchy(document: str, source: str) -> list[Any]:
+    """Read joints as [name, parent, offset, channels, is End Site], word by word and never by recursion."""
+    tokens = list(_TOKEN.finditer(document))
+    words = [token.group() for token in tokens]
+    joints: list[Any] = []
+    opened: list[int] = []
+    at = 1
+    try:
+        if not words or words[0].lower() != "hierarchy":
+            raise ValueError("HIERARCHY in the first line")
+        while at < len(words):
+            keyword = words[at].lower()
+            if keyword in ("root", "joint", "end"):
+                brace = words.index("{", at)
+                _open_joint(joints, opened, keyword, words[at + 1 : brace])
+                at = brace + 1
+            elif keyword == "}":
+                at, _ = at + 1, opened.pop()
+            elif keyword == "offset" and joints[opened[-1]][2] is None:
+                joints[opened[-1]][2] = [_number(words[at + k]) for k in (1, 2, 3)]
+                at += 4
+            elif keyword == "channels" and joints[opened[-1]][3] is None and not joints[opened[-1]][4]:
+                names = words[at + 2 : at + 2 + int(words[at + 1])]
+                joints[opened[-1]][3] = tuple(CHANNELS[name.lower()] for name in names)
+                at += 2 + int(words[at + 1])
+            else:
+                raise ValueError("ROOT, JOINT, End Site, OFFSET and CHANNELS once a joint, or }")
+        if opened or not joints or any(joint[2] is None for joint in joints):
+            raise ValueError("joints, an OFFSET in each, and a } for every {")
+        names = [joint[0] for joint in joints]
+        if len(set(names)) != len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise refusal(source, "joints", f"{shown(twice)} twice", "each name once", "rename one of both")
+        if any(len(set(joint[3] or ())) != len(joint[3] or ()) for joint in joints):
+            raise ValueError("each channel of a joint once")
+    except (ValueError, IndexError, KeyError) as error:
+        token = tokens[min(at, len(tokens) - 1)] if tokens else None
+        line = document.count("\n", 0, token.start() if token else 0) + 1
+        got = "the end of the hierarchy" if at >= len(words) else shown(" ".join(words[at : at + 6]))
+        own = type(error) is ValueError and "invalid" not in str(error)
+        expected = str(error) if own else "numbers, and names of channels"
+        raise refusal(source, f"line {line}", got, expected, "correct it, or complete the file") from None
+    return [[*joint[:3], joint[3] or (), joint[4]] for joint in joints]
+
+
+def _open_joint(joints: list[Any], opened: list[int], keyword: str, words: list[str]) -> None:
+    """Append a joint, or an End Site that is named after its joint."""
+    site, parent = keyword == "end", opened[-1] if opened else -1
+    if (keyword == "root") == bool(opened) or (opened and joints[parent][4]) or "}" in words:
+        raise ValueError("JOINT or End Site inside a joint, ROOT outside")
+    if len(joints) >= MAX_JOINTS or len(opened) >= MAX_DEPTH or not words:
+        raise ValueError(f"a name; at most {MAX_JOINTS} joints, {MAX_DEPTH} deep")
+    name = " ".join(words)
+    if site:
+        count = sum(one[1] == parent and one[4] for one in joints) + 1
+        name = f"{joints[parent][0]}_end{count if count > 1 else ''}"
+    opened.append(len(joints))
+    joints.append([name, parent, None, None, site])
+
+
+def _number(word: str) -> float:
+    if not _NUMBER.fullmatch(word) or not abs(float(word)) <= LARGEST_VALUE:
+        raise ValueError(f"a number of at most {LARGEST_VALUE:g}")
+    return float(word)
+
+
+def _values(document: str, start: int, width: int, source: str) -> Array:
+    """Read the numbers after the two lines of the motion's head (T, C)."""
+    try:
+        values = np.array(document[start:].split(), dtype=np.float64)
+        sane = (np.abs(values) <= LARGEST_VALUE).all() and "_" not in document[start:]
+        if sane and len(values) and len(values) % width == 0:
+            return values.reshape(-1, width)
+    except ValueError:
+        pass
+    first = document.count("\n", 0, start) + 1
+    for number, line in enumerate(document[start:].split("\n"), first):
+        words = line.split()
+        bad = [word for word in words if not _NUMBER.fullmatch(word) or not abs(float(word)) <= LARGEST_VALUE]
+        if bad or (words and len(words) != width):
+            got = shown(bad[0]) if bad else f"{len(words)} values"
+            remedy = "the file is cut off there, or its CHANNELS are not those of its frames"
+            raise refusal(source, f"line {number}", got, f"{width} finite numbers, one a channel", remedy)
+    raise refusal(source, "MOTION", "no frames", "a line of values a frame", "the file is cut off")
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a document is a parsed BVH file."""
+    return isinstance(document, Bvh)
+
+
+def read(document: Bvh, path: str, options: Options) -> Motion:
+    """Make a motion of a BVH file: points are its joints and the End Sites that have a length."""
+    absolute = positions_are_absolute(document)
+    points = world_points(document, absolute=absolute)
+    frames = len(document.values)
+    counted = f"Frames is {document.frames}, but the file has {frames}: it may be cut off"
+    notes = ["position channels stand in place of the offsets"] if absolute and _moves(document) else []
+    if options.unit:
+        unit, metres = options.unit, METRES.get(options.unit)
+    else:
+        unit, metres = _unit(document, points, path, notes)
+    kept = [k for k, site in enumerate(document.sites) if not site or document.offsets[k].any()]
+    return points_motion(
+        points[:, kept],
+        [document.names[k] for k in kept],
+        path,
+        options,
+        unit=unit,
+        metres=metres,
+        rate=1.0 / document.frame_time,
+        up_by_custom="+y",
+        notes=notes,
+        warnings=[counted] if frames != document.frames else [],
+        document=document,
+        in_world=True,
+    )
+
+
+def holds(document: Bvh, motion: Motion) -> bool:
+    """Tell whether a motion is still that of the document that it came from."""
+    if motion.joints is None or len(motion) != len(document.values):
+        return False
+    layout = motion.layout if motion.layout.endswith(".toml") else ""
+    own = read(document, motion.source, Options(layout=layout))
+    return own.joints is not None and bool(np.array_equal(own.joints, motion.joints, equal_nan=True))
+
+
+def with_values(document: Bvh, values: Array) -> Bvh:
+    """Return the file with other values (T, C): numbers that stay the same keep their text, byte for byte."""
+    if values.shape != document.values.shape:
+        raise refusal("", "values", f"shape {values.shape}", f"{document.values.shape}", "keep the frames")
+    head = _HEAD.match(document.text, _MOTION.search(document.text).end())  # type: ignore[union-attr]
+    start = head.end()  # type: ignore[union-attr]
+    parts = re.split(r"(\S+)", document.text[start:])  # white space and words in turn
+    for place in np.flatnonzero((values != document.values).ravel()).tolist():
+        parts[2 * place + 1] = f"{values.flat[place]:.6f}"
+    return replace(document, text=document.text[:start] + "".join(parts), values=values)
+
+
+def _moves(document: Bvh) -> bool:
+    held = zip(document.parents, document.channels, strict=True)
+    return any(parent >= 0 and not all(r for r, _ in channels) for parent, channels in held)
+
+
+def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) -> Array:
+    r"""Place joints and End Sites of every frame by forward kinematics.
+
+    A joint's frame in its parent's is the translation by its offset and position channels, then the rotations in the
+    order of its channels, each about axes that the one before has turned: :math:`T = T(o) R_a R_b R_c` (Meredith &
+    Maddock 2001).
+
+    Parameters
+    ----------
+    document : Bvh
+    absolute : bool
+        Whether position channels stand in place of the offset, or are added to it.
+    values : array (T, C), optional
+        Other values than the file's.
+
+    Returns
+    -------
+    array (T, P, 3)
+        In the file's unit and axes.
+    """
+    values = document.values if values is None else values
+    points = np.empty((len(values), len(document.names), 3))
+    rotations: list[Array | None] = []
+    for k, (parent, channels) in enumerate(zip(document.parents, document.channels, strict=True)):
+        local = np.tile(document.offsets[k], (len(values), 1))
+        R = turn = rotations[parent] if parent >= 0 else None
+        for (rotates, axis), value in zip(channels, values[:, document.columns[k]].T, strict=True):
+            if rotates:
+                one = coordinate_rotation(axis, np.radians(value))
+                R = one if R is None else R @ one
+            elif absolute:
+                local[:, axis] = value
+            else:
+                local[:, axis] += value
+        if turn is not None:
+            local = np.einsum("tij,tj->ti", turn, local)
+        points[:, k] = local if parent < 0 else points[:, parent] + local
+        rotations.append(R)
+    return points
+
+
+def positions_are_absolute(document: Bvh) -> bool:
+    """Tell whether position channels stand in place of the offsets, or are added to them.
+
+    The notes on the format add the two; MotionBuilder, Blender and the data sets made with them (LAFAN1,
+    Bandai-Namco) write the joint's whole place into its position channels, beside the same offset. Channels of joints
+    below a root that keep near the offset decide; a root alone would only stand elsewhere.
+    """
+    small = SMALL_OFFSET_SHARE * float(np.abs(document.offsets).max(initial=0.0))
+    votes: dict[bool, list[bool]] = {True: [], False: []}
+    for k, channels in enumerate(document.channels):
+        near = []
+        for (rotates, axis), value in zip(channels, document.values[:, document.columns[k]].T, strict=True):
+            offset = document.offsets[k, axis]
+            if not rotates and abs(offset) > small:
+                near.append(bool(abs(np.median(value) - offset) < 0.5 * abs(offset)))
+        if near:
+            votes[document.parents[k] < 0].append(any(near))
+    decisive = votes[False] or votes[True]
+    return bool(decisive) and 2 * sum(decisive) >= len(decisive)
+
+
+def _unit(document: Bvh, points: Array, source: str, notes: list[str]) -> tuple[str, float]:
+    """Find the unit by the longest chain of bones, which no posture changes."""
+    length = _longest_chain(points[:: max(1, len(points) // FRAMES_SAMPLED)], document.parents)
+    unit = min(UNITS, key=lambda name: abs(np.log(max(length * UNITS[name] / CHAIN_METRES, 1e-300))))
+    metres = length * UNITS[unit]
+    if not CHAIN_BOUNDS[0] <= metres <= CHAIN_BOUNDS[1]:
+        got = f"a skeleton whose longest chain of bones has {length:.4g} units"
+        raise refusal(source, "unit", got, f"{CHAIN_METRES:g} m in {', '.join(UNITS)}", "state it (--unit)")
+    words = "CMU's unit (an inch over 0.45)" if unit == "0.45 in" else unit
+    notes.append(f"lengths are in {words}: the longest chain of bones has {length:.4g} units, {metres:.2f} m")
+    return unit, UNITS[unit]
+
+
+def _longest_chain(points: Array, parents: tuple[int, ...]) -> float:
+    """Return the longest way along the bones between two ends of the tree, median over frames.
+
+    A root that has one child alone is a place in the world and no part of the body.
+    """
+    count = len(parents)
+    children = np.bincount([parent for parent in parents if parent >= 0], minlength=count)
+    bone, deepest, longest = np.zeros(count), np.zeros(count), 0.0
+    outside = set()
+    for k, parent in enumerate(parents):
+        if parent < 0 or parent in outside:
+            if children[k] == 1:
+                outside.add(k)
+        else:
+            bone[k] = np.median(np.linalg.norm(points[:, k] - points[:, parent], axis=-1))
+    for k in range(count - 1, -1, -1):
+        if parents[k] >= 0:
+            way = deepest[k] + bone[k]
+            longest = max(longest, deepest[parents[k]] + way)
+            deepest[parents[k]] = max(deepest[parents[k]], way)
+    return float(longest)

@@ -1,0 +1,281 @@
+"""C3D: the binary format of motion capture systems (Motion Lab Systems, *The C3D File Format User Guide*, c3d.org).
+
+Blocks of 512 bytes: a header whose words count points, analogue values and frames; parameters in groups; then the
+frames, each with four numbers a point (x, y, z and a residual, negative where the point was not seen) and the analogue
+values, as 16-bit integers if the scale is positive and as 32-bit floats if it is negative. Every count is compared with
+the length of the file before anything is read.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError, refusal, shown
+from posekit.formats.body_checks import UNIT_WORDS, points_motion
+from posekit.formats.files import write_bytes
+from posekit.formats.options import Options
+from posekit.formats.trc import one_recording, seconds
+from posekit.geometry import UP_AXES, Array
+
+if TYPE_CHECKING:
+    from posekit.motion import Motion
+
+BLOCK: Final = 512
+MAX_VALUES: Final = 100_000_000
+MAX_PARAMETERS: Final = 10_000
+#: Largest number that a word of the header holds.
+MAX_COUNT: Final = 65_535
+#: Bytes of a parameter's value by type: text, byte, 16-bit integer, 32-bit float.
+_SIZES: Final = {-1: 1, 1: 1, 2: 2, 4: 4}
+_SCREEN_X: Final = {"x": "+Y", "y": "+Z", "z": "+X"}
+_REMEDY: Final = "the file is cut off or damaged: export it again"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class C3d:
+    """Points (T, P, 3) of a C3D file in its unit, NaN where not seen; its rate; parameters by ``GROUP:NAME``."""
+
+    points: Array
+    rate: float
+    parameters: dict[str, Any]
+
+    def texts(self, name: str) -> list[str]:
+        """Return the texts of a parameter of the group POINT; empty if there are none."""
+        found = self.parameters.get(f"POINT:{name}", [])
+        return found if isinstance(found, list) else []
+
+
+def parse(data: bytes, source: str) -> C3d:
+    """Decode a C3D file.
+
+    Raises
+    ------
+    InputError
+        If it is none, holds no points, is cut off, or states more than it holds.
+    """
+
+    def damaged(field: str, got: str, expected: str) -> InputError:
+        return refusal(source, field, got, expected, _REMEDY)
+
+    if len(data) < 2 * BLOCK or data[1] != 0x50 or data[0] < 2:
+        raise damaged("", f"{len(data):,} bytes, first {data[:2].hex()}", "C3D, whose second byte is 50")
+    section = (data[0] - 1) * BLOCK
+    if section + 4 > len(data) or data[section + 3] not in (84, 85, 86):
+        raise damaged("header", f"block {data[0]} of {len(data) // BLOCK}", "a section of parameters")
+    processor = data[section + 3]
+    order = ">" if processor == 86 else "<"
+    count, analogues, first, last, _ = struct.unpack_from(f"{order}5H", data, 2)
+    scale, rate = (float(_floats(data[place : place + 4], processor)[0]) for place in (12, 20))
+    start = (struct.unpack_from(f"{order}H", data, 16)[0] - 1) * BLOCK
+    if count == 0:
+        raise damaged("POINT:USED", "no points", "points in space")
+    if not section < start <= len(data):
+        raise damaged("header", f"frames from byte {start:,}", "frames after the parameters")
+    parameters = _parameters(data, section + 4, start, processor, damaged)
+    stated = parameters.get("POINT:SCALE")
+    if isinstance(stated, np.ndarray) and stated.size:
+        scale = float(stated[0])
+    if not math.isfinite(scale) or scale == 0:
+        raise damaged("POINT:SCALE", f"{scale:g}", "a finite number that is not 0")
+    width = (4 * count + analogues) * (4 if scale < 0 else 2)
+    frames = _frames(parameters, first, last, len(data) - start, width, damaged)
+    if frames * width > 4 * MAX_VALUES or len(data) - start < frames * width:
+        got = f"{len(data) - start:,} bytes of frames"
+        raise damaged("", got, f"{frames * width:,} for {frames:,} frames of {count:,} points")
+    body = data[start : start + frames * width]
+    values: NDArray[Any] = _floats(body, processor) if scale < 0 else np.frombuffer(body, f"{order}i2")
+    values = values.reshape(frames, -1)[:, : 4 * count].reshape(frames, count, 4)
+    with np.errstate(invalid="ignore"):  # a NaN of the file is a missing point
+        points = values[..., :3].astype(np.float64)
+        points[~(values[..., 3] >= 0)] = np.nan
+    own = parameters.get("POINT:RATE")
+    rates = [float(own[0])] if isinstance(own, np.ndarray) and own.size else []
+    rate = next((one for one in (*rates, rate) if math.isfinite(one) and one > 0), math.nan)
+    return C3d(points=points * scale if scale > 0 else points, rate=rate, parameters=parameters)
+
+
+def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
+    """Decode 32-bit floats; DEC's (85) have their halves exchanged and four times the value."""
+    if processor != 85:
+        return np.frombuffer(data, ">f4" if processor == 86 else "<f4").astype(np.float32)
+    words = np.frombuffer(data, "<u2").astype(np.uint32).reshape(-1, 2)
+    return (words[:, 0] << 16 | words[:, 1]).view(np.float32) / np.float32(4)
+
+
+def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width: int, damaged: Any) -> int:
+    """Return the number of frames; a header counts to 65,535, and longer files say so in one of three other ways."""
+    count = last - first + 1
+    if count < 1:
+        raise damaged("header", f"frames {first} to {last}", "the last not before the first")
+    stated = [
+        int(parameters[name][0])
+        for name in ("POINT:FRAMES", "POINT:LONG_FRAMES")
+        if isinstance(parameters.get(name), np.ndarray)
+        and parameters[name].size
+        and 0 <= parameters[name][0] < 2**31
+    ]
+    ends = [parameters.get(f"TRIAL:ACTUAL_{name}_FIELD") for name in ("START", "END")]
+    words = [end for end in ends if isinstance(end, np.ndarray) and end.size >= 2]
+    if len(words) == 2:
+        begin, end = (int(low + 65536 * high) for low, high in (word[:2] for word in words))
+        stated.append(end - begin + 1)
+    longest = max(stated, default=0)
+    if longest > MAX_COUNT:
+        return longest
+    if last == MAX_COUNT and held - width * count >= width + BLOCK:
+        raise damaged("POINT:FRAMES", f"{last:,} frames or more", "the number in POINT:LONG_FRAMES")
+    return count
+
+
+def _parameters(data: bytes, place: int, end: int, processor: int, damaged: Any) -> dict[str, Any]:
+    """Return parameters by group and name, ``POINT:FRAMES``: lists of text, or arrays of numbers."""
+    order = ">" if processor == 86 else "<"
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, Any]] = []
+
+    def inside(at: int, bound: int) -> None:
+        if at > bound:
+            raise damaged(f"parameters, byte {place}", f"an end at byte {at}", f"one by byte {bound}")
+
+    while place + 2 <= end and data[place] != 0:
+        if len(groups) + len(found) > MAX_PARAMETERS:
+            raise damaged("parameters", f"more than {MAX_PARAMETERS:,}", "fewer")
+        length, group = struct.unpack_from("bb", data, place)
+        after_name = place + 2 + abs(length)
+        inside(after_name + 2, end)
+        name = data[place + 2 : after_name].decode("latin-1").strip().upper()
+        (offset,) = struct.unpack_from(f"{order}H", data, after_name)
+        after = after_name + offset if offset else end
+        inside(after, end)
+        if group < 0:
+            groups[-group] = name
+        else:
+            at = after_name + 2
+            inside(at + 2, after)
+            kind, ranks = struct.unpack_from("bB", data, at)
+            begin = at + 2 + ranks
+            if kind not in _SIZES:
+                raise damaged(f"parameters, byte {place}", f"type {kind}", "one of -1, 1, 2, 4")
+            inside(begin, after)
+            dimensions = tuple(data[at + 2 : begin])
+            stop = begin + math.prod(dimensions) * _SIZES[kind]
+            inside(stop, after)
+            found.append((group, name, _value(kind, dimensions, data[begin:stop], processor)))
+        if not offset:
+            break
+        place = max(after, after_name + 2)
+    for group, name, _ in found:
+        if group not in groups:
+            raise damaged("parameters", f"{shown(name)} in no group", "a group of each parameter")
+    return {f"{groups[group]}:{name}": value for group, name, value in found}
+
+
+def _value(kind: int, dimensions: tuple[int, ...], data: bytes, processor: int) -> Any:
+    if kind == -1:
+        length = max(dimensions[0] if dimensions else 1, 1)
+        text = data.decode("latin-1")
+        return [text[start : start + length].strip(" \0") for start in range(0, len(text), length)]
+    if kind == 4:
+        return _floats(data, processor).astype(np.float64)
+    return np.frombuffer(data, f"{'>' if processor == 86 else '<'}u{kind}").astype(np.float64)
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a document is a parsed C3D file."""
+    return isinstance(document, C3d)
+
+
+def read(document: C3d, path: str, options: Options) -> Motion:
+    """Make a motion of a C3D file's points; analogue channels are left out, and time begins at 0."""
+    count = document.points.shape[1]
+    names = document.texts("LABELS")
+    k = 2
+    while len(names) < count and (more := document.texts(f"LABELS{k}")):
+        names, k = [*names, *more], k + 1
+    names = [name or f"unnamed_{k}" for k, name in enumerate([*names, *[""] * count][:count], 1)]
+    if len(set(names)) != len(names):
+        names = [name if names.index(name) == k else f"{name}_{k}" for k, name in enumerate(names)]
+    word = next(iter(document.texts("UNITS")), "")
+    unit = UNIT_WORDS.get(word.casefold(), "")
+    up = next(iter(document.texts("Y_SCREEN")), "").casefold()
+    up = f"+{up}" if f"+{up}" in UP_AXES else up
+    return points_motion(
+        document.points,
+        names,
+        path,
+        options,
+        rate=document.rate,
+        unit=unit,
+        up=up if up in UP_AXES else "",
+        notes=[f"POINT:UNITS {shown(word)} is not known"] if word and not unit else [],
+        partial=True,
+    )
+
+
+def write(path: str | Path, motion: Motion, **_: Any) -> None:
+    """Write the points of one recording as C3D: 32-bit floats in metres, axes as they are.
+
+    The up axis goes into ``POINT:Y_SCREEN``; a missing point has the residual -1. Times become frames at the rate.
+
+    Raises
+    ------
+    InputError
+        If the motion has no points, several recordings, uneven times, or too many frames.
+    """
+    points, names, rate = one_recording(motion, "C3D"), motion.joint_names, motion.rate or 30.0
+    if len(motion) > MAX_COUNT - 1 or 4 * points.shape[1] * len(motion) > MAX_VALUES:
+        raise refusal(motion.source, "", f"{len(motion):,} frames", f"up to {MAX_COUNT - 1:,}", "cut it")
+    off: Array = np.abs(np.diff(seconds(motion)) * rate - 1)
+    if off.max(initial=0.0) > 0.01:
+        got = f"a step of {np.diff(seconds(motion))[int(np.argmax(off))]:.3g} s"
+        raise refusal(motion.source, "time", got, "even steps: C3D has no times", "write another format")
+    group: dict[str, tuple[int, Any]] = {
+        "USED": (2, [len(names)]),
+        "SCALE": (4, [-1.0]),
+        "DATA_START": (2, [0]),
+        "RATE": (4, [rate]),
+        "FRAMES": (2, [len(motion)]),
+        "LABELS": (-1, list(names)),
+        "DESCRIPTIONS": (-1, [""] * len(names)),
+        "UNITS": (-1, ["m"]),
+    }
+    if motion.up:
+        group |= {"X_SCREEN": (-1, [_SCREEN_X[motion.up[1]]]), "Y_SCREEN": (-1, [motion.up.upper()])}
+    analogue: dict[str, tuple[int, Any]] = {"USED": (2, [0]), "SCALE": (4, []), "RATE": (4, [0.0])}
+    groups = {"POINT": group, "ANALOG": analogue}
+    blocks = -(-len(_section(groups)) // BLOCK)
+    group["DATA_START"] = (2, [2 + blocks])
+    section = bytearray(_section(groups).ljust(blocks * BLOCK, b"\0"))
+    section[:4] = bytes((1, 0x50, blocks, 84))
+    header = struct.pack("<BBHHHHHfHHf", 2, 0x50, len(names), 0, 1, len(motion), 0, -1.0, 2 + blocks, 0, rate)
+    frames = np.zeros((len(motion), len(names), 4), dtype="<f4")
+    missing = np.asarray(np.isnan(points).any(axis=-1))
+    frames[..., :3] = np.where(missing[..., None], 0.0, points)
+    frames[..., 3] = np.where(missing, -1.0, 0.0)
+    write_bytes(path, header.ljust(BLOCK, b"\0") + bytes(section) + frames.tobytes())
+
+
+def _section(groups: dict[str, dict[str, tuple[int, Any]]]) -> bytes:
+    """Write groups of parameters: (type, values) by name."""
+    made = b"\0\0\0\0"
+    for number, (group, parameters) in enumerate(groups.items(), 1):
+        made += struct.pack("bb", len(group), -number) + group.encode() + struct.pack("<HB", 3, 0)
+        for name, (kind, values) in parameters.items():
+            if kind == -1:
+                width = max((len(one) for one in values), default=0) or 1
+                body = b"".join(one.encode("ascii", "replace").ljust(width) for one in values)
+                dimensions = bytes((width, len(values)))
+            else:
+                body = np.array(values, dtype={2: "<u2", 4: "<f4"}[kind]).tobytes()
+                dimensions = bytes((len(values),)) if len(values) != 1 else b""
+            body = struct.pack("bB", kind, len(dimensions)) + dimensions + body + b"\0"
+            made += struct.pack("bb", len(name), number) + name.encode()
+            made += struct.pack("<H", 2 + len(body)) + body
+    return made + b"\0\0"

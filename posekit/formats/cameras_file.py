@@ -1,0 +1,471 @@
+"""Cameras in files: OpenCV's YAML, XML and JSON, ROS's camera_info, NPZ arrays, and TOML of Pose2Sim and Anipose.
+
+All of these are named fields, spelled differently: one reader finds intrinsics, lens, pose and size under the names
+that are in use. Pose2Sim's tables have ``fisheye`` for every camera, metres, and a world whose z points up; Anipose's
+unit is that of its calibration board, mostly millimetres; Caliscope's ``rotation_count`` tells which way is up.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+from xml.etree import ElementTree
+
+import numpy as np
+
+from posekit.cameras import PinholeCamera
+from posekit.errors import CameraError, InputError, cut, one_line, refusal, shown
+from posekit.formats import json_file
+from posekit.formats.files import text, write_bytes
+from posekit.formats.node import Node, as_numbers
+from posekit.formats.options import Options
+from posekit.geometry import UP_AXES, Array, rotation_from_vector, vector_from_rotation
+from posekit.settings import UNITS
+
+Fields = Mapping[str, Any]
+
+#: Names of each field in use, upper or lower case, with or without underscores.
+FIELDS: Final = {
+    "K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix mtx k m",
+    "distortion": "distortion_coefficients distortion_coeffs distortion distortions dist_coeffs dist_coefs dist_coef "
+    "distcoef dist d",
+    "rotation": "rotation_matrix rotation_vector rotation rmat rot rvec r",
+    "translation": "translation_vector translation tvec t",
+    "size": "image_size img_size image_resolution resolution size",
+    "width": "image_width width w",
+    "height": "image_height height h",
+    "fisheye": "fisheye_model fisheye use_fisheye_model",
+    "model": "distortion_model camera_model model",
+    "name": "camera_name name id",
+}
+FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
+PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
+#: Lines of YAML: number, indentation, content.
+Lines = deque[tuple[int, int, str]]
+MAX_CAMERAS: Final = 100_000
+#: Largest distance of a camera from the world's origin at which a file without a unit is taken as metres.
+METRES_UP_TO: Final = 100.0
+#: Smallest distance at which it is taken as millimetres; below it, it could be centimetres as well.
+MILLIMETRES_FROM: Final = 1000.0
+#: Cosine between an axis of the world and the mean upward direction of the pictures, from which that axis is up.
+LEAST_UPRIGHT: Final = 0.8
+#: An entry of a map in YAML, a word in a list in brackets, and the words that are no text.
+_YAML_ENTRY: Final = re.compile(r"(\"[^\"]*\"|'[^']*'|[^:#&*\[\]{}\"'-][^:]*?)\s*:(?:\s+(.*))?$")
+_YAML_WORD: Final = re.compile(r"\"[^\"]*\"|'[^']*'|[^\[\]{},:\s\"'][^\[\]{},:\"']*")
+_WORDS: Final[dict[str, Any]] = {
+    **{"true": True, "false": False, "null": None, "~": None},
+    **{".nan": np.nan, ".inf": np.inf, "-.inf": -np.inf},
+}
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a document has intrinsics, in itself or one level below, or a field that is called so."""
+    if isinstance(document, list):
+        return any(isinstance(one, Mapping) and _suffixes(one) for one in document[:1])
+    if not isinstance(document, Mapping):
+        return False
+    below = [one for value in document.values() for one in (value if isinstance(value, list) else [value])]
+    called = [name for name in FIELDS["K"].split() if len(name) > len("mtx")]
+    held = [one for one in [document, *below] if isinstance(one, Mapping)]
+    return any(_suffixes(one) or isinstance(_named(one, tuple(called), ""), list | Mapping) for one in held)
+
+
+def read(document: Any, path: str | Path, options: Options) -> dict[str, PinholeCamera]:
+    """Read the cameras of a calibration.
+
+    Parameters
+    ----------
+    document : mapping or list
+        One camera's fields; several cameras' with the camera in the fields' names (``K_left``, ``M1``); or an object a
+        camera.
+    path : path
+        The file.
+    options : Options
+        `unit` of translations, and the world's `up` axis.
+
+    Returns
+    -------
+    dict of str to PinholeCamera
+        Lengths in metres.
+
+    Raises
+    ------
+    InputError
+        If there is no camera, or one that is impossible.
+    """
+    fields = {"cameras": document} if isinstance(document, list) else dict(document)
+    stem = Path(path).name.partition(".")[0]
+    held: list[tuple[str, Mapping[str, Any], str]] = []
+    if suffixes := _suffixes(fields):
+        plain = str(_value(fields, "name") or stem)
+        held = [(suffix or plain, fields, suffix) for suffix in suffixes]
+    else:
+        for key, entry in fields.items():
+            many = enumerate(entry[:MAX_CAMERAS]) if isinstance(entry, list) else [(key, entry)]
+            for number, one in many:
+                if isinstance(one, Mapping) and "" in _suffixes(one):
+                    held.append((str(_value(one, "name") or number), one, ""))
+    if not held:
+        there = one_line(", ".join(cut(str(key)) for key in list(fields)[:6])) or "nothing"
+        expected = f"one of {', '.join(FIELDS['K'].split())}"
+        got = f"no 3x3 matrix of intrinsics among {there}"
+        raise refusal(path, "camera_matrix", got, expected, "give a calibration")
+    metadata = fields.get("metadata")
+    stated = metadata.get("up", "") if isinstance(metadata, Mapping) else fields.get("up", "")
+    up = options.up or (stated if isinstance(stated, str) else "")
+    entries = [one for _, one, _ in held]
+    if not up and all("fisheye" in one and "matrix" in one for one in entries):
+        up = "+z"
+    unit = options.unit or _unit(entries, path)
+    found: dict[str, PinholeCamera] = {}
+    for name, entry, suffix in held:
+        if name in found:
+            raise refusal(path, "name", f"{shown(name)} twice", "each name once", "rename one of the two")
+        own = up or entry.get("up", "")
+        found[name] = _camera(entry, path, name, suffix, unit, own if own in UP_AXES else "")
+    axis = "" if up else _up_of_pictures([one.get("rotation_count") for one in entries], list(found.values()))
+    if not axis:
+        return found
+    return {name: replace(camera, up=axis) for name, camera in found.items()}
+
+
+def _camera(fields: Fields, path: str | Path, name: str, suffix: str, unit: str, up: str) -> PinholeCamera:
+    """Make one camera of its fields; those of several cameras have its suffix."""
+    place = f"{cut(name)}."
+    K = _numbers(_value(fields, "K", suffix), path, f"{place}K", 9).reshape(3, 3)
+    given = _value(fields, "distortion", suffix)
+    distortion = np.empty(0) if given is None else _numbers(given, path, f"{place}distortion")
+    fisheye = _is_fisheye(fields, path, place, suffix)
+    if not fisheye and 0 < len(distortion) < 4:  # some programs leave out coefficients that are 0
+        distortion = np.pad(distortion, (0, 4 - len(distortion)))
+    R, t = _pose(fields, path, place, suffix)
+    guess: dict[str, Any] = {
+        name: kind(fields[name])
+        for name, kind, accepted in (("how", str, str), ("deviation", float, int | float))
+        if isinstance(fields.get(name), accepted)
+    }
+    try:
+        return PinholeCamera(
+            name=name,
+            K=K,
+            distortion=distortion,
+            fisheye=fisheye,
+            size=_size(fields, path, place, suffix),
+            R=R,
+            t=None if t is None else t / UNITS[unit],
+            up=up if R is not None else "",
+            **guess,
+        )
+    except CameraError as error:
+        raise InputError(one_line(f"{path}: {error}")) from None
+
+
+def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
+    """Tell the unit of the cameras' positions by their distance from the origin."""
+    poses = [as_numbers(_value(one, "translation")) for one in entries]
+    farthest = max((float(np.linalg.norm(t)) for t in poses if t is not None and t.size == 3), default=0.0)
+    if farthest <= METRES_UP_TO or not np.isfinite(farthest):
+        return "m"
+    if farthest < MILLIMETRES_FROM:
+        got = f"a camera {farthest:.0f} from the origin, in no stated unit"
+        expected = f"metres, up to {METRES_UP_TO:.0f}"
+        raise refusal(path, "translation", got, expected, "give the unit with --unit cm or mm")
+    warnings.warn(
+        f"{path}: cameras up to {farthest:,.0f} from the origin: translations are taken as millimetres; "
+        "give another unit with --unit",
+        UserWarning,
+        stacklevel=2,
+    )
+    return "mm"
+
+
+def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Array | None, Array | None]:
+    """Return R and t; neither if one is missing: ROS calls its rectification R."""
+    given = _value(fields, "translation", suffix)
+    rotations = [
+        array
+        for alias in FIELDS["rotation"].split()
+        if (value := _named(fields, (alias,), suffix)) is not None
+        and (array := _numbers(value, path, f"{place}R")).size in (3, 9)
+    ]
+    if given is None or not rotations:
+        return None, None
+    t = _numbers(given, path, f"{place}t", 3)
+    R = max(rotations, key=lambda array: array.size)  # a matrix cannot be misread
+    return R.reshape(3, 3) if R.size == 9 else rotation_from_vector(R), t
+
+
+def _size(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[int, int] | None:
+    """Return width and height; None if the file has neither, or zero, as ROS writes an unknown size."""
+    for end in (suffix, ""):
+        sides = [_value(fields, name, end) for name in ("width", "height")]
+        if (pair := _value(fields, "size", end)) is not None:
+            pair = pair.get("data") if isinstance(pair, Mapping) else pair
+            sides = np.ravel(np.asarray(pair, dtype=object)).tolist()
+        if all(side is None for side in sides):
+            continue
+        pixels = as_numbers(sides)
+        if pixels is None or len(pixels) != 2 or (pixels % 1 != 0).any() or (pixels < 0).any():
+            raise refusal(path, f"{place}size", shown(sides), "width and height in pixels")
+        return (int(pixels[0]), int(pixels[1])) if pixels.all() else None
+    return None
+
+
+def _is_fisheye(fields: Fields, path: str | Path, place: str, suffix: str) -> bool:
+    flag, model = (
+        next((one for end in (suffix, "") if (one := _value(fields, name, end)) is not None), None)
+        for name in ("fisheye", "model")
+    )
+    if flag is not None and str(flag).casefold() not in ("0", "1", "true", "false"):
+        raise refusal(path, f"{place}fisheye", shown(flag), "true or false")
+    word = model.casefold() if isinstance(model, str) else ""
+    if word not in FISHEYE_MODELS + PLAIN_MODELS:
+        known = ", ".join(one for one in FISHEYE_MODELS + PLAIN_MODELS if one)
+        raise refusal(path, f"{place}distortion_model", shown(model), known, "undistort the pictures first")
+    return str(flag).casefold() in ("1", "true") or word in FISHEYE_MODELS
+
+
+def _up_of_pictures(turns: list[Any], cameras: list[PinholeCamera]) -> str:
+    """Return the world's axis that points up in pictures that are upright after quarter turns (``rotation_count``)."""
+    if not all(isinstance(turn, int) for turn in turns) or any(camera.R is None for camera in cameras):
+        return ""
+    in_camera = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    ups = [in_camera[turn % 4] @ camera.R for turn, camera in zip(turns, cameras, strict=True)]
+    mean = np.mean(ups, axis=0)
+    along = int(np.argmax(np.abs(mean)))
+    return "" if abs(mean[along]) < LEAST_UPRIGHT else ("+" if mean[along] > 0 else "-") + "xyz"[along]
+
+
+def _numbers(value: Any, path: str | Path, field: str, count: int | None = None) -> Array:
+    """Return numbers as a flat array: of lists, of arrays, or of OpenCV's object with rows, cols and data."""
+    data = value.get("data") if isinstance(value, Mapping) else value
+    array = Node(data, path, field).array().ravel()
+    declared = array.size
+    if isinstance(value, Mapping):
+        rows, cols = value.get("rows"), value.get("cols")
+        declared = rows * cols if isinstance(rows, int) and isinstance(cols, int) else -1
+    if array.size != declared or count not in (None, array.size):
+        expected = str(count) if count is not None else "as many as rows and cols say"
+        raise refusal(path, field, f"{array.size} numbers", expected, "write the file again")
+    return array
+
+
+def _suffixes(fields: Fields) -> list[str]:
+    """List the camera suffixes of fields that are 3x3 intrinsics: nothing, a number, or a word after an underscore."""
+    found = []
+    for key, value in fields.items():
+        low = str(key).casefold()
+        for alias in FIELDS["K"].split():
+            for spelling in (alias, alias.replace("_", "")):
+                rest = low.removeprefix(spelling)
+                part_of_name = rest == low or (rest and rest[0] not in "_-" and not rest.isdecimal())
+                if (low == spelling or not part_of_name) and _is_intrinsic(value):
+                    found.append(str(key)[len(spelling) :].lstrip("_-"))
+    return list(dict.fromkeys(found))
+
+
+def _is_intrinsic(value: Any) -> bool:
+    """Tell whether a value is a 3x3 matrix with 0, 0, 1 below: no projection matrix, rotation or table."""
+    array = as_numbers(value.get("data") if isinstance(value, Mapping) else value)
+    return array is not None and array.size == 9 and bool((array.ravel()[6:] == [0, 0, 1]).all())
+
+
+def _value(fields: Fields, field: str, suffix: str = "") -> Any:
+    return _named(fields, tuple(FIELDS[field].split()), suffix)
+
+
+def _named(fields: Fields, aliases: tuple[str, ...], suffix: str) -> Any:
+    """Return the first field of some names with a suffix; None if there is none."""
+    by_key = {str(key).casefold(): value for key, value in fields.items()}
+    end = suffix.casefold()
+    for alias in aliases:
+        for spelling in (alias, alias.replace("_", "")):
+            for key in (spelling,) if not suffix else (f"{spelling}_{end}", f"{spelling}{end}"):
+                if key in by_key:
+                    value = by_key[key]
+                    one = isinstance(value, np.ndarray) and value.size == 1
+                    return value.item() if one else value
+    return None
+
+
+def parse_xml(data: bytes, source: str) -> dict[str, Any]:
+    """Parse OpenCV's FileStorage XML into plain fields; entities and document types are refused."""
+    import defusedxml.ElementTree as safe
+
+    try:
+        root = safe.fromstring(text(data, source), forbid_dtd=True)
+    except (ElementTree.ParseError, ValueError) as error:  # refused entities are a ValueError
+        reason = cut(one_line(str(error)))
+        raise refusal(source, "", f"no plain XML: {reason}", "XML without a document type") from None
+    if root.tag != "opencv_storage":
+        raise refusal(source, "", f"the root element <{cut(root.tag)}>", "<opencv_storage>")
+    return {element.tag: _xml_value(element) for element in root}
+
+
+def _xml_value(element: ElementTree.Element) -> Any:
+    """Turn an element into an object, a list, numbers or a text."""
+    if len(element):
+        inner = {child.tag: _xml_value(child) for child in element}
+        return [_xml_value(child) for child in element] if set(inner) == {"_"} else inner
+    words = (element.text or "").split()
+    values = [_scalar(word) for word in words]
+    if not all(type(value) in (int, float) for value in values):
+        return (element.text or "").strip().strip('"')
+    return values[0] if len(values) == 1 and element.tag != "data" else values
+
+
+def parse_yaml(data: bytes, source: str) -> Any:
+    """Parse the part of YAML that OpenCV's FileStorage and ROS write: maps, lists, numbers and words.
+
+    Raises
+    ------
+    InputError
+        If the text holds anything else: anchors, aliases, blocks of text, several documents.
+    """
+    lines = deque(_yaml_lines(text(data, source), source))
+    if not lines:
+        raise refusal(source, "", "nothing but comments", "YAML", "check how it was written")
+    try:
+        value = _yaml_block(lines, source)
+    except RecursionError:
+        raise _bad_yaml(source, 1, "too many levels") from None
+    if lines:
+        raise _bad_yaml(source, lines[0][0], lines[0][2])
+    return value
+
+
+def _bad_yaml(source: str, line: int, got: str) -> InputError:
+    return refusal(source, f"line {line}", shown(got), "maps, lists, numbers and words")
+
+
+def _yaml_lines(content: str, source: str) -> Iterator[tuple[int, int, str]]:
+    """Yield line number, indentation and content of logical lines: a list in brackets may span several."""
+    parts: list[str] = []
+    start = indent = opened = 0
+    for number, raw in enumerate(content.splitlines(), 1):
+        line = re.sub(r"(^|\s)#.*", "", raw) if '"' not in raw and "'" not in raw else raw
+        if not parts:
+            if not line.strip() or line.startswith(("%", "---", "...")):
+                continue
+            start, indent = number, len(line) - len(line.lstrip(" "))
+        parts.append(line.strip())
+        plain = re.sub(r"\"[^\"]*\"|'[^']*'", "", line)
+        opened += sum(map(plain.count, "[{")) - sum(map(plain.count, "]}"))
+        if opened <= 0:
+            yield start, indent, " ".join(parts)
+            parts, opened = [], 0
+    if parts:
+        raise _bad_yaml(source, start, " ".join(parts))
+
+
+def _yaml_block(lines: Lines, source: str) -> Any:
+    """Take the block that starts at the first line, a list with dashes or a map, off the lines."""
+    indent, dashed = lines[0][1], _is_dashed(lines[0][2])
+    items, found = list[Any](), dict[str, Any]()
+    while lines and lines[0][1] == indent and _is_dashed(lines[0][2]) == dashed:
+        number, _, content = lines.popleft()
+        inner = content[1:].strip()
+        entry = _YAML_ENTRY.match(content)
+        if dashed and _YAML_ENTRY.match(inner):  # a map whose first entry is on the line of its dash
+            lines.appendleft((number, indent + len(content) - len(inner), inner))
+            items.append(_yaml_block(lines, source))
+        elif dashed:
+            items.append(_yaml_value(inner, number, indent, lines, source))
+        elif entry is not None and (name := entry[1].strip("\"'")) not in found:
+            found[name] = _yaml_value(entry[2] or "", number, indent, lines, source)
+        else:
+            raise _bad_yaml(source, number, content)
+    return items if dashed else found
+
+
+def _is_dashed(content: str) -> bool:
+    return f"{content} ".startswith("- ")
+
+
+def _yaml_value(content: str, number: int, indent: int, lines: Lines, source: str) -> Any:
+    """Parse the value on a line, JSON once its words are spelled so, or take the block below it."""
+    content = re.sub(r"^!!?[\w-]+\s*", "", content)
+    if not content:
+        below = lines and (lines[0][1] > indent or (lines[0][1] == indent and _is_dashed(lines[0][2])))
+        return _yaml_block(lines, source) if below else None
+    if content[0] not in "[{&*|>":
+        return _scalar(content)
+    try:
+        if content[0] in "&*|>":
+            raise ValueError("an anchor, an alias or a block of text")
+        spelled = _YAML_WORD.sub(lambda word: json.dumps(_scalar(word[0])), re.sub(r",\s*\]", "]", content))
+        return json.loads(spelled)
+    except (ValueError, RecursionError):
+        raise _bad_yaml(source, number, content) from None
+
+
+def _scalar(word: str) -> Any:
+    """Read a plain word: a number, a truth value, nothing, or a text."""
+    word = word.strip()
+    if word[:1] in "\"'" and word[-1:] == word[:1] and len(word) > 1:
+        return word[1:-1]
+    if word.casefold() in _WORDS:
+        return _WORDS[word.casefold()]
+    if re.fullmatch(r"[+-]?\d{1,18}", word):
+        return int(word)
+    return float(word) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", word) else word
+
+
+def write(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
+    """Write cameras: ``.toml`` as Pose2Sim reads them, or ``.json`` with an object a camera; metres.
+
+    The cause and the deviation of a guessed focal length go along in ``how`` and ``deviation``.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise, or the worlds of cameras in one TOML file point up differently.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".json", ".toml"):
+        raise refusal(path, "", f"cameras for {shown(suffix)}", "a .toml or a .json file", "rename it")
+    if suffix == ".json":
+        return json_file.write(path, {name: camera.fields() for name, camera in cameras.items()})
+    write_bytes(path, "".join(f"{line}\n" for line in _toml(path, cameras)).encode())
+
+
+def _toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> list[str]:
+    ups = {camera.up for camera in cameras.values()}
+    if len(ups) > 1:
+        got = f"worlds that point up along {', '.join(map(shown, sorted(ups)))}"
+        raise refusal(path, "up", got, "one world", "write one file each")
+    lines: list[str] = []
+    for number, (name, camera) in enumerate(cameras.items(), start=1):
+        lines += [f"[cam_{number:02d}]", f"name = {_quoted(name)}"]
+        if camera.size is not None:
+            lines.append(f"size = {_listed(camera.size)}")
+        lines.append(f"matrix = [ {', '.join(_listed(row) for row in camera.K)}]")
+        lens = np.zeros(4) if camera.distortion is None else camera.distortion
+        lines.append(f"distortions = {_listed(lens)}")
+        if camera.R is not None and camera.t is not None:
+            lines.append(f"rotation = {_listed(vector_from_rotation(camera.R))}")
+            lines.append(f"translation = {_listed(camera.t)}")
+        lines.append(f"fisheye = {'true' if camera.fisheye else 'false'}")
+        if camera.deviation:
+            lines += [f"how = {_quoted(camera.how)}", f"deviation = {camera.deviation!r}"]
+        lines.append("")
+    lines += ["[metadata]", "adjusted = false", "error = 0.0"]
+    if ups - {"", "+z"}:
+        lines.append(f'up = "{ups.pop()}"')
+    return lines
+
+
+def _quoted(word: str) -> str:
+    if one_line(word) != word:
+        raise refusal("camera", "name", shown(word), "characters that print", "rename it")
+    return json.dumps(word, ensure_ascii=False)
+
+
+def _listed(values: Any) -> str:
+    return "[ " + ", ".join(repr(float(value)) for value in values) + "]"

@@ -1,0 +1,140 @@
+"""``posekit.result/2``, which earlier versions wrote: its JSON and NPZ are turned into a document of ``result/3``.
+
+It has no answer in joints: the first of its representatives stands for it. Its postures are sorted by falling
+probability, and its covariances become the radius of each joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.formats import json_file
+from posekit.formats.node import Node
+from posekit.geometry import PER_METRE
+from posekit.recovery.answer import joint_radius
+from posekit.skeleton import JOINTS
+
+#: Entries of a symmetric matrix in a file: xx, xy, xz, yy, yz, zz.
+UPPER: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+#: Padded arrays of the NPZ by the field of a posture in JSON.
+POSTURE_ARRAYS: Final = {
+    **{"joints": "joints", "q": "q", "branches": "branches", "group": "groups"},
+    **{"probability": "probability", "scale": "scales"},
+}
+ROOT_FIELDS: Final = ("method", "estimate", "deviation", "lower", "upper")
+
+
+def document_of(root: Node) -> dict[str, Any]:
+    """Return the document of ``posekit.result/3`` for one of ``posekit.result/2``, in the file's unit."""
+    document = dict(root.value)
+    if "count" in document:
+        document = _unpadded(root)
+    frames = [dict(frame.object()) for frame in Node(document, root.source).at("frames").list(1)]
+    _add_radius([posture for frame in frames for posture in frame["postures"]])
+    places = []  # by frame: the new number of each posture
+    for frame in frames:
+        held, why, answer = frame["postures"], frame.get("rejected") or {}, frame.get("answer") or {}
+        order = np.argsort([-(one.get("probability") or 0.0) for one in held], kind="stable").tolist()
+        places.append({old: new for new, old in enumerate(order)})
+        chosen = [places[-1][old] for old in answer.get("representatives") or []]
+        frame["postures"] = [held[old] for old in order]
+        first = (chosen or [0])[0] if held else None
+        frame["answer"] = {
+            "joints": None if first is None else frame["postures"][first]["joints"],
+            "survivor": first,
+            "representatives": chosen,
+            "represented": answer.get("probability") or [],
+            "nearer": np.zeros(len(JOINTS) - 1),
+        }
+        frame["levels"] = tuple((frame.get("levels") or {}).get("motion") or ())
+        frame["reason"] = "" if held or not why else max(why, key=lambda name, why=why: why[name])
+        if (how := frame.get("root")) is not None:
+            frame["root"] = {name: how.get(name) for name in ROOT_FIELDS}
+    settings, per = document.get("settings") or {}, PER_METRE[document["unit"]]
+    pictures = settings.get("pictures") or ()
+    for frame, picture in zip(frames, pictures if len(pictures) == len(frames) else (), strict=False):
+        frame["picture"] = str(picture)
+    paths = (document.get("paths") or {}).get("paths") or []
+    return {
+        **{name: document[name] for name in ("unit", "configuration_names")},
+        "joint_names": list(JOINTS),
+        "settings": settings,
+        "lengths": {name: one * per for name, one in (settings.get("lengths") or {}).items()},
+        "camera": settings.get("camera"),
+        "frames": frames,
+        "paths": [_path(one, places) for one in paths],
+    }
+
+
+def _add_radius(postures: list[dict[str, Any]]) -> None:
+    """Give postures, in place, the fields of ``result/3``: chi2, radius, branch and inferred."""
+    refined = [one.get("refined") or {} for one in postures]
+    rows = [[row or [0.0] * 6 for row in one.get("covariance") or [None] * len(JOINTS)] for one in refined]
+    matrices = np.zeros((len(postures), len(JOINTS), 3, 3))
+    entries = np.nan_to_num(np.array(rows, dtype=np.float64).reshape(-1, len(JOINTS), 6))
+    matrices[..., UPPER[0], UPPER[1]] = matrices[..., UPPER[1], UPPER[0]] = entries
+    radius = joint_radius(matrices) if postures else ()
+    for posture, one, own in zip(postures, refined, radius, strict=True):
+        inferred = posture.get("inferred") or {}
+        posture |= {"chi2": one.get("chi2") or 0.0, "radius": own, "branch": posture.get("branches", "")}
+        posture |= {"group": posture.get("group", -1), "inferred": [name in inferred for name in JOINTS]}
+
+
+def _path(one: Mapping[str, Any], places: list[dict[int, int]]) -> dict[str, Any]:
+    smoothed, joints = (np.array(one[name], dtype=np.float64) for name in ("smoothed", "joints"))
+    return {
+        "probability": one["share"],
+        "survivor": [place.get(int(old), -1) for old, place in zip(one["survivor"], places, strict=True)],
+        "joints": np.where(np.isfinite(smoothed), smoothed, joints),
+    }
+
+
+def _unpadded(root: Node) -> dict[str, Any]:
+    """Return the JSON document of the padded arrays of an NPZ."""
+    held: Mapping[str, Any] = root.value
+    counts = root.at("count").array(None).astype(np.intp).tolist()
+
+    def parsed(name: str, default: Any) -> Any:
+        return json_file.parse(root.at(name).text().encode(), root.source) if name in held else default
+
+    of_posture = {ours: np.asarray(held[name]) for ours, name in POSTURE_ARRAYS.items() if name in held}
+    refined = [name for name in ("chi2", "covariance") if f"refined/{name}" in held]
+    of_refined = {name: held[f"refined/{name}"] for name in refined}
+    margins = {name.removeprefix("margins/"): held[name] for name in held if name.startswith("margins/")}
+    inferred, roots = (parsed(name, [None] * len(counts)) for name in ("inferred", "roots"))
+    reasons = np.asarray(held["rejected/names"]).tolist()
+    frames: list[dict[str, Any]] = []
+    for k, count in enumerate(counts):
+        postures = [{name: one[k, i].tolist() for name, one in of_posture.items()} for i in range(count)]
+        for i, posture in enumerate(postures):
+            posture["refined"] = {name: values[k, i].tolist() for name, values in of_refined.items()}
+            posture["margins"] = {name: float(values[k, i]) for name, values in margins.items()}
+            posture["inferred"] = inferred[k][i] if inferred[k] else {}
+        camera = {name: held[f"camera/{name}"][k] for name in ("f", "rotation", "position", "residual")}
+        rejected = zip(reasons, held["rejected/counts"][k].tolist(), strict=True)
+        frame = {
+            "time": float(held["time"][k]),
+            "camera": {name: None if np.isnan(values).any() else values for name, values in camera.items()},
+            "rejected": {name: count for name, count in rejected if count >= 0},
+            "levels": {"motion": [int(n) for n in held["levels/motion"][k] if n >= 0]},
+            "root": roots[k],
+            "postures": postures,
+        }
+        if "answer/representatives" in held:
+            rows = [int(n) for n in held["answer/representatives"][k] if n >= 0]
+            chances = np.asarray(held["answer/probability"][k])[: len(rows)].tolist()
+            frame["answer"] = {"representatives": rows, "probability": chances}
+        frame |= {name: held[name][k] for name in ("unlisted", "unlisted_probability") if name in held}
+        frames.append(frame)
+    names = ("survivor", "share", "joints", "smoothed")
+    paths = zip(*(held[f"paths/{name}"] for name in names), strict=True) if "paths/survivor" in held else ()
+    return {
+        "unit": root.at("unit").text(),
+        "configuration_names": list(root.at("configuration_names").texts()),
+        "settings": parsed("settings", {}),
+        "frames": frames,
+        "paths": {"paths": [dict(zip(names, one, strict=True)) for one in paths]},
+    }

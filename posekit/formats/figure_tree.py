@@ -1,0 +1,280 @@
+r"""The figure as animation programs have it: a tree from the pelvis, y up, facing z; written as BVH.
+
+The figure's URDF starts from the torso, whose origin is the neck. Here the tree starts from the pelvis (the hips):
+torso (turning about the pelvis), neck (the head), shoulders, elbows, hips, knees; wrists, ankles and head points turn
+nothing. With B from the URDF's axes (x forward, y left, z up) to these (x left, y up, z forward), a ball joint's
+:math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` is :math:`R_x(\alpha) R_z(\beta) R_y(\gamma)`: the angles of the joint, in
+its order.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from posekit.errors import refusal
+from posekit.formats.body_checks import METRES
+from posekit.formats.bvh import Bvh, holds
+from posekit.formats.files import write_bytes
+from posekit.formats.trc import one_recording, seconds
+from posekit.geometry import Array, rotation_from_quaternion, up_vector
+from posekit.geometry.rotations import coordinate_rotation, rotation_between, turned_near
+from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+    from posekit.motion import Motion
+
+#: From the URDF's axes to x left, y up, z forward.
+TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+#: Axes of the three angles of a joint.
+AXIS_ORDER: Final = (0, 2, 1)
+#: Cosine of the middle angle below which the first is arbitrary: choosing it turns the rotation by less than that.
+LOCKED_COSINE: Final = 1e-9
+#: Share of a step by which a frame may lie beside its place in an even sequence of times.
+UNEVEN_STEP_SHARE: Final = 0.1
+#: Names of the figure's joints in BVH, by which animation programs find their own characters' joints. A file's Neck may
+#: lie anywhere between the shoulders and the head; NeckBase is the figure's.
+NAMES: Final = {
+    **{"pelvis": "Hips", "torso": "Spine", "neck": "NeckBase", "head": "Head", "nose": "Nose"},
+    **{
+        f"{side}_{part}": f"{side.capitalize()}{name}"
+        for side in SIDES
+        for part, name in (
+            *(("shoulder", "Arm"), ("elbow", "ForeArm"), ("wrist", "Hand"), ("hip", "UpLeg")),
+            *(("knee", "Leg"), ("ankle", "Foot"), ("eye", "Eye"), ("ear", "Ear")),
+        )
+    },
+}
+
+
+class Node(NamedTuple):
+    """A place of the tree: its name, its parent's index, the points whose mean it is, the link that turns with it."""
+
+    name: str
+    parent: int
+    points: tuple[str, ...]
+    link: str
+
+
+def _nodes() -> tuple[Node, ...]:
+    nodes = [Node("pelvis", -1, ("pelvis",), "hips"), Node("torso", 0, ("pelvis",), "torso")]
+
+    def add(name: str, parent: str, link: str = "", points: tuple[str, ...] = ()) -> None:
+        nodes.append(Node(name, [node.name for node in nodes].index(parent), points or (name,), link))
+
+    add("neck", "torso", "head")
+    add("head", "neck", points=("right_ear", "left_ear"))
+    for name in HEAD_POINTS:
+        add(name, "head")
+    for upper, top, links in (
+        (("shoulder", "elbow", "wrist"), "torso", ("upper_arm", "forearm", "")),
+        (("hip", "knee", "ankle"), "pelvis", ("thigh", "shank", "")),
+    ):
+        for side in SIDES:
+            parent = top
+            for part, link in zip(upper, links, strict=True):
+                add(f"{side}_{part}", parent, f"{side}_{link}" if link else "")
+                parent = f"{side}_{part}"
+    return tuple(nodes)
+
+
+#: Depth first, as a file lists them.
+NODES: Final = _nodes()
+
+
+def figure_of(motion: Motion) -> tuple[Figure, Array]:
+    """Return a figure of the person's lengths and the configurations (T, nq) of a motion.
+
+    Stored configurations of the figure are used as they are; otherwise they are computed from the joints in closed
+    form. An unknown angle keeps the value of the nearest frame that has it; one that is never known stands at zero, or
+    at its limit next to zero.
+
+    Raises
+    ------
+    InputError
+        If a frame has no torso: then nothing hangs together.
+    """
+    from posekit.body import load_figure
+    from posekit.body.lengths import segment_lengths, shoulders_are_behind
+
+    figure = load_figure()
+    if motion.joints is not None:
+        joints = motion.figure_joints
+        lengths = segment_lengths(joints)
+        if any(abs(lengths.get(name, own) - own) > 1e-6 for name, own in figure.lengths.items()):
+            figure = figure.scaled(lengths, behind=shoulders_are_behind(joints))
+    own = motion.robot in ("figure", "stick_figure")
+    if own and motion.q is not None and motion.q.shape[1] == figure.model.nq:
+        q = np.array(motion.q)
+    elif motion.joints is not None:
+        q = np.array(figure.configurations(motion.figure_joints, motion.head).q)
+    else:
+        got = f"configurations of {motion.robot or 'a robot'}"
+        raise refusal(motion.source, "", got, "joints, or a figure's configurations", "write csv or npz")
+    lost = np.isnan(q[:, :7]).any(axis=1)
+    if lost.any():
+        frame = int(np.argmax(lost))
+        got = f"no torso in frame {frame} ({int(lost.sum())} of {len(q)} frames)"
+        raise refusal(motion.source, "joints", got, "neck, shoulders and pelvis in each", "write csv or npz")
+    rest = np.clip(0.0, figure.limits.lower, figure.limits.upper)
+    for k, neutral in zip(figure.angle_index, rest, strict=True):
+        known = np.flatnonzero(np.isfinite(q[:, k]))
+        middles = (known[1:] + known[:-1]) / 2
+        q[:, k] = q[known[np.searchsorted(middles, np.arange(len(q)))], k] if len(known) else neutral
+    return figure, q
+
+
+def rest_place(figure: Figure, node: Node) -> Array:
+    """Return the place (3,) of a node at the neutral configuration, metres, the URDF's axes, from the neck."""
+    return np.asarray(figure.neutral_points[[POINT[point] for point in node.points]].mean(axis=0))
+
+
+def offsets(figure: Figure) -> Array:
+    """Return each node's place in its parent's frame (21, 3), metres; the root's is zero."""
+    place = np.stack([rest_place(figure, node) for node in NODES])
+    steps = [place[k] - place[one.parent] if one.parent >= 0 else np.zeros(3) for k, one in enumerate(NODES)]
+    return np.asarray(np.stack(steps) @ TO_Y_UP.T)
+
+
+def placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
+    """Put configurations (T, nq) into the tree.
+
+    Returns
+    -------
+    root : array (T, 3)
+        The pelvis in the world, y up, metres.
+    angles : array (T, 21, 3)
+        Of each node against its parent (the first against the world), about x, z and y, radians.
+    """
+    W = up_turn(up or "+z")
+    R_torso = W @ rotation_from_quaternion(q[:, 3:7]) @ TO_Y_UP.T
+    pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
+    own = dict(zip(DOFS, (q[:, figure.angle_index] * figure.limits.sign).T, strict=True))
+    column = {"flexion": 0, "bending": 1, "abduction": 1, "rotation": 2}
+    angles = np.zeros((len(q), len(NODES), 3))
+    for k, node in enumerate(NODES):
+        for turn, place in column.items():
+            if f"{node.name}.{turn}" in own:
+                angles[:, k, place] = own[f"{node.name}.{turn}"]
+    # The URDF turns the hips against the torso; here the torso turns against the hips, and the hips are the root.
+    R_hips = euler_rotation(angles[:, 0])
+    angles[:, 1] = euler_angles(R_hips.transpose(0, 2, 1))
+    angles[:, 0] = euler_angles(R_torso @ R_hips)
+    return q[:, :3] @ W.T + R_torso @ pelvis, angles
+
+
+def up_turn(up: str) -> Array:
+    """Return the rotation (3, 3) that turns an up axis into +y, as `Motion.rotated` does."""
+    start, end = up_vector(up), up_vector("+y")
+    if np.allclose(start, -end):
+        return np.diag([1.0, -1.0, -1.0])
+    return np.asarray(np.round(rotation_between(start[None], end[None])[0]))
+
+
+def euler_rotation(angles: Array) -> Array:
+    """Return the rotations (..., 3, 3) of angles (..., 3), radians, in the order of `AXIS_ORDER`."""
+    x, z, y = (coordinate_rotation(axis, angles[..., k]) for k, axis in enumerate(AXIS_ORDER))
+    return np.asarray(x @ z @ y)
+
+
+def euler_angles(R: Array) -> Array:
+    """Return the angles (..., 3) of rotations (..., 3, 3), radians, the middle one within a quarter turn.
+
+    The first is taken out of the rotation before the last is read: where the middle one is a quarter turn the first is
+    arbitrary, and the last makes up for it.
+    """
+    a = np.arctan2(R[..., 2, 1], R[..., 1, 1])
+    cosine, sine = np.cos(a), np.sin(a)
+    b = np.arctan2(-R[..., 0, 1], cosine * R[..., 1, 1] + sine * R[..., 2, 1])
+    c = np.arctan2(sine * R[..., 1, 0] - cosine * R[..., 2, 0], cosine * R[..., 2, 2] - sine * R[..., 1, 2])
+    return np.stack([a, b, c], axis=-1)
+
+
+def continuous(angles: Array) -> Array:
+    """Choose among the angles (T, J, 3) of the same rotations those that jump least from frame to frame.
+
+    The first frame stays; no step is a full turn, and none goes to the other branch a + pi, pi - b, c + pi (Diebel
+    2006, *Representing Attitude*, section 5.6).
+    """
+    from posekit.body.angles import other_branch
+
+    angles = np.array(angles, dtype=np.float64)
+    if len(angles) < 2:
+        return angles
+    locked = np.abs(np.cos(angles[..., 1])) < LOCKED_COSINE
+    if locked.any():  # the first angle is that of the frame before; the last makes up for it
+        last = np.maximum.accumulate(np.where(locked, 0, np.arange(len(angles))[:, None]), axis=0)
+        held = np.take_along_axis(angles[..., 0], last, axis=0)
+        angles[..., 2] += np.where(locked, np.sin(angles[..., 1]) * (held - angles[..., 0]), 0.0)
+        angles[..., 0] = np.where(locked, held, angles[..., 0])
+    # A frame's branch against the one before is the same for both branches of that one: parity adds up.
+    step = turned_near(np.diff(angles, axis=0), 0.0)
+    other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)
+    odd = np.zeros(angles.shape[:2], dtype=bool)
+    odd[1:] = np.cumsum((other**2).sum(axis=-1) < (step**2).sum(axis=-1), axis=0) % 2 == 1
+    angles[odd] = other_branch(angles[odd])
+    return np.unwrap(angles, axis=0)
+
+
+def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -> None:
+    """Write one recording as BVH, y up; a motion that came from BVH keeps its hierarchy, names and channels.
+
+    Joints of the figure have the channels Xrotation Zrotation Yrotation: flexion, abduction (or bending) and rotation.
+    Angles and places have 6 decimals.
+
+    Raises
+    ------
+    InputError
+        If the motion has several recordings, uneven times, or no body.
+    """
+    if isinstance(motion.document, Bvh) and holds(motion.document, motion):
+        write_bytes(path, motion.document.text.encode())
+        return
+    if unit not in METRES:
+        raise refusal(path, "unit", repr(unit), f"one of {', '.join(METRES)}", "state one of them")
+    if motion.joints is not None:
+        one_recording(motion, "BVH")
+    figure, q = figure_of(motion)
+    root, angles = placed(figure, q, motion.up)
+    scale = 1.0 / METRES[unit]
+    values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(q), -1)])
+    values = np.round(values, 6) + 0.0  # no -0.000000
+    hierarchy = "".join(_block(0, offsets(figure) * scale, 0))
+    head = f"HIERARCHY\n{hierarchy}MOTION\nFrames: {len(q)}\nFrame Time: {_even_step(motion, path):.10f}\n"
+    row = " ".join("%.6f" if column.any() else "%d" for column in values.T) + "\n"
+    write_bytes(path, (head + "".join(row % tuple(one) for one in values.tolist())).encode("ascii"))
+
+
+def _even_step(motion: Motion, path: str | Path) -> float:
+    """Return the seconds from frame to frame; refuse times that are not even."""
+    time = seconds(motion)
+    if len(time) == 1:
+        return 1 / 30
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    beside = np.abs(time - time[0] - step * np.arange(len(time))) / (step or np.nan)
+    if not beside.max() <= UNEVEN_STEP_SHARE:
+        got = f"steps from {np.diff(time).min():.4g} to {np.diff(time).max():.4g} s"
+        raise refusal(path, "time", got, "even steps: BVH has no other", "write csv, npz or trc")
+    return step
+
+
+def _block(k: int, steps: Array, depth: int) -> list[str]:
+    """Spell a node and what hangs on it; the tree is 6 deep."""
+    tab, node = "\t" * depth, NODES[k]
+    x, y, z = np.round(steps[k], 8) + 0.0
+    turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in AXIS_ORDER)
+    moves = "Xposition Yposition Zposition "
+    lines = [
+        f"{tab}{'JOINT' if depth else 'ROOT'} {NAMES[node.name]}\n{tab}{{\n",
+        f"{tab}\tOFFSET {x:.8f} {y:.8f} {z:.8f}\n",
+        f"{tab}\tCHANNELS {3 if depth else 6} {'' if depth else moves}{turns}\n",
+    ]
+    children = [child for child, other in enumerate(NODES) if other.parent == k]
+    if not children:  # a reader expects an end; the figure has no hands and no feet, so it has no length
+        lines.append(f"{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0.0 0.0 0.0\n{tab}\t}}\n")
+    for child in children:
+        lines += _block(child, steps, depth + 1)
+    return [*lines, f"{tab}}}\n"]

@@ -1,0 +1,99 @@
+"""Whole files: read once under a size limit, unpacked if gzipped, and written completely or not at all."""
+
+from __future__ import annotations
+
+import difflib
+import gzip
+import os
+import secrets
+import stat
+import zlib
+from io import BytesIO
+from pathlib import Path
+from typing import Final
+
+from posekit.errors import InputError, TooLargeError, refusal
+
+#: Bytes of a file, packed and unpacked: a larger one is cut into clips first.
+MAX_BYTES: Final = 2_000_000_000
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Read a regular file and unpack it if it is gzipped.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it cannot be read or unpacked, or it is larger than `MAX_BYTES`.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise refusal(path, "", "no regular file", "a file", "give the path of a file")
+            if status.st_size > MAX_BYTES:
+                raise _too_large(path)
+            data = file.read()
+    except IsADirectoryError:
+        raise refusal(path, "", "a folder", "a file", "give one of its files") from None
+    except OSError as error:
+        near = difflib.get_close_matches(Path(path).name, _names_beside(Path(path)), n=1)
+        remedy = f"did you mean {near[0]}?" if near else "check the path"
+        raise refusal(path, "", error.strerror or "an error", "a file that can be read", remedy) from None
+    except ValueError:  # a null character in the path
+        raise refusal("", "", repr(str(path)), "the path of a file", "check the path") from None
+    if data[:2] != b"\x1f\x8b":
+        return data
+    try:
+        with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
+            data = packed.read(MAX_BYTES + 1)
+    except (OSError, EOFError, zlib.error):
+        raise refusal(path, "", "a damaged gzip file", "a whole one", "copy or download it again") from None
+    if len(data) > MAX_BYTES:
+        raise _too_large(path)
+    return data
+
+
+def _names_beside(path: Path) -> list[str]:
+    """List the names in the folder of a file that is missing."""
+    try:
+        return [one.name for one in path.parent.iterdir()]
+    except OSError:
+        return []
+
+
+def text(data: bytes, source: str) -> str:
+    """Decode a text file: UTF-8, or UTF-16 with its mark; bytes of older encodings are kept as Latin-1."""
+    if b"\x00" in data[:1000] and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        raise refusal(source, "", "a binary file", "a text file", "check the file's name")
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    raise refusal(source, "", "a damaged text", "UTF-8", "save it as UTF-8")
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write a file whole or not at all, gzipped if its name ends in ``.gz``: a new file takes its place at the end."""
+    path = Path(path)
+    if len(data) > MAX_BYTES:
+        raise _too_large(path)
+    if path.suffix.lower() == ".gz":
+        data = gzip.compress(data, mtime=0)
+    new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        if path.exists() and not path.is_file():  # a device or a pipe is written to, not replaced
+            path.write_bytes(data)
+            return
+        new.write_bytes(data)
+        new.replace(path)
+    except OSError as error:
+        new.unlink(missing_ok=True)
+        why = error.strerror or "an error"
+        raise refusal(path, "", why, "a place to write", "check folder and rights") from None
+
+
+def _too_large(path: str | Path) -> InputError:
+    got = f"more than {MAX_BYTES:,} bytes"
+    return refusal(path, "", got, "less", "cut it into clips", error=TooLargeError)

@@ -1,0 +1,217 @@
+"""GLB: the figure's bodies, standing or moving, as glTF 2.0 in one binary file. It is written, not read.
+
+Khronos Group, *glTF 2.0 Specification* (2021). Metres, y up, right-handed. One node a joint, with the joint's name and
+its place; the capsule of its link hangs on it. A motion is one animation with a rotation for each node that turns and a
+translation for the pelvis, linear between frames. Numbers of an animation are 32-bit floats: so that they stay exact to
+1e-6 m far from the origin, the whole hangs on a node at whole metres near the person.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import json
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import refusal
+from posekit.formats.figure_tree import NODES, TO_Y_UP, euler_rotation, figure_of, offsets, placed, rest_place
+from posekit.formats.files import write_bytes
+from posekit.formats.trc import seconds
+from posekit.geometry import Array, Ints, cross, quaternion_from_rotation
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+    from posekit.motion import Motion
+
+#: Postures in one file: each is a body of 21 nodes.
+MAX_BODIES: Final = 1000
+#: Colours of one body: right orange, left blue, the trunk grey.
+SIDE_COLOURS: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
+#: Turn of the hue from one body to the next, so that neighbours differ however many there are.
+GOLDEN_TURN: Final = 0.6180339887498949
+#: Corners of a capsule's rings, and rings of a half sphere: faces lie inside the capsule by under 1 % of its radius.
+RING_CORNERS, HALF_SPHERE_RINGS = 24, 6
+_FLOAT, _UINT16, _VERTICES, _INDICES = 5126, 5123, 34962, 34963
+
+
+class _Glb:
+    """A glTF document that grows, and its numbers."""
+
+    def __init__(self) -> None:
+        self.document: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "posekit"},
+            "scene": 0,
+            "scenes": [{"nodes": []}],
+            "nodes": [],
+        }
+        self.data = bytearray()
+
+    def append(self, kind: str, item: dict[str, Any]) -> int:
+        items: list[dict[str, Any]] = self.document.setdefault(kind, [])
+        items.append(item)
+        return len(items) - 1
+
+    def accessor(self, values: NDArray[Any], kind: int = _FLOAT, target: int = 0, ends: bool = False) -> int:
+        """Add numbers (N,), (N, 3) or (N, 4) and return the index of their accessor."""
+        data = np.ascontiguousarray(values, dtype="<u2" if kind == _UINT16 else "<f4")
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": data.nbytes}
+        view |= {"target": target} if target else {}
+        table = data.reshape(len(data), -1)
+        accessor: dict[str, Any] = {
+            "bufferView": self.append("bufferViews", view),
+            "componentType": kind,
+            "count": len(data),
+            "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[table.shape[1]],
+        }
+        if ends:
+            accessor |= {"min": table.min(axis=0).tolist(), "max": table.max(axis=0).tolist()}
+        self.data += data.tobytes() + bytes(-data.nbytes % 4)
+        return self.append("accessors", accessor)
+
+    def packed(self) -> bytes:
+        """Return the file: a chunk of JSON and a chunk of numbers, both padded to 4 bytes."""
+        document = {**self.document, "buffers": [{"byteLength": len(self.data)}]}
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii")
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(self.data))
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text, struct.pack("<I4s", len(self.data), b"BIN\0")
+        return head + b"".join(chunks) + bytes(self.data)
+
+
+def write(path: str | Path, motion: Motion, **_: Any) -> None:
+    """Write a motion as GLB: one body that moves, or a standing body for each alternative posture.
+
+    Raises
+    ------
+    InputError
+        If the motion has no body, several recordings, or too many postures.
+    """
+    moving = motion.in_time or len(motion) == 1
+    if moving and len(np.unique(np.asarray(motion.clip))) > 1:
+        raise refusal(path, "", "several recordings", "one for GLB", "choose one")
+    if not moving and len(motion) > MAX_BODIES:
+        raise refusal(path, "", f"{len(motion)} postures", f"at most {MAX_BODIES}", "choose fewer")
+    figure, q = figure_of(motion)
+    root, angles = placed(figure, q, motion.up)
+    glb = _Glb()
+    origin = np.round((root.min(axis=0) + root.max(axis=0)) / 2)
+    world = glb.append("nodes", {"name": "origin", "translation": (origin + 0.0).tolist(), "children": []})
+    glb.document["scenes"][0]["nodes"] = [world]
+    turns, away, shapes, steps = _turns(angles), root - origin, _shapes(glb, figure), offsets(figure)
+    if moving:
+        colours = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
+        used = {link: colours[link.split("_")[0] if "_" in link else ""] for link in shapes}
+        first = _body(glb, world, steps, away[0], turns[0], shapes, used)
+        if len(q) > 1:
+            _animate(glb, path, first, away, turns, seconds(motion))
+    else:
+        for k in range(len(q)):
+            rgb = colorsys.hsv_to_rgb((0.58 + GOLDEN_TURN * k) % 1.0, 0.65, 0.85)
+            used = dict.fromkeys(shapes, _material(glb, f"posture_{k}", rgb))
+            _body(glb, world, steps, away[k], turns[k], shapes, used, f"posture_{k}")
+    write_bytes(path, glb.packed())
+
+
+def _turns(angles: Array) -> Array:
+    """Return each node's rotation as quaternions (T, 21, 4), x, y, z, w, with no change of sign along time."""
+    turns = quaternion_from_rotation(euler_rotation(angles))
+    back = np.einsum("tji,tji->tj", turns[1:], turns[:-1]) < 0
+    turns[1:] *= np.where(np.cumsum(back, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    return np.asarray(turns)
+
+
+def _material(glb: _Glb, name: str, rgb: tuple[float, ...]) -> int:
+    surface = {"baseColorFactor": [*rgb, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8}
+    return glb.append("materials", {"name": name, "pbrMetallicRoughness": surface})
+
+
+def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
+    """Add the capsules' triangles, each in its link's frame."""
+    at = {node.link: rest_place(figure, node) for node in NODES if node.link}
+    shapes = {}
+    for capsule in figure.capsules:
+        place = (figure.neutral_points - at[capsule.link])[None]
+        middle, axis = (row[0] @ TO_Y_UP.T for row in capsule.place(place))
+        half = capsule.half_length * axis
+        vertices, normals, faces = _capsule(middle - half, middle + half, capsule.radius)
+        shapes[capsule.link] = {
+            "attributes": {
+                "POSITION": glb.accessor(vertices, target=_VERTICES, ends=True),
+                "NORMAL": glb.accessor(normals, target=_VERTICES),
+            },
+            "indices": glb.accessor(faces.ravel(), _UINT16, _INDICES),
+        }
+    return shapes
+
+
+def _body(
+    glb: _Glb,
+    world: int,
+    steps: Array,
+    root: Array,
+    turns: Array,
+    shapes: dict[str, dict[str, Any]],
+    materials: dict[str, int],
+    label: str = "",
+) -> int:
+    """Add a body's nodes under the world and return the first; those of a named body hang on a node of that name."""
+    nodes = glb.document["nodes"]
+    if label:
+        nodes[world]["children"].append(len(nodes))
+        world = glb.append("nodes", {"name": label, "children": []})
+    first = len(nodes)
+    for k, node in enumerate(NODES):
+        entry: dict[str, Any] = {"name": f"{label}.{node.name}" if label else node.name}
+        entry["translation"] = ((root if node.parent < 0 else steps[k]) + 0.0).tolist()
+        if node.link:
+            entry["rotation"] = turns[k].tolist()
+        if node.link in shapes:
+            primitive = {**shapes[node.link], "material": materials[node.link]}
+            entry["mesh"] = glb.append("meshes", {"name": entry["name"], "primitives": [primitive]})
+        parent = world if node.parent < 0 else first + node.parent
+        nodes[parent].setdefault("children", []).append(glb.append("nodes", entry))
+    return first
+
+
+def _animate(glb: _Glb, path: str | Path, first: int, away: Array, turns: Array, time: Array) -> None:
+    """Add the key frames of a body."""
+    keys = (time - time[0]).astype(np.float32)
+    if not (np.diff(keys) > 0).all():
+        got = f"frames {float(np.diff(time).min()):g} s apart"
+        raise refusal(path, "time", got, "times that differ in 32-bit floats", "cut the motion")
+    inputs = glb.accessor(keys, ends=True)
+    rotations = [(k, "rotation", turns[:, k]) for k, node in enumerate(NODES) if node.link]
+    tracks = [(0, "translation", away), *rotations]
+    channels, samplers = [], []
+    for k, what, values in tracks:
+        samplers.append({"input": inputs, "interpolation": "LINEAR", "output": glb.accessor(values)})
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": first + k, "path": what}})
+    glb.append("animations", {"name": "motion", "channels": channels, "samplers": samplers})
+
+
+def _capsule(start: Array, end: Array, radius: float) -> tuple[Array, Array, Ints]:
+    """Mesh a capsule: vertices (V, 3), outward normals (V, 3), faces (F, 3) counter-clockwise from outside."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    across = cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across /= np.linalg.norm(across)
+    turn = 2 * np.pi * np.arange(RING_CORNERS) / RING_CORNERS
+    ring = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), cross(axis, across))
+    lift = np.pi / 2 * np.arange(HALF_SPHERE_RINGS) / HALF_SPHERE_RINGS
+    half = np.cos(lift)[:, None, None] * ring + np.sin(lift)[:, None, None] * axis  # from the equator up
+    below = half - 2 * np.sin(lift)[:, None, None] * axis
+    normals = np.concatenate([-axis[None], *below[::-1], *half, axis[None]])
+    centres = np.where(np.arange(len(normals))[:, None] < len(normals) // 2, start, end)
+    k = np.arange(RING_CORNERS)
+    after, last = (k + 1) % RING_CORNERS, 1 + 2 * HALF_SPHERE_RINGS * RING_CORNERS
+    faces = [np.stack([np.zeros_like(k), 1 + after, 1 + k], axis=-1)]
+    for low in range(1, last - RING_CORNERS, RING_CORNERS):
+        high = low + RING_CORNERS
+        faces.append(np.stack([low + k, low + after, high + after], axis=-1))
+        faces.append(np.stack([low + k, high + after, high + k], axis=-1))
+    top = last - RING_CORNERS
+    faces.append(np.stack([top + k, top + after, np.full_like(k, last)], axis=-1))
+    return centres + radius * normals, normals, np.concatenate(faces)

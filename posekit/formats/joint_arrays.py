@@ -1,0 +1,309 @@
+"""Points in space as arrays (NPZ, NPY, pickle) and tables (CSV, Parquet), with names or in a layout's order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import refusal, shown
+from posekit.formats.body_checks import UNIT_WORDS, points_motion
+from posekit.formats.files import write_bytes
+from posekit.formats.layout import by_order, load_layout
+from posekit.formats.npz_file import packed
+from posekit.formats.options import Options
+from posekit.formats.robot_tables import RATES, TIMES
+from posekit.formats.tables import Table, csv_text
+from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints
+from posekit.skeleton import HEAD_POINTS, JOINTS
+
+if TYPE_CHECKING:
+    from posekit.motion import Motion
+
+#: Arrays by name.
+Held = Mapping[str, Any]
+
+#: Names of arrays of points, in the order in which they are looked for.
+POINTS: Final = (
+    *("joints", "points", "posed_joints", "pred_keypoints_3d", "keypoints_3d", "keypoints3d", "positions_3d"),
+    *("poses_3d", "joints_3d", "joints3d", "kpts_3d", "pred_joints", "joint_positions", "positions"),
+    *("new_joints", "xyz", "arr_0", ""),
+)
+NAMES: Final = ("joint_names", "names", "keypoint_names", "point_names", "marker_names", "labels")
+UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
+LONG_COLUMNS: Final = ("name", "x", "y", "z")
+#: Columns of caliscope's triangulated points, of which 0 to 32 are MediaPipe's (mprib/caliscope).
+CALISCOPE_COLUMNS: Final = ("point_id", "x_coord", "y_coord", "z_coord")
+#: Columns of the recording or person of a row.
+PEOPLE: Final = ("clip", "person", "person_id", "track_id", "subject")
+FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
+MAX_VALUES: Final = 100_000_000
+_COORDINATE: Final = re.compile(r"(.+)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a document holds points in space."""
+    if isinstance(document, Table):
+        return _long_columns(document) is not None or bool(_wide_columns(document.names))
+    return isinstance(document, Mapping) and _key(document) is not None
+
+
+def _key(document: Held) -> str | None:
+    """Return the name of the array of points, or of the only array that could be one."""
+    arrays = {
+        name: value.ndim
+        for name, value in document.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim > 1
+    }
+    named = next((name for name in POINTS if name in arrays), None)
+    shaped = [name for name, rank in arrays.items() if rank > 2 and document[name].shape[-1] in (3, 4)]
+    return named if named is not None or len(shaped) != 1 else shaped[0]
+
+
+def read(document: Any, path: str, options: Options) -> Motion:
+    """Read points in space.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit; the error names the layouts with that number of points.
+    """
+    if isinstance(document, Table):
+        return _read_table(document, path, options)
+    key = _key(document)
+    points = _shaped(document.get(key), path, key or "")
+    frames, notes = len(points), []
+    names = tuple(str(one) for one in np.ravel(next((document[n] for n in NAMES if n in document), ())))
+    if names and len(names) != points.shape[1]:
+        got = f"{len(names)} names"
+        raise refusal(path, "joint_names", got, f"{points.shape[1]}, one a point", "correct the file")
+    if np.shape(document.get("head")) == (frames, len(HEAD_POINTS), 3):
+        points = np.concatenate([points, np.asarray(document["head"], dtype=np.float64)], axis=1)
+        names = (*(names or JOINTS), *HEAD_POINTS)
+    if "layout" in document and not names and not options.layout:
+        options = replace(options, layout=str(document["layout"]))
+    fields: dict[str, Any] = {"clips": tuple(str(one) for one in np.ravel(document.get("clip_names", ())))}
+    fields |= _counts(document, frames, len(fields["clips"]) or frames, path)
+    if "pred_cam_t" in document:  # SAM 3D Body
+        notes.append("points are relative to the body in each frame; pred_cam_t is left out")
+    if "in_world" in document or "pred_cam_t" in document:
+        fields["in_world"] = bool(document.get("in_world", False))
+    if np.shape(document.get("q"))[:1] == (frames,):
+        fields["q"] = np.asarray(document["q"], dtype=np.float64)
+        fields["q_names"] = tuple(str(one) for one in np.ravel(document.get("configuration_names", ())))
+        fields["robot"] = options.urdf or str(document.get("robot", "figure"))
+    fields["rate"], fields["time"] = _times(document, fields.get("clip"), frames, path)
+    for name, known in (("unit", UNIT_WORDS), ("up", UP_WORDS)):
+        fields[name] = _word(document, name, known, path)
+    custom = "+y" if "clip_fps" in document else ""
+    return points_motion(points, names, path, options, up_by_custom=custom, notes=notes, **fields)
+
+
+def _shaped(values: Any, path: str, key: str) -> Array:
+    """Return points (T, P, 3) of an array (T, P, 3), (1, T, P, 3), (T, 3 P) or (T, P, 4) with a confidence."""
+    points = np.asarray(values, dtype=np.float64)
+    if points.ndim == 4 and 1 in points.shape[:2]:
+        points = points[0] if points.shape[0] == 1 else points[:, 0]
+    if points.ndim == 2 and points.shape[1] == 3 and by_order(len(points)):
+        points = points[None]  # one posture
+    elif points.ndim == 2 and points.shape[1] % 3 == 0 and by_order(points.shape[1] // 3):
+        points = points.reshape(len(points), -1, 3)
+    if points.ndim == 3 and points.shape[2] == 4:
+        points = np.where(points[..., 3:] > 0, points[..., :3], np.nan)
+    if points.ndim != 3 or points.shape[2] != 3 or not len(points):
+        near = ", ".join(layout.name for count in points.shape[1:] for layout in by_order(count))
+        expected = "(frames, points, 3)" + (f"; {near} have so many points" if near else "")
+        flat = points.shape[-1:] == (2,)
+        remedy = "these are points in pictures: recover them" if flat else "name them with --layout"
+        raise refusal(path, key or "array", f"shape {points.shape}", expected, remedy)
+    if (np.abs(points) > FARTHEST_COORDINATE).any():
+        raise refusal(
+            path, key or "array", "a number too large", f"coordinates below {FARTHEST_COORDINATE:g}"
+        )
+    return points
+
+
+def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Ints]:
+    """Return the recording and the number of each frame, where a file has them."""
+    found = {}
+    for key, most in (("clip", clips), ("frame", 2**53)):
+        values = np.asarray(document.get(key, ()))
+        if key in document and values.shape == (frames,) and values.dtype.kind in "iu":
+            found[key] = values.astype(np.intp)
+        if key in document and (key not in found or found[key].min() < 0 or found[key].max() >= most):
+            got, expected = f"{values.dtype} {values.shape}", f"{frames} whole numbers from 0, below {most}"
+            raise refusal(path, key, got, expected, "correct the file")
+    return found
+
+
+def _times(held: Held, clip: Ints | None, frames: int, path: str) -> tuple[float | None, Array | None]:
+    """Return the file's rate and times; recordings that have each their own rate have times made of it."""
+    time = next((np.ravel(held[name]) for name in TIMES if name in held), None)
+    if time is not None and (time.dtype.kind not in "iuf" or len(time) != frames):
+        raise refusal(path, "time", f"{len(time)} of {time.dtype}", f"{frames} numbers", "correct the file")
+    rates = np.ravel(next((held[name] for name in ("clip_fps", *RATES) if name in held), ()))
+    rates = rates.astype(np.float64) if rates.dtype.kind in "iuf" else np.empty(0)
+    if time is None and clip is not None and clip.max() < rates.size and len(np.unique(rates)) > 1:
+        starts = np.array([np.argmax(clip == index) for index in range(rates.size)])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            time = (np.arange(frames) - starts[clip]) / np.where(rates > 0, rates, np.nan)[clip]
+    return (float(rates[0]) if rates.size else None), None if time is None else time.astype(np.float64)
+
+
+def _word(document: Held, key: str, known: Mapping[str, str], path: str) -> str:
+    word = str(np.ravel(document.get(key, ""))[0]).strip().casefold()
+    if word and word not in known:
+        raise refusal(path, key, shown(word), f"one of {', '.join(known)}", "correct the file")
+    return known.get(word, "")
+
+
+def _long_columns(table: Table) -> tuple[str, ...] | None:
+    """Return the columns of a table with a row a frame and point: the point and its three coordinates."""
+    return next((one for one in (LONG_COLUMNS, CALISCOPE_COLUMNS) if set(one) <= set(table.names)), None)
+
+
+def _wide_columns(names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the points whose three coordinates are among the columns of a table, and their columns."""
+    found: dict[str, dict[str, str]] = {}
+    for column in names:
+        if match := _COORDINATE.fullmatch(column):
+            found.setdefault(match[1], {}).setdefault(match[2].lower(), column)
+    return {name: [axes[axis] for axis in "xyz"] for name, axes in found.items() if set(axes) == set("xyz")}
+
+
+def _read_table(table: Table, path: str, options: Options) -> Motion:
+    names = [name for name in table.names if name]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise refusal(path, "columns", f"{shown(twice)} twice", "each name once", "rename one of the two")
+    time_name = next((name for name in names if name.casefold() in TIMES), None)
+    frame_name = next((name for name in FRAMES if name in names), None)
+    who = next((table.texts(name) for name in PEOPLE if name in names), [])
+    long = _long_columns(table)
+    if long:
+        points, labels, rows = _long(table, long, frame_name or time_name, who, path)
+    else:
+        columns = _wide_columns(names)
+        labels = tuple(columns)
+        flat = [table.checked(column) for axes in columns.values() for column in axes]
+        points = np.stack(flat, axis=1).reshape(-1, len(labels), 3)
+        rows = np.arange(len(points))
+    if not len(rows):
+        raise refusal(path, "", "no rows", "a row a frame", "check how it was written")
+    fields: dict[str, Any] = {}
+    if who:
+        kept = [who[row] for row in rows.tolist()]
+        fields["clips"] = tuple(dict.fromkeys(kept))
+        fields["clip"] = np.array([fields["clips"].index(one) for one in kept], dtype=np.intp)
+    number = table.checked(frame_name)[rows] if frame_name else np.full(len(rows), np.nan)
+    if np.isfinite(number).all():
+        # Frames that were left out keep their place; each recording counts from 0.
+        clip = fields.get("clip", np.zeros(len(rows), dtype=np.intp))
+        first = np.array([number[clip == index].min() for index in range(clip.max() + 1)])
+        fields["frame"] = (number - first[clip]).astype(np.intp)
+    fields |= {name: table.about[name] for name in ("unit", "up") if name in table.about}
+    if "in_world" in table.about:
+        fields["in_world"] = table.about["in_world"] == "1"
+    if long is CALISCOPE_COLUMNS:
+        fields["layout"] = load_layout("mediapipe_33")
+    if time_name:
+        fields["time"] = table.checked(time_name)[rows]
+    return points_motion(points, labels, path, options, **fields)
+
+
+def _long(
+    table: Table, columns: tuple[str, ...], frame_name: str | None, who: list[str], path: str
+) -> tuple[Array, tuple[str, ...], Ints]:
+    """Return points (T, P, 3) of a table with a row a frame and point, their names, the first row of each frame."""
+    if frame_name is None:
+        raise refusal(path, "columns", shown(", ".join(table.names)), "a column frame or time", "add it")
+    if columns is CALISCOPE_COLUMNS:
+        labels = load_layout("mediapipe_33").points
+        index = table.checked(columns[0])
+        used = (index >= 0) & (index < len(labels))
+        point = np.where(used, index, 0).astype(np.intp)
+    else:
+        words = table.texts(columns[0])
+        labels = tuple(dict.fromkeys(words))
+        place = {name: k for k, name in enumerate(labels)}
+        point, used = np.array([place[word] for word in words]), np.ones(len(words), dtype=bool)
+    frame = table.checked(frame_name)
+    used &= np.isfinite(frame)
+    order = {name: k for k, name in enumerate(dict.fromkeys(who))}
+    person = np.array([order[one] for one in who]) if who else np.zeros(len(frame))
+    if not used.any():
+        raise refusal(path, "", "no point of the body", "rows of points", "check how it was written")
+    pairs = np.stack([person, frame], axis=1)[used]
+    keys, first, row = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    if len(keys) * len(labels) * 3 > MAX_VALUES:
+        got = f"{len(keys):,} frames of {len(labels):,} points"
+        raise refusal(path, "", got, f"at most {MAX_VALUES:,} numbers", "cut it into clips")
+    cells, counts = np.unique(row.reshape(-1) * len(labels) + point[used], return_counts=True)
+    if (counts > 1).any():
+        frame_index, k = divmod(int(cells[np.argmax(counts > 1)]), len(labels))
+        where = f"frame {keys[frame_index, 1]:g}"
+        raise refusal(path, where, f"{shown(labels[k])} twice", "each point once a frame", "remove one")
+    points = np.full((len(keys), len(labels), 3), np.nan)
+    points[row.reshape(-1), point[used]] = np.stack([table.checked(one) for one in columns[1:]], axis=1)[used]
+    return points, labels, np.flatnonzero(used)[first]
+
+
+def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:
+    """Write a motion as NPZ without pickles, nothing lost: points, configurations, times, clips, frames, axes."""
+    arrays: dict[str, Any] = {
+        "time": motion.time,
+        "frame": np.asarray(motion.frame, dtype=np.int64),
+        "clip": np.asarray(motion.clip, dtype=np.int64),
+        "clip_names": np.array(_clip_names(motion), dtype=np.str_),
+        "up": np.array(motion.up),
+        "unit": np.array("m"),
+        "in_world": np.array(motion.in_world),
+    }
+    if motion.joints is not None:
+        arrays |= {"joints": motion.joints, "joint_names": np.array(motion.joint_names, dtype=np.str_)}
+    if motion.q is not None:
+        arrays |= {"q": motion.q, "configuration_names": np.array(motion.q_names, dtype=np.str_)}
+        arrays["robot"] = np.array(motion.robot)
+    write_bytes(path, packed(arrays))
+
+
+def _clip_names(motion: Motion) -> tuple[str, ...]:
+    count = int(np.max(np.asarray(motion.clip))) + 1
+    return tuple(motion.clips[k] if k < len(motion.clips) else str(k) for k in range(count))
+
+
+def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
+    """Return a motion's columns, a row a frame: time, clip if there are several, ``neck_x``, …, or its q by names."""
+    clip = np.asarray(motion.clip)
+    columns: dict[str, NDArray[Any]] = {}
+    if not motion.in_time and len(motion) > 1:
+        columns["frame"] = np.asarray(motion.frame)
+    columns["time"] = np.asarray(motion.time)
+    if clip.max() > 0:
+        columns["clip"] = np.array(_clip_names(motion))[clip]
+    if motion.joints is not None:
+        for k, name in enumerate(motion.joint_names):
+            columns |= {f"{name}_{axis}": motion.joints[:, k, place] for place, axis in enumerate("xyz")}
+    elif motion.q is not None:
+        names = motion.q_names or [f"q_{k}" for k in range(motion.q.shape[1])]
+        columns |= dict(zip(names, motion.q.T, strict=True))
+    return columns
+
+
+def write_csv(path: str | Path, motion: Motion, **_: Any) -> None:
+    """Write a motion's points (or configurations) as CSV or TSV, a row a frame; metres, seconds, radians."""
+    tabs = Path(path).name.lower().removesuffix(".gz").endswith(".tsv")
+    write_bytes(path, csv_text(columns_of(motion), "\t" if tabs else ",").encode())
+
+
+def write_parquet(path: str | Path, motion: Motion, **_: Any) -> None:
+    """Write a motion's columns as Parquet, with its axes in the metadata."""
+    from posekit.formats.parquet import packed_table
+
+    about = {"up": motion.up, "unit": "m", "in_world": str(int(motion.in_world)), "robot": motion.robot}
+    write_bytes(path, packed_table(columns_of(motion), about))

@@ -1,0 +1,148 @@
+"""JSON: parse bytes that may be damaged, and write documents whose arrays hold NaN."""
+
+from __future__ import annotations
+
+import gc
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError, cut, refusal, shown
+from posekit.formats.files import text, write_bytes
+
+#: Bytes of JSON that are parsed or written: in memory a parsed document takes about ten times as many.
+MAX_JSON_BYTES: Final = 500_000_000
+
+#: Bytes of a file that somebody may have edited by hand, whose keys are checked for repetition: it costs a tenth.
+MAX_BY_HAND: Final = 1_000_000
+
+
+@contextmanager
+def without_collection() -> Iterator[None]:
+    """Pause the collection of cyclic garbage: documents of millions of lists have none, and it takes half the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def parse(data: bytes, source: str | Path) -> Any:
+    """Parse a JSON file.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the file, UTF-8.
+    source : path
+        The file, for errors.
+
+    Returns
+    -------
+    object
+        Lists, objects, strings, numbers, booleans and None. NaN and infinite numbers are kept; a reader refuses them
+        where they mean nothing.
+
+    Raises
+    ------
+    InputError
+        If the file is empty, too large, malformed, nests too deeply, or repeats a key within one object.
+    """
+    if len(data) > MAX_JSON_BYTES:
+        raise _too_large(source)
+    if not data.strip():
+        raise refusal(source, "", "an empty file", "JSON", "check how it was written")
+    spelled = text(data, str(source))
+    try:
+        with without_collection():
+            return json.loads(spelled, object_pairs_hook=_unique if len(data) < MAX_BY_HAND else None)
+    except _RepeatedKeyError as error:
+        raise refusal(source, str(error), "the same key twice in one object", "one", "remove one") from None
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno} column {error.colno}"
+        rest = spelled[error.pos : error.pos + 20]
+        got = shown(rest) if rest else "the end of the file"
+        raise refusal(
+            source, where, got, f"JSON ({error.msg[0].lower()}{error.msg[1:]})", "correct the file there"
+        ) from None
+    except RecursionError:
+        raise refusal(source, "", "values nested too deeply", "at most 900 levels", "flatten it") from None
+    except ValueError as error:  # an integer of more digits than Python converts
+        raise refusal(source, "", cut(str(error)), "numbers of ordinary length") from None
+
+
+class _RepeatedKeyError(Exception):
+    """Raised inside the parser, which has no file name."""
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        keys = [key for key, _ in pairs]
+        raise _RepeatedKeyError(cut(next(key for key in keys if keys.count(key) > 1)))
+    return found
+
+
+def write(path: str | Path, head: dict[str, Any], name: str = "", items: Iterable[Any] = ()) -> None:
+    """Write ``{**head, name: [items]}`` as JSON with one entry and one item a line, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        ``.json``, or ``.json.gz`` for a packed file.
+    head : dict
+        Entries of the document, without NaN: see `nullable`.
+    name : str
+        Key of the long list; empty if the document has none.
+    items : iterable
+        Members of the list.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or would be too large to be read again.
+    """
+    data = bytearray()
+    with without_collection():
+        for piece in _pieces(head, name, items):
+            data += piece.encode()
+            if len(data) > MAX_JSON_BYTES:
+                raise _too_large(path)
+    write_bytes(path, bytes(data))
+
+
+def _pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[str]:
+    spell = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
+    yield "{\n" + ",\n".join(f" {spell(key)}: {spell(value)}" for key, value in head.items())
+    if name:
+        yield f",\n {spell(name)}: ["
+        separator = "\n  "
+        for item in items:
+            yield separator + spell(item)
+            separator = ",\n  "
+        yield "\n ]"
+    yield "\n}\n"
+
+
+def nullable(values: NDArray[Any] | float) -> Any:
+    """Turn an array into nested lists, or a number into a float, with None for NaN."""
+    array = np.asarray(values)
+    if array.dtype.kind != "f":
+        return array.tolist()
+    unknown = np.isnan(array)
+    if not unknown.any():
+        return array.tolist()
+    boxed = array.astype(object)
+    boxed[unknown] = None
+    return boxed.tolist()
+
+
+def _too_large(path: str | Path) -> InputError:
+    return refusal(path, "", f"over {MAX_JSON_BYTES / 1e6:.0f} MB of JSON", "less", "use .npz, or split it")

@@ -1,0 +1,163 @@
+"""Key points in tables: DeepLabCut's CSV, a row a picture (SLEAP, MediaPipe), and Caliscope's row a point."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.cameras.detections import Detections
+from posekit.errors import refusal, shown
+from posekit.formats.detection_rows import Rows, detections_of
+from posekit.formats.layout import load_layout, plain
+from posekit.formats.options import Options
+from posekit.formats.tables import Table, numbers
+from posekit.geometry import Array
+
+DEEPLABCUT_LEVELS: Final = ("scorer", "individuals", "bodyparts", "coords")
+#: Columns of Caliscope's ``xy_HOLISTIC.csv``: points 0 to 32 are MediaPipe's of the body, a port is a camera.
+CALISCOPE: Final = {
+    **{"sync_index": "frame", "port": "port", "frame_time": "time"},
+    **{"point_id": "id", "img_loc_x": "x", "img_loc_y": "y"},
+}
+PICTURE: Final = "frame frameidx frameid frameindex framenumber image imageid filename".split()
+TIME: Final = ("time", "timestamp", "seconds", "times")
+PERSON: Final = ("person", "personid", "track", "trackid", "individual")
+#: Names of columns, as `plain` reduces them.
+SURE: Final = ("visibility", "likelihood", "confidence", "score", "presence", "conf", "c")
+_WIDE: Final = re.compile(rf"(?P<name>.+?)[\s._-]+(?P<part>x|y|{'|'.join(SURE)})\Z", re.IGNORECASE)
+#: Named points that a row a picture has at least.
+LEAST_POINTS: Final = 4
+
+
+def looks_like(table: Table) -> bool:
+    """Tell whether a table holds key points in pictures; points in space have a z and no confidence."""
+    if table.head and table.head[0][:1] == ["scorer"]:
+        return True
+    names = table.names
+    if set(CALISCOPE) <= set(names):
+        return True
+    parts = _wide(names)
+    deep = any(re.search(r"[\s._-]z\Z", name, re.IGNORECASE) for name in names)
+    sure = any("sure" in columns for columns in parts.values())
+    return len(parts) >= LEAST_POINTS and (sure or not deep)
+
+
+def read(table: Table, path: str | Path, options: Options) -> Detections:
+    """Read key points from a table.
+
+    Raises
+    ------
+    InputError
+        If a cell is no number, or the names of the points fit no layout.
+    """
+    rows = Rows(source=str(path))
+    if table.head and table.head[0][:1] == ["scorer"]:
+        _deeplabcut(table, rows)
+    elif set(CALISCOPE) <= set(table.names):
+        _caliscope(table, rows)
+    else:
+        _row_a_picture(table, rows)
+    return detections_of(rows, options)
+
+
+def _deeplabcut(table: Table, rows: Rows) -> None:
+    """Columns (scorer[, individuals], bodyparts, coords); an empty cell is a missing point."""
+    rows.kind = "deeplabcut"
+    cells = [table.parted(line) for line in table.lines]
+    levels = {row[0]: row for row in cells[: len(DEEPLABCUT_LEVELS)] if row[0] in DEEPLABCUT_LEVELS}
+    body, coords = cells[len(levels) :], levels.get("coords", [])
+    lead = next((k for k, coord in enumerate(coords) if coord in ("x", "y", "likelihood")), len(coords))
+    odd = next((k for k, row in enumerate(cells) if len(row) != len(coords)), None)
+    if odd is not None or "bodyparts" not in levels or lead == len(coords):
+        got = "no rows bodyparts and coords" if odd is None else f"{len(cells[odd])} cells in row {odd + 1}"
+        raise refusal(rows.source, "", got, "DeepLabCut's header and rows of one length", "save it again")
+    values = numbers([cell for row in body for cell in row[lead:]]).reshape(len(body), len(coords) - lead)
+    individuals = levels.get("individuals", [""] * len(coords))
+    columns: dict[str, dict[str, dict[str, int]]] = {}
+    for k in range(lead, len(coords)):
+        part = columns.setdefault(individuals[k], {}).setdefault(levels["bodyparts"][k], {})
+        if coords[k] in part:
+            got = f"{shown(levels['bodyparts'][k])}: {coords[k]} twice"
+            raise refusal(rows.source, "bodyparts", got, "each once", "write one scorer's table alone")
+        part[coords[k]] = k - lead
+    # Unique points of a project have another set of names than the individuals: they are nobody.
+    most = max(columns.values(), key=len)
+    rows.names = tuple(most)
+    labels = [rows.picture("/".join(row[:lead])) for row in body]
+    people = [parts for parts in columns.values() if list(parts) == list(most)]
+    for person, parts in enumerate(people):
+        points, sure = _columns(values, parts)
+        for label, one, confidence in zip(labels, points, sure, strict=True):
+            rows.add(label, one, confidence, person=person if len(people) > 1 else None)
+
+
+def _columns(values: Array, parts: dict[str, dict[str, int]]) -> tuple[Array, Array]:
+    """Return points (T, P, 2) and confidences (T, P) of columns by point and part; NaN where there is none."""
+    padded = np.concatenate([values, np.full((len(values), 1), np.nan)], axis=1)
+    x, y, sure = (
+        padded[:, [next((part[name] for name in names if name in part), -1) for part in parts.values()]]
+        for names in (("x",), ("y",), ("sure", "likelihood"))
+    )
+    return np.stack([x, y], axis=-1), sure
+
+
+def _caliscope(table: Table, rows: Rows) -> None:
+    """Read pixels that each camera saw of one person; times are seconds of a clock."""
+    rows.kind, rows.by_camera = "mediapipe", True
+    rows.names = load_layout("mediapipe_33").points
+    data = {ours: table.checked(name) for name, ours in CALISCOPE.items()}
+    whole = np.stack([data["frame"], data["port"], data["id"]], axis=1)
+    whole = np.clip(np.nan_to_num(whole, nan=-1), -1, 2**31).astype(np.intp)
+    body = (whole >= 0).all(axis=1) & (whole[:, 2] < len(rows.names))
+    pictures, first = np.unique(whole[:, 0], return_index=True)
+    for number, time in zip(pictures.tolist(), data["time"][first].tolist(), strict=True):
+        rows.picture(number, time=time)
+    found, row = np.unique(whole[body, :2], axis=0, return_inverse=True)
+    points = np.full((len(found), len(rows.names), 2), np.nan)
+    points[row.ravel(), whole[body, 2]] = np.stack([data["x"], data["y"]], axis=1)[body]
+    for (frame, port), one in zip(found.tolist(), points, strict=True):
+        rows.add(frame, one, np.full(len(one), np.nan), person=port)
+
+
+def _wide(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
+    """Return the columns of each point by part, of names such as ``nose_x``, ``nose.score``."""
+    found: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        match = _WIDE.match(name)
+        if match is not None and "world" not in name.casefold():
+            part = match["part"].lower()
+            found.setdefault(match["name"], {}).setdefault(part if part in ("x", "y") else "sure", column)
+    return {name: parts for name, parts in found.items() if {"x", "y"} <= set(parts)}
+
+
+def _row_a_picture(table: Table, rows: Rows) -> None:
+    parts = _wide(table.names)
+    rows.kind = "a row a picture"
+    numbered = [re.fullmatch(r"(?:landmark|point|kp|lm)?[\s._-]*(\d+)", one, re.IGNORECASE) for one in parts]
+    rows.names = tuple(parts)
+    if all(numbered):
+        order = sorted(parts, key=lambda name: int(re.findall(r"\d+", name)[0]))
+        parts, rows.names = {name: parts[name] for name in order}, ()
+    picture, time, person = (_column(table, wanted) for wanted in (PICTURE, TIME, PERSON))
+    columns = list(dict.fromkeys(k for columns in parts.values() for k in columns.values()))
+    values = np.full((len(table.cells), len(table.names)), np.nan)
+    for k in columns:
+        values[:, k] = table.checked(table.names[k])
+    points, sure = _columns(values, parts)
+    times = table.column(time) if time else np.full(len(values), np.nan)
+    texts = [re.findall(r"\d+", text) for text in table.texts(person)] if person else []
+    who = [int(one[0]) if one else None for one in texts]
+    labels = table.texts(picture) if picture else [str(k) for k in range(len(values))]
+    for k, label in enumerate(labels):
+        rows.picture(label, time=float(times[k]))
+        rows.add(label, points[k], sure[k], person=who[k] if who else None)
+
+
+def _column(table: Table, wanted: Sequence[str]) -> Any:
+    """Return the name of the first column that is called as wanted; None if there is none."""
+    words = {plain(name): name for name in reversed(table.names)}
+    return next((words[one] for one in wanted if one in words), None)

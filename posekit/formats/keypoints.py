@@ -1,0 +1,329 @@
+"""Key points that detectors wrote: COCO, MMPose, OpenPose, Halpe, MediaPipe as JSON; see `keypoint_tables` for tables.
+
+Sources: cocodataset.org, "Data format" and "Results format"; jin-s13/COCO-WholeBody; MMPose 1.x,
+``demo/topdown_demo_with_mmdet.py --save-predictions`` and ``MMPoseInferencer``; OpenPose, ``doc/02_output.md``;
+AlphaPose, ``docs/output.md``; MediaPipe, ``NormalizedLandmark``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.cameras.detections import Detections
+from posekit.formats import json_file
+from posekit.formats.detection_rows import Rows, detections_of
+from posekit.formats.files import read_bytes
+from posekit.formats.node import Node
+from posekit.formats.options import Options
+from posekit.formats.tables import Table
+from posekit.geometry import Array
+
+#: Parts of COCO-WholeBody's 133 points: field, number of points, and the flag that tells whether it was labelled.
+WHOLEBODY_PARTS: Final = (
+    ("keypoints", 17, ""),
+    ("foot_kpts", 6, "foot_valid"),
+    ("face_kpts", 68, "face_valid"),
+    ("lefthand_kpts", 21, "lefthand_valid"),
+    ("righthand_kpts", 21, "righthand_valid"),
+)
+#: Fields of a person's points in OpenPose's files; the second in files older than 2018.
+OPENPOSE_POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
+#: Fields of a person's landmarks in MediaPipe's frames.
+LANDMARKS: Final = ("pose_landmarks", "poseLandmarks", "landmarks")
+WORLD_LANDMARKS: Final = ("pose_world_landmarks", "poseWorldLandmarks", "world_landmarks")
+N_LANDMARKS: Final = 33
+#: Pixels that a picture may have a side.
+LARGEST_SIDE: Final = 10**6
+#: Names of a frame's time, and their unit in seconds; a ``timestamp`` far above seconds is in milliseconds.
+SECONDS: Final = {"time": 1, "timestamp": 1, "timestamp_s": 1, "timestamp_ms": 1e-3, "timestamp_us": 1e-6}
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a JSON document, a folder of them, or a table holds key points in pictures."""
+    if isinstance(document, Table):
+        from posekit.formats import keypoint_tables
+
+        return keypoint_tables.looks_like(document)
+    if isinstance(document, Path):
+        return any(True for _ in document.glob("*.json"))
+    return bool(_kind(document))
+
+
+def read(document: Any, path: str | Path, options: Options) -> Detections:
+    """Read the key points of people in pictures.
+
+    Parameters
+    ----------
+    document : object
+        Parsed JSON; a `Table`; or the path of a folder with one JSON file a picture.
+    path : path
+        The file or the folder.
+    options : Options
+        `layout` of the points if the file does not name them, `rate` if it has no times.
+
+    Raises
+    ------
+    InputError
+        If the file is malformed, or it is not clear which points its points are.
+    """
+    if isinstance(document, Table):
+        from posekit.formats import keypoint_tables
+
+        return keypoint_tables.read(document, path, options)
+    rows = Rows(source=str(path))
+    if isinstance(document, Path):
+        files = sorted(document.glob("*.json"), key=lambda file: _counted(file.name))
+        for file in files:
+            content = json_file.parse(read_bytes(file), str(file))
+            if len(files) > 1 or content != []:
+                _add(Node(content, file), rows, file.stem.removesuffix("_keypoints"))
+        rows.in_folder = len(files) > 1
+    else:
+        _add(Node(document, path), rows, Path(path).name.partition(".")[0])
+    return detections_of(rows, options)
+
+
+def _counted(name: str) -> list[tuple[int, str]]:
+    """Order names by the numbers in them."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _kind(document: Any) -> str:
+    """Name the kind of a document; empty if it holds no key points."""
+    if isinstance(document, dict):
+        if isinstance(document.get("annotations"), list):
+            holders = (*_dicts(document["annotations"]), *_dicts(document.get("categories")))
+            return "coco" if any("keypoints" in one for one in holders) else ""
+        if "instance_info" in document and "meta_info" in document:
+            return "mmpose"
+        people = document.get("people")
+        if isinstance(people, list) and all(_has(one, OPENPOSE_POINTS) for one in people):
+            return "openpose"
+        frames = document.get("frames")
+        return "mediapipe" if _is_landmarks(frames if isinstance(frames, list) else [document]) else ""
+    first = next(_dicts(document), None) if isinstance(document, list) else None
+    if first is None:
+        return "mmpose" if document == [] else ""
+    if "keypoint_scores" in first or ("instances" in first and "frame_id" in first):
+        return "mmpose"
+    if "image_id" in first and _has(first, [name for name, *_ in WHOLEBODY_PARTS]):
+        return "results"
+    return "mediapipe" if _is_landmarks(document) else ""
+
+
+def _dicts(value: Any) -> Iterator[dict[str, Any]]:
+    return (one for one in value if isinstance(one, dict)) if isinstance(value, list) else iter(())
+
+
+def _is_landmarks(frames: list[Any]) -> bool:
+    return any(_has(frame, (*LANDMARKS, *WORLD_LANDMARKS)) for frame in frames)
+
+
+def _has(entry: Any, names: Sequence[str]) -> bool:
+    return isinstance(entry, dict) and any(name in entry for name in names)
+
+
+def _add(root: Node, rows: Rows, label: str) -> None:
+    """Add the pictures and the people of one document; a picture without a name of its own is called `label`."""
+    kind = _kind(root.value)
+    if not kind:
+        expected = "key points of COCO, MMPose, OpenPose or MediaPipe"
+        raise root.refused(expected, "keep other files out of the folder, or convert it to one of these")
+    if rows.kind and rows.kind != kind:
+        expected = f"a file of {rows.kind}, as the files before"
+        raise root.refused(expected, "split the folder", f"a file of {kind}")
+    rows.kind = kind
+    KINDS[kind](root, rows, label)
+
+
+def _coco(root: Node, rows: Rows, label: str) -> None:
+    """Read annotations: ``{"images": […], "annotations": […], "categories": […]}``."""
+    rows.film = None
+    named: dict[Any, str] = {}
+    listed = list(root.at("images", []).list())
+    titles = [one.object().get("file_name") for one in listed]
+    own = len(set(map(str, titles))) == len(titles) and all(isinstance(one, str) and one for one in titles)
+    for image, name in zip(listed, titles, strict=True):
+        identity = image.at("id").value
+        if type(identity) not in (int, str) or identity in named:
+            raise image.at("id").refused("an id of its own for each image", "renumber the images")
+        sides = [image.at(side).positive() if image.has(side) else np.nan for side in ("width", "height")]
+        named[identity] = rows.picture(name if own else identity, size=(sides[0], sides[1]))
+    parts = [name for name, *_ in WHOLEBODY_PARTS]
+    everyone = list(root.at("annotations").list())
+    people = [one for one in everyone if _has(one.object(), parts) and not one.value.get("iscrowd")]
+    names = {
+        str(one.get("id")): tuple(map(str, one["keypoints"]))
+        for one in _dicts(root.value.get("categories"))
+        if isinstance(one.get("keypoints"), list)
+    }
+    people = _of_bodies(root, people, names, rows)
+    triples = [_triples(one) for one in people]
+    thirds = np.concatenate([one[:, 2] for one in triples]) if triples else np.empty(0)
+    flags = bool(np.isin(thirds, (0, 1, 2)).all())
+    for one, values in zip(people, triples, strict=True):
+        identity = one.at("image_id").value
+        if listed and (type(identity) not in (int, str) or identity not in named):
+            raise one.at("image_id").refused(f"the id of one of the {len(named)} images", "add the image")
+        sure = np.where(values[:, 2] > 0, np.nan, 0.0) if flags else values[:, 2]
+        rows.add(named.get(identity, identity), values[:, :2], sure, person=one.value.get("track_id"))
+
+
+def _of_bodies(root: Node, people: list[Node], names: dict[str, tuple[str, ...]], rows: Rows) -> list[Node]:
+    """Keep the people of the one category whose points are a body's; note the names of its points."""
+    category = [str(one.value.get("category_id")) for one in people]
+    kinds = {names[one] for one in category if one in names} or set(names.values())
+    if len(kinds) > 1:  # animals and objects have points, too
+        kinds = {kind for kind in kinds if "shoulder" in " ".join(kind).lower()}
+    if len(kinds) > 1:
+        remedy = "split the file by its categories"
+        raise root.at("categories").refused("one kind of people with the points of a body", remedy)
+    rows.names = next(iter(kinds), ())
+    kept = zip(people, category, strict=True)
+    return [one for one, which in kept if names.get(which, rows.names) == rows.names]
+
+
+def _results(root: Node, rows: Rows, label: str) -> None:
+    """Read a flat list of people: COCO results, and AlphaPose's with the picture's name for its id."""
+    rows.film = None
+    for one in root.list():
+        identity = one.at("image_id").value
+        if type(identity) not in (int, str):
+            raise one.at("image_id").refused("a number, or a picture's name")
+        values = _triples(one)
+        person = one.value.get("track_id", one.value.get("idx"))
+        while isinstance(person, list):  # AlphaPose lists the detections that it merged
+            person = person[0] if person else None
+        rows.add(identity, values[:, :2], np.where(values[:, 2] == 2, np.nan, values[:, 2]), person=person)
+
+
+def _triples(person: Node) -> Array:
+    """Return a person's points (K, 3) of x, y and flag or confidence: one list, or COCO-WholeBody's parts joined."""
+    parts, given = [], person.value.get("keypoints")
+    whole = not _has(person.value, [name for name, *_ in WHOLEBODY_PARTS[1:]])
+    whole |= isinstance(given, list) and len(given) > 3 * WHOLEBODY_PARTS[0][1]
+    for name, count, flag in () if whole else WHOLEBODY_PARTS:
+        absent = not person.value.get(name) or (flag and not person.value.get(flag, True))
+        parts.append(np.zeros(3 * count) if absent else person.at(name).array(3 * count, unknown=True))
+    flat = np.concatenate(parts) if parts else person.at("keypoints").array(None, unknown=True)
+    if not len(flat) or len(flat) % 3:
+        raise person.at("keypoints").refused("a list [x, y, v, x, y, v, …]", got=f"{len(flat)} numbers")
+    return flat.reshape(-1, 3)
+
+
+def _mmpose(root: Node, rows: Rows, label: str) -> None:
+    """Read the demos' ``{meta_info, instance_info}``, and the Inferencer's list of people or of pictures."""
+    listed = root
+    if isinstance(root.value, dict):
+        listed = root.at("instance_info")
+        table = root.at("meta_info").at("keypoint_id2name").object()
+        names = [table.get(str(k)) for k in range(len(table))]
+        if not all(isinstance(name, str) and name for name in names):
+            raise root.at("meta_info").at("keypoint_id2name").refused("a name for each point, by its number")
+        rows.names = tuple(map(str, names))
+    for entry in list(listed.list()):
+        if "instances" not in entry.object():
+            _instance(entry, rows, rows.picture(label))
+            continue
+        number = rows.picture(entry.at("frame_id").value)
+        for one in entry.at("instances").list():
+            _instance(one, rows, number)
+    if not rows.pictures or listed.value == []:
+        rows.picture(label)
+
+
+def _instance(one: Node, rows: Rows, label: str) -> None:
+    points = one.at("keypoints").array(None, None, unknown=True)
+    if points.shape[1] != 2:
+        got = f"{points.shape[1]} coordinates a point"
+        raise one.at("keypoints").refused("two, pixels", "save the predictions of a 2D model", got)
+    sure = one.at("keypoint_scores").array(len(points), unknown=True)
+    # MMPose puts a point without a positive score at -1 of the crop (mmpose/codecs/utils/post_processing.py).
+    rows.add(label, points, np.where(sure <= 0, 0.0, sure), person=one.value.get("track_id"))
+
+
+def _openpose(root: Node, rows: Rows, label: str) -> None:
+    """Read one picture: ``{"people": [{"person_id": [-1], "pose_keypoints_2d": [x, y, c] * K}]}``."""
+    rows.picture(label)
+    for one in root.at("people").list():
+        field = next(name for name in OPENPOSE_POINTS if name in one.object())
+        if one.at(field).value == []:
+            continue
+        flat = one.at(field).array(None, unknown=True)
+        if len(flat) % 3:
+            raise one.at(field).refused("a list [x, y, c, x, y, c, …]", got=f"{len(flat)} numbers")
+        values = flat.reshape(-1, 3)
+        person = one.value.get("person_id")
+        person = person[0] if isinstance(person, list) and len(person) == 1 else person
+        rows.add(label, values[:, :2], values[:, 2], person=person)
+
+
+def _mediapipe(root: Node, rows: Rows, label: str) -> None:
+    """Read frames ``{frame, pose_landmarks: [{x, y, z, visibility} * 33]}``, or of several people each."""
+    document, world = root.value, 0
+    listed = root if isinstance(document, list) else root.at("frames", None)
+    frames = list(listed.list()) if listed.value is not None else [root]
+    size = _size(document)
+    for number, frame in enumerate(frames):
+        if frame.value in (None, {}, []):
+            rows.picture(number)
+            continue
+        entry = frame.object()
+        own = next((entry[name] for name in ("frame", "frame_id", "image") if name in entry), None)
+        named = own if isinstance(own, int | str) else label if frame is root else number
+        picture = rows.picture(named, time=_time(frame), size=_size(entry, size))
+        field = next((name for name in LANDMARKS if entry.get(name)), None)
+        if field is None:
+            world += _has(entry, WORLD_LANDMARKS) and not _has(entry, LANDMARKS)
+            continue
+        held = list(frame.at(field).list())
+        several = isinstance(held[0].value, list) and isinstance((held[0].value or [0])[0], dict | list)
+        for person in held if several else [frame.at(field)]:
+            points = list(person.list())
+            if len(points) != N_LANDMARKS:
+                got = f"{len(points)} landmarks"
+                raise person.refused(f"{N_LANDMARKS} landmarks", "save all of them", got)
+            table = np.array([_landmark(one) for one in points])
+            rows.add(picture, table[:, :2], table[:, 2])
+    if world == len(frames):
+        got = "world landmarks alone: metres around the hips"
+        raise root.refused("landmarks in the picture", "save pose_landmarks, too", got)
+
+
+def _landmark(one: Node) -> tuple[float, float, float]:
+    """Return x, y and visibility of ``{x, y, z, visibility}`` or ``[x, y, z, visibility]``."""
+    if isinstance(one.value, list):
+        values = one.array(None, unknown=True)
+        if len(values) < 2:
+            raise one.refused("[x, y, z, visibility]")
+        return float(values[0]), float(values[1]), float(values[3]) if len(values) > 3 else np.nan
+    entry = one.object()
+    x, y = (one.at(axis).number() if entry.get(axis) is not None else np.nan for axis in "xy")
+    name = next((name for name in ("visibility", "presence", "score") if entry.get(name) is not None), None)
+    return x, y, one.at(name).number() if name else np.nan
+
+
+def _time(frame: Node) -> float:
+    """Return a frame's time in seconds; NaN if it has none."""
+    name = next((name for name in SECONDS if type(frame.value.get(name)) in (int, float)), None)
+    return frame.at(name).number(most=1e18) * SECONDS[name] if name else np.nan
+
+
+def _size(holder: Any, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:
+    """Return width and height that an object or its metadata states."""
+    inner = [holder, holder.get("metadata"), holder.get("video_info")] if isinstance(holder, dict) else []
+    for one in _dicts(inner):
+        for prefix in ("", "image_", "frame_", "video_"):
+            sides = one.get(f"{prefix}width"), one.get(f"{prefix}height")
+            if all(isinstance(side, int | float) and 0 < side < LARGEST_SIDE for side in sides):
+                return float(sides[0]), float(sides[1])  # type: ignore[arg-type]
+    return known
+
+
+#: Readers of a document by its kind.
+KINDS: Final = dict(coco=_coco, results=_results, mmpose=_mmpose, openpose=_openpose, mediapipe=_mediapipe)

@@ -1,0 +1,387 @@
+"""Layouts: which names or places of a file are which joints, from TOML in ``urdf/layouts`` or of the user's own."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import nearest, refusal, shown
+from posekit.formats.files import read_bytes, text
+from posekit.geometry import Array, cross, dot, unit
+from posekit.motion.motion import NAMES
+from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side
+
+FOLDER: Final = Path(__file__).parent.parent / "urdf" / "layouts"
+#: Landmarks that are no joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
+MIDDLES: Final = ("mid_shoulders", "mid_hips")
+LANDMARKS: Final = (*POINTS, *MIDDLES)
+#: Landmarks that every layout of a body places.
+PARTS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+LIMBS: Final = tuple(f"{side}_{part}" for part in PARTS for side in SIDES)
+
+#: Points of a file by our name.
+Placed = dict[str, tuple[str, ...]]
+
+#: Place of the built-in figure's pelvis on the line from the middle of the shoulders (0) to that of the hips (1).
+PELVIS_SHARE: Final = 0.8200545021161334
+#: Its neck from the middle of the shoulders, shares of that line: forward, left, up in their and the pelvis' frame.
+NECK_OFFSET: Final = (0.06720811867953341, 0.0, -0.002995656796876607)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layout:
+    """Meaning of a file's names, columns or places.
+
+    Attributes
+    ----------
+    name : str
+        As ``coco_17``; the path of a user's file.
+    kind : str
+        ``points``, ``names`` (naming habits of animation programs) or ``robot``.
+    points : tuple of str
+        The format's points in its order; empty if its files name their points.
+    landmarks : dict
+        Landmark (`LANDMARKS`) to the file's names whose mean it is.
+    feet : dict
+        Toes and heels (`posekit.skeleton.FEET_POINTS`) to the file's names.
+    fields : dict
+        All other fields of the TOML: ``source``, ``up``, ``unit``, ``counts``, ``parts``, ``robot``, ``needs``,
+        ``joints`` and the places of a robot's root.
+    """
+
+    name: str
+    kind: str = "points"
+    points: tuple[str, ...] = ()
+    landmarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    feet: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    fields: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def sources(self) -> dict[str, tuple[str, ...]]:
+        """Landmarks and feet to the file's names."""
+        return {**self.landmarks, **self.feet}
+
+    def over(self, names: Sequence[str]) -> Layout:
+        """Return the part of the layout whose points are all among a file's names, spelt as the file spells them."""
+        there = {plain(name): name for name in reversed(names)}
+        landmarks, feet = (
+            {
+                ours: tuple(there[plain(part)] for part in parts)
+                for ours, parts in own.items()
+                if _in(parts, there)
+            }
+            for own in (self.landmarks, self.feet)
+        )
+        return Layout(name=self.name, points=tuple(names), landmarks=landmarks, feet=feet, fields=self.fields)
+
+    def gather(self, points: Array, names: Sequence[str] = ()) -> dict[str, Array]:
+        """Pick landmarks out of a file's points.
+
+        Parameters
+        ----------
+        points : array (..., P, D)
+            The file's points, NaN where one is missing.
+        names : sequence of str (P,), optional
+            Their names; the layout's own if not given.
+
+        Returns
+        -------
+        dict of array (..., D)
+            By landmark or foot point; NaN where one of the points of a mean is missing. Absent ones are left out.
+        """
+        column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
+        found = {
+            ours: points[..., [column[plain(part)] for part in parts], :].mean(axis=-2)
+            for ours, parts in self.sources.items()
+            if _in(parts, column)
+        }
+        markers = self.fields.get("hips", {})
+        if markers and points.shape[-1] == 3 and _in(tuple(markers.values()), column):
+            right, left, back = (points[..., column[plain(markers[k])], :] for k in ("right", "left", "back"))
+            found |= dict(zip(("right_hip", "left_hip"), _hips(right, left, back), strict=True))
+        return found
+
+    def seen(self, names: Sequence[str], values: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
+        """Name points in pictures (N, P, D) as posekit does, with neck and pelvis between shoulders and hips.
+
+        A detector's neck is the middle of the shoulders; the figure's pelvis lies toward the middle of the hips.
+        Both are placed in the image: bent spines and perspective move them by a centimetre or two.
+        """
+        found = self.gather(values, names)
+        for part in ("shoulder", "hip"):
+            sides = [found.get(f"{side}_{part}") for side in ("right", "left")]
+            if f"mid_{part}s" not in found and sides[0] is not None and sides[1] is not None:
+                found[f"mid_{part}s"] = (sides[0] + sides[1]) / 2
+        derived = []
+        shoulders, hips = found.get("mid_shoulders"), found.get("mid_hips")
+        if "neck" not in found and shoulders is not None:
+            found["neck"] = shoulders
+            derived.append("neck")
+        if "pelvis" not in found and shoulders is not None and hips is not None:
+            share = PELVIS_SHARE if values.shape[-1] > 1 else 0.5  # a confidence is the mean of both
+            found["pelvis"] = shoulders + share * (hips - shoulders)
+            derived.append("pelvis")
+        kept = tuple(name for name in NAMES if name in found)
+        empty = np.empty((len(values), 0, values.shape[-1]))
+        return kept, np.stack([found[name] for name in kept], axis=1) if kept else empty, tuple(derived)
+
+    def place(self, names: Sequence[str], points: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
+        """Name a file's points in space as posekit does, with neck and pelvis placed if the file has none.
+
+        Parameters
+        ----------
+        names : sequence of str (P,)
+            The file's names, or () for the layout's own.
+        points : array (T, P, 3)
+
+        Returns
+        -------
+        names : tuple of str (K,)
+            Of `posekit.motion.motion.NAMES`, in that order.
+        points : array (T, K, 3)
+        derived : tuple of str
+            The joints that no point of the file is.
+        """
+        found = self.gather(points, names)
+        for part in ("shoulder", "hip"):
+            sides = [found.get(f"{side}_{part}") for side in ("right", "left")]
+            if sides[0] is not None and sides[1] is not None:
+                middle, stated = (sides[0] + sides[1]) / 2, found.get(f"mid_{part}s")
+                unseen = middle if stated is None else stated
+                found[f"mid_{part}s"] = np.where(np.isnan(middle), unseen, middle)
+        derived = tuple(name for name in ("pelvis", "neck") if name not in found)
+        if not {"mid_shoulders", "mid_hips", "right_shoulder", "left_shoulder"} <= set(found):
+            derived = ()
+        if "pelvis" in derived:
+            spine = found["mid_hips"] - found["mid_shoulders"]
+            found["pelvis"] = found["mid_shoulders"] + PELVIS_SHARE * spine
+        if "neck" in derived:
+            found["neck"] = _neck(found)
+        placed = tuple(name for name in NAMES if name in found)
+        if not placed:
+            return (), points[..., :0, :], ()
+        return placed, np.stack([found[name] for name in placed], axis=-2), derived
+
+
+def _hips(right: Array, left: Array, back: Array) -> tuple[Array, Array]:
+    """Place the hips (T, 3) from the anterior spines of the pelvis and the sacrum.
+
+    From the middle of the spines, as shares of their distance: 0.36 to the side, 0.19 backward, 0.30 down (Bell,
+    Brand & Pedersen 1989, *Prediction of hip joint centre location from external landmarks*, Human Movement Science 8).
+    """
+    width = np.linalg.norm(left - right, axis=-1, keepdims=True)
+    to_left, middle = unit(left - right), (left + right) / 2
+    ahead = unit((middle - back) - dot(middle - back, to_left)[..., None] * to_left)
+    base = middle - width * (0.19 * ahead + 0.30 * cross(ahead, to_left))
+    return base - 0.36 * width * to_left, base + 0.36 * width * to_left
+
+
+def _neck(found: Mapping[str, Array]) -> Array:
+    """Place the neck (T, 3) in the frame of shoulders and pelvis, scaled by the median spine."""
+    spine = np.linalg.norm(found["mid_shoulders"] - found["mid_hips"], axis=-1)
+    spine = spine[np.isfinite(spine)]
+    left = unit(found["left_shoulder"] - found["right_shoulder"])
+    way = found["right_shoulder"] - found["pelvis"]
+    down = unit(way - dot(way, left)[..., None] * left)
+    frame = np.stack([cross(down, left), left, -down], axis=-1)
+    offset = np.array(NECK_OFFSET) * (float(np.median(spine)) if len(spine) else 1.0)
+    return np.asarray(found["mid_shoulders"] + frame @ offset)
+
+
+def plain(name: str) -> str:
+    """Reduce a name to what is compared: lower-case letters and digits, without a prefix that ends in a colon."""
+    return re.sub(r"[\W_]+", "", name.rpartition(":")[2].casefold())
+
+
+def _in(parts: Sequence[str], there: Mapping[str, Any]) -> bool:
+    return all(plain(part) in there for part in parts)
+
+
+def layout_names() -> tuple[str, ...]:
+    """Return the names of the built-in layouts."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def load_layout(name: str | Path) -> Layout:
+    """Load a layout by its name, or from a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such layout, or a landmark or a point in it is not known.
+
+    Examples
+    --------
+    >>> load_layout("coco_17").landmarks["right_wrist"]
+    ('right_wrist',)
+    """
+    if str(name).endswith(".toml"):
+        return _layout(parse_toml(read_bytes(name), str(name)), str(name))
+    if str(name) not in layout_names():
+        remedy = f"give a TOML file, or {nearest(str(name), layout_names())}"
+        raise refusal("", "layout", shown(str(name)), "the name of a layout", remedy)
+    return _built_in(str(name))
+
+
+@cache
+def _built_in(name: str) -> Layout:
+    return _layout(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")), name)
+
+
+def parse_toml(data: bytes, source: str) -> dict[str, Any]:
+    """Parse TOML, or refuse it with its line."""
+    try:
+        return tomllib.loads(text(data, source))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise refusal(source, "", str(error), "a TOML file", "correct the line") from None
+
+
+def _layout(table: dict[str, Any], name: str) -> Layout:
+    kind = table.get("kind", "points")
+    if kind == "points" and not isinstance(table.get("landmarks"), dict):
+        raise refusal(name, "landmarks", shown(table.get("landmarks")), "a table", "add [landmarks]")
+    points = tuple(table.get("points", ()))
+    known = [plain(point) if isinstance(point, str) else "" for point in points]
+    for point, word in zip(points, known, strict=True):
+        if not word or known.count(word) > 1:
+            raise refusal(name, "points", shown(point), "names that differ in letters or digits", "rename it")
+    parts = {
+        title: _parts(table.get(title, {}), title, order, points, name)
+        for title, order in (("landmarks", LANDMARKS), ("feet", FEET_POINTS))
+    }
+    known_keys = ("points", "landmarks", "feet", "kind", "schema")
+    own = {key: value for key, value in table.items() if key not in known_keys}
+    return Layout(name=name, kind=kind, points=points, fields=own, **parts)
+
+
+def _parts(table: Any, title: str, order: Sequence[str], points: Sequence[str], name: str) -> Placed:
+    if not isinstance(table, dict):
+        raise refusal(name, title, shown(table), "a table", f"write it as [{title}]")
+    placed: Placed = {}
+    for ours, given in table.items():
+        found = (given,) if isinstance(given, str) else given
+        where = f"{title}.{ours}"
+        if ours not in order:
+            raise refusal(name, where, "an unknown landmark", "a known one", nearest(ours, order))
+        if not isinstance(found, list | tuple) or not found or not all(isinstance(one, str) for one in found):
+            raise refusal(name, where, shown(given), "a name, or a list of names")
+        unknown = [one for one in found if points and one not in points]
+        if unknown or len(set(found)) != len(found):
+            got = unknown[0] if unknown else "a name twice"
+            raise refusal(name, where, shown(got), "different names of its points", nearest(got, points))
+        placed[ours] = tuple(found)
+    for ours, found in placed.items():
+        if other_side(ours) != ours and placed.get(other_side(ours)) == found:
+            got = f"{shown(list(found))}, as {other_side(ours)}"
+            raise refusal(name, f"{title}.{ours}", got, "points of its own")
+    return placed
+
+
+def by_order(count: int) -> list[Layout]:
+    """List the layouts of points whose files have so many points and do not name them."""
+    every = map(_built_in, layout_names())
+    return [one for one in every if one.points and count in one.fields.get("counts", [len(one.points)])]
+
+
+def by_names(names: Sequence[str], source: str) -> Layout:
+    """Find the layout of a file that names its points.
+
+    A layout fits if it places both ends of every limb. The best is made of just these points; then the one with most
+    names to the letter (``RHip`` is not ``r_hip``, whose neck may be another), then the one that places most landmarks,
+    then one of files that name their points, then the one that uses most names. If none fits, the naming habits of
+    animation programs are tried, then a layout that places shoulders, hips and half of the other limb joints.
+
+    Raises
+    ------
+    InputError
+        If none fits: the nearest one is named, and what it lacks.
+    """
+    there, verbatim = {plain(name): name for name in names}, set(names)
+    every = [one for one in map(_built_in, layout_names()) if one.kind == "points"]
+
+    def lacking(one: Layout) -> list[str]:
+        hips = one.fields.get("hips", {})
+        by_pelvis = ("right_hip", "left_hip") if hips and _in(tuple(hips.values()), there) else ()
+        asked = [limb for limb in LIMBS if limb not in by_pelvis]
+        return [limb for limb in asked if not _in(one.landmarks.get(limb, ("\0",)), there)]
+
+    fitting = [one for one in every if not lacking(one)]
+
+    def rank(one: Layout) -> tuple[bool, int, int, bool, int]:
+        exact = bool(one.points) and {plain(point) for point in one.points} == set(there)
+        as_written = sum(set(one.landmarks.get(limb, ())) <= verbatim for limb in LIMBS)
+        placed = [parts for parts in one.sources.values() if _in(parts, there)]
+        return exact, as_written, len(placed), not one.points, sum(map(len, placed))
+
+    if fitting:
+        return max(fitting, key=rank)
+    habit = _by_habit(names)
+    if habit is not None:
+        return habit
+    near = min(every, key=lambda one: len(lacking(one)))
+    missing = lacking(near)
+    if len(missing) <= len(LIMBS) // 2 and "right_shoulder" not in missing and "right_hip" not in missing:
+        return near
+    if len(missing) == len(LIMBS):
+        got = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+        remedy = "write which name is which joint into a TOML file, and give it with --layout"
+        raise refusal(source, "points", got, "names of one of the layouts", remedy)
+    got = f"no {', no '.join(missing)} by the layout {near.name}, which has most of the names"
+    expected = f"{', '.join(near.landmarks.get(missing[0], ('a name',)))} for {missing[0]}, and so on"
+    raise refusal(source, "points", got, expected, "rename the points, or give your own --layout")
+
+
+def _by_habit(names: Sequence[str]) -> Layout | None:
+    """Read names as animation programs build them: a common prefix, a side, a part of the body."""
+    habits = _built_in("animation").fields
+    prefix = _common_prefix(names)
+    found: dict[tuple[str, str], str] = {}
+    for name in names:
+        words = _words(name.rpartition(":")[2].removeprefix(prefix), habits["left"], habits["right"])
+        if words is not None:
+            found.setdefault(words, name)
+    placed: dict[str, tuple[str, ...]] = {}
+    for ours, alternatives in habits["parts"].items():
+        part = next((one for one in alternatives if {("left", one), ("right", one)} <= found.keys()), None)
+        if part is not None:
+            for side in ("right", "left"):
+                placed[f"{side}_{ours}"] = (found[side, part],)
+    if not set(LIMBS) <= set(placed):
+        return None
+    feet = {name: parts for name, parts in placed.items() if name in FEET_POINTS}
+    return Layout(
+        name="animation",
+        points=tuple(names),
+        landmarks={name: parts for name, parts in placed.items() if name not in feet},
+        feet=feet,
+        fields={"source": habits["source"]},
+    )
+
+
+def _common_prefix(names: Sequence[str]) -> str:
+    """Return what most names begin with, up to a separator: ``Bip01_``, ``Character1_``, ``J_Bip_``."""
+    starts = {name[: match.end()] for name in names for match in re.finditer(r"[_ .-]", name)}
+    common = [start for start in starts if 2 * sum(name.startswith(start) for name in names) > len(names)]
+    return max(common, key=len, default="")
+
+
+def _words(name: str, left: Sequence[str], right: Sequence[str]) -> tuple[str, str] | None:
+    """Part a name into side and part: ``lThigh``, ``thigh_l``, ``Thigh.L``, ``LeftThigh`` are ("left", "thigh")."""
+    pieces = [piece for piece in re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])|(?<=^[LR])(?=[A-Z])", name) if piece]
+    words = [piece.casefold() for piece in pieces]
+    for side, signs in (("left", left), ("right", right)):
+        for place in (0, -1):
+            if len(words) > 1 and words[place] in signs:
+                del words[place]
+                return side, "".join(words)
+            # Old tools write the side without a separator: ``lfemur``, ``rshoulder``.
+        if len(words) == 1 and words[0][:1] in signs and len(words[0]) > 3:
+            return side, words[0][1:]
+    return None

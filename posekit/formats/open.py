@@ -1,0 +1,161 @@
+"""`open`: read any file once, recognise its container, then the first reader that its content fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+from posekit.errors import refusal, shown
+from posekit.formats.files import read_bytes
+from posekit.formats.node import undamaged
+from posekit.formats.options import Options
+from posekit.geometry import UP_AXES
+
+CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
+    # container: "module:parse" of (data: bytes, source: str) -> plain document, and the endings of its files
+    "json": ("json_file:parse", (".json",)),
+    "arrays": ("npz_file:parse", (".npz", ".npy", ".pkl", ".pickle", ".p", ".joblib", ".pt", ".pth")),
+    "table": ("tables:parse", (".csv", ".tsv", ".txt", ".trc", ".mot", ".sto")),
+    "bvh": ("bvh:parse", (".bvh",)),
+    "c3d": ("c3d:parse", (".c3d",)),
+    "parquet": ("parquet:parse", (".parquet", ".pq")),
+    "toml": ("layout:parse_toml", (".toml",)),
+    "yaml": ("cameras_file:parse_yaml", (".yaml", ".yml")),
+    "xml": ("cameras_file:parse_xml", (".xml",)),
+}
+#: First bytes by which a file with another ending is recognised.
+STARTS: Final = {
+    **{b"HIERARCHY": "bvh", b"PathFileType": "table", b"{": "json", b"[": "json", b"PAR1": "parquet"},
+    **{b"PK\x03\x04": "arrays", b"\x93NUMPY": "arrays"},
+}
+READERS: Final[dict[str, tuple[str, ...]]] = {
+    # container: modules whose `looks_like(document)` is asked in this order, and whose `read(document, path, options)`
+    # makes the object
+    "json": ("view_file", "postures_file", "result_file", "report_file", "cameras_file", "keypoints"),
+    "arrays": (
+        *("view_file", "postures_file", "result_file", "report_file", "cameras_file"),
+        *("smpl", "robot_tables", "joint_arrays"),
+    ),
+    "table": ("trc", "report_file", "keypoints", "robot_tables", "joint_arrays"),
+    "bvh": ("bvh",),
+    "c3d": ("c3d",),
+    "parquet": ("result_file", "report_file", "robot_tables", "joint_arrays"),
+    "toml": ("cameras_file",),
+    "yaml": ("cameras_file",),
+    "xml": ("cameras_file",),
+    "folder": ("keypoints",),  # a folder's document is its Path; `parsed` reads one of its files
+}
+#: Endings of pictures and films, which detectors read.
+PICTURES: Final = ".png .jpg .jpeg .tif .tiff .webp .bmp .gif .heic .mp4 .mov .avi".split()
+
+
+def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
+    """Read a file once and return its container's name and its plain document.
+
+    Documents: JSON, TOML: dict or list. Arrays (NPZ, NPY, pickles): dict of arrays, numbers, strings and plain
+    containers, an unnamed array under "". Table: `posekit.formats.tables.Table`; of Parquet with metadata in `about`.
+    A folder's document is its `Path`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return "folder", path
+    data, suffix = read_bytes(path), suffix_of(path)
+    by_suffix = (name for name, (_, suffixes) in CONTAINERS.items() if suffix in suffixes)
+    by_start = (name for start, name in STARTS.items() if data.lstrip()[:20].startswith(start))
+    container = next(iter([*by_suffix, *by_start]), None)
+    if suffix in PICTURES:
+        remedy = "run a pose detector on it, and give what it writes"
+        raise refusal(path, "", "pictures", "the key points that a detector found in them", remedy)
+    if not data.strip():
+        raise refusal(path, "", "an empty file", "one with data", "write or copy it again")
+    if container is None:
+        known = ", ".join(one for _, suffixes in CONTAINERS.values() for one in suffixes)
+        raise refusal(path, "", shown(suffix), f"a file of {known}", "convert it, or rename it")
+    return container, named(CONTAINERS[container][0])(data, str(path))
+
+
+def suffix_of(path: Path) -> str:
+    """Return the ending of a file's name in lower case, without ``.gz``."""
+    return (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
+
+
+def named(function: str) -> Callable[..., Any]:
+    """Return a function of this package by its name "module:function", importing the module."""
+    module, _, name = function.partition(":")
+    found: Callable[..., Any] = getattr(import_module(f"posekit.formats.{module}"), name)
+    return found
+
+
+def open(  # the door's name, as in `gzip.open`
+    path: str | PathLike[str],
+    layout: str = "",
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    rate: float | None = None,
+    urdf: str = "",
+    person: int | None = None,
+) -> Any:
+    """Open a file or folder: it is read once, and recognised by its content.
+
+    Parameters
+    ----------
+    path : path
+        A file of motion, key points, a view, cameras, a result, a report or a robot; or a detector's folder. Files may
+        be gzipped.
+    layout : str
+        Name of a layout (`posekit.formats.layout.layout_names`), or path of a TOML file of your own.
+    unit : str, optional
+        Unit of the file's lengths: "m", "cm", "mm" or "in".
+    up : str, optional
+        Axis that points up: "+y".
+    rate : float, optional
+        Frames a second of a file without times.
+    urdf : str
+        Name or path of the robot of a table of configurations.
+    person : int, optional
+        Person of a file of several, from 0.
+
+    Returns
+    -------
+    Motion, View, Detections, Recovery, Report, Robot, or dict of cameras by name
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or recognised, or contradicts itself.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> posekit.open("samples/jump.bvh").rate
+    30.0
+    """
+    if up is not None and len(up) == 1:
+        up = f"+{up}"
+    options = Options(layout=layout, unit=unit or "", up=up or "", rate=rate, urdf=urdf, person=person)
+    if options.unit and options.unit not in ("m", "cm", "mm", "in"):
+        raise refusal("", "unit", shown(options.unit), "m, cm, mm or in", "state one of them")
+    if options.up and options.up not in UP_AXES:
+        raise refusal("", "up", shown(options.up), f"one of {', '.join(UP_AXES)}", "state one of them")
+    if rate is not None and not 0 < rate < float("inf"):
+        raise refusal("", "rate", shown(rate), "frames a second, above 0", "state another")
+    if suffix_of(Path(path)) == ".urdf":
+        from posekit.robots import load_robot
+
+        return load_robot(Path(path))
+    container, document = parsed(path)
+    for module in READERS[container]:
+        if named(f"{module}:looks_like")(document):
+            with undamaged(Path(path), f"the parts of {container} that {module} reads"):
+                return named(f"{module}:read")(document, str(path), options)
+    names = [str(one) for one in (document if isinstance(document, dict) else getattr(document, "names", ()))]
+    listed = ", ".join(shown(name) for name in names[:8] if name)
+    held = f"the entries {listed}" if listed else f"nothing that is known in a {container} file"
+    remedy = "say which name is which joint in a TOML file, and give it with --layout"
+    if isinstance(document, dict) and {"images", "annotations"} <= document.keys():
+        held, remedy = "a COCO file without keypoints", "give the file of its person keypoints"
+    raise refusal(path, "", held, "motion, key points, a view, cameras, a result or a report", remedy)

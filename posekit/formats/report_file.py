@@ -1,0 +1,135 @@
+"""``posekit.report/2``: a `Report` as JSON, NPZ, CSV, Parquet and Markdown.
+
+JSON and NPZ have all of it, as columns by name; CSV and Parquet have the table of findings, a row a violation, which
+pandas reads in one line, and Parquet keeps the rest in its metadata.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from posekit.errors import refusal, shown
+from posekit.formats import json_file
+from posekit.formats.files import write_bytes
+from posekit.formats.json_file import nullable
+from posekit.formats.node import Node, schema_of, undamaged
+from posekit.formats.options import Options
+from posekit.formats.result_file import plain
+from posekit.formats.tables import Table, csv_text
+from posekit.formats.view_file import check_schema
+
+if TYPE_CHECKING:
+    from posekit.validators.report import Report
+
+REPORT_SCHEMA: Final = "posekit.report/2"
+#: Arrays with one entry a frame, and their types.
+ROWS: Final = {"clip": np.intp, "frame": np.intp, "time": np.float64, "incomplete": np.bool_}
+#: Arrays with one entry a frame and check.
+TABLES: Final = {"margins": np.float64, "silent": np.bool_}
+#: Columns of the findings that are whole numbers; the others are numbers.
+FINDINGS: Final = {"row": np.intp, "check": np.intp, "place": np.intp}
+NUMBERS: Final = ("value", "lower", "upper", "margin")
+TEXTS: Final = ("files", "names", "checks", "units", "places", "notes", "warnings", "refused")
+MAPPINGS: Final = ("messages", "not_asked", "settings")
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a JSON document, NPZ arrays or a Parquet table hold a report."""
+    if isinstance(document, Table):
+        return REPORT_SCHEMA in document.about.get("posekit", "")[:200]
+    return schema_of(document).startswith("posekit.report/")
+
+
+def read(document: Any, path: str | Path, options: Options) -> Report:
+    """Read a report.
+
+    Raises
+    ------
+    InputError
+        If the document is damaged or of another version.
+    """
+    from posekit.validators.report import Report
+
+    with undamaged(path, REPORT_SCHEMA):
+        if isinstance(document, Table):
+            document = json_file.parse(document.about["posekit"].encode(), f"{path}: about")
+        root = Node(document, path)
+        check_schema(root, REPORT_SCHEMA)
+        if "about" in document:
+            about = json_file.parse(root.at("about").text().encode(), f"{path}: about")
+            root = Node({**about, **document}, path)
+        count = len(root.at("clip").array(None))
+        texts: dict[str, Any] = {name: root.at(name).texts() for name in TEXTS}
+        checks = len(texts["checks"])
+        found = {one: root.at(f"findings.{one}").array(None, unknown=True) for one in (*FINDINGS, *NUMBERS)}
+        for name, most in (("row", count), ("check", checks), ("place", len(texts["places"]))):
+            if len(found[name]) and not (0 <= found[name].min() and found[name].max() < most):
+                expected = f"numbers from 0 to {most - 1}"
+                raise root.at(f"findings.{name}").refused(expected, "write the report again")
+        fields: dict[str, Any] = {name: _typed(root.at(name), kind, count) for name, kind in ROWS.items()}
+        fields |= {name: _typed(root.at(name), kind, count, checks) for name, kind in TABLES.items()}
+        fields |= {name: dict(root.at(name).object()) for name in MAPPINGS}
+        findings = {name: values.astype(FINDINGS.get(name, np.float64)) for name, values in found.items()}
+        return Report(findings=findings, **texts, **fields)
+
+
+def _typed(node: Node, kind: Any, *shape: int) -> Any:
+    """Return an array of a type; truth values are kept as 0 and 1 in JSON."""
+    values = node.value.astype(np.float64) if getattr(node.value, "dtype", None) == np.bool_ else node.value
+    return Node(values, node.source, node.place).array(*shape, unknown=kind is np.float64).astype(kind)
+
+
+def write(path: str | Path, report: Report) -> None:
+    """Write a report: ``.json``, ``.npz``, ``.csv``, ``.parquet`` or ``.md``, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise, or the file cannot be written.
+    """
+    name = Path(path).name.lower().removesuffix(".gz")
+    if name.endswith(".json"):
+        from posekit.validators.report import clip_rows
+
+        document = {**_about(report), "decision": report.decision, "clips": plain(clip_rows(report))}
+        arrays = {key: nullable(values) for key, values in _arrays(report).items()}
+        json_file.write(path, {**document, **arrays})
+    elif name.endswith(".npz"):
+        from posekit.formats.npz_file import packed
+
+        about = json.dumps(_about(report), allow_nan=False)
+        arrays = {"schema": np.array(REPORT_SCHEMA), "about": np.array(about), **_arrays(report)}
+        write_bytes(path, packed(arrays))
+    elif name.endswith(".csv"):
+        write_bytes(path, csv_text(report.table()).encode())
+    elif name.endswith(".parquet"):
+        from posekit.formats.parquet import packed_table
+
+        held = {**_about(report), **{key: nullable(values) for key, values in _arrays(report).items()}}
+        table = report.table().items()
+        columns = {key: one.astype(np.str_) if one.dtype == object else one for key, one in table}
+        write_bytes(path, packed_table(columns, {"posekit": json.dumps(held, allow_nan=False)}))
+    elif name.endswith(".md"):
+        write_bytes(path, f"# {report.decision}\n\n```\n{report.summary()}\n```\n".encode())
+    else:
+        got = f"the ending {shown(Path(path).suffix)}"
+        raise refusal(path, "", got, ".json, .npz, .csv, .parquet or .md", "rename it")
+
+
+def _about(report: Report) -> dict[str, Any]:
+    """Return everything that is no array."""
+    about: dict[str, Any] = {"schema": REPORT_SCHEMA}
+    about |= {name: list(getattr(report, name)) for name in TEXTS}
+    return about | {name: plain(dict(getattr(report, name))) for name in MAPPINGS}
+
+
+def _arrays(report: Report) -> Mapping[str, Any]:
+    """Return the arrays by name, truth values as 0 and 1."""
+    held = {name: np.asarray(getattr(report, name)) for name in (*ROWS, *TABLES)}
+    held |= {f"findings.{name}": np.asarray(report.findings[name]) for name in (*FINDINGS, *NUMBERS)}
+    return {name: one.astype(np.int8) if one.dtype == np.bool_ else one for name, one in held.items()}

@@ -1,0 +1,431 @@
+"""``posekit.result/3``: a `Recovery` as JSON, NPZ and Parquet; ``posekit.result/2`` is read by `earlier_result`.
+
+JSON has an object a posture, lengths in the file's unit, null for unknown numbers; columns that hold nothing are left
+out. NPZ and Parquet have the columns of the survivors under their names, metres: NPZ also ``frames.*``, ``answer.*``
+and ``path.*`` arrays. Everything else is one JSON text, ``about``, which Parquet keeps in its metadata.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import refusal, shown
+from posekit.formats import json_file
+from posekit.formats.files import write_bytes
+from posekit.formats.json_file import nullable
+from posekit.formats.node import Node, schema_of, undamaged
+from posekit.formats.options import Options
+from posekit.formats.tables import Table
+from posekit.formats.view_file import check_schema
+from posekit.geometry import PER_METRE, Array
+from posekit.recovery.recovery import Answer, Frames, Paths, Recovery, Survivors
+from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
+
+RESULT_SCHEMA: Final = "posekit.result/3"
+EARLIER_SCHEMA: Final = "posekit.result/2"
+#: Columns of the survivors, in the order of JSON, and the shape of one survivor's value.
+SHAPES: Final[dict[str, tuple[int | None, ...]]] = {
+    "joints": (len(JOINTS), 3),
+    "head": (len(HEAD_POINTS), 3),
+    "q": (None,),
+    "probability": (),
+    "chi2": (),
+    "branch": (),
+    "group": (),
+    "radius": (len(JOINTS),),
+    "inferred": (len(JOINTS),),
+    "scale": (),
+}
+#: Values that say nothing; NaN for the other columns.
+FILL: Final[dict[str, Any]] = {"chi2": 0.0, "branch": "", "group": -1, "radius": 0.0, "inferred": False}
+#: Power of the unit of length in a column.
+POWER: Final = {"joints": 1, "head": 1, "radius": 1, "scale": -1}
+CAMERA_LENGTHS: Final = ("f", "position")
+#: Fields of a frame's ``camera`` and ``root`` that are lengths.
+ROOT_LENGTHS: Final = ("estimate", "deviation", "lower", "upper", "depth")
+#: Fields of a recovery beside its tables.
+MAPPINGS: Final = ("settings", "tolerances", "lengths", "camera")
+ABOUT: Final = ("unit", *MAPPINGS, "source", "joint_names", "configuration_names")
+#: Lists with an entry a frame, and the entry that says nothing.
+FRAME_FILL: Final[dict[str, Any]] = {
+    **{"camera": {}, "rejected": {}, "levels": (), "reason": "", "judged": "", "root": None}
+}
+FRAME_LISTS: Final = ("pictures", *FRAME_FILL)
+FRAME_ARRAYS: Final = ("time", "unlisted", "unlisted_probability")
+ANSWER_LISTS: Final = ("sure_of", "representatives", "represented")
+ANSWER_ARRAYS: Final = ("joints", "sure", "survivor", "nearer", "nearer_sure")
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether a JSON document, NPZ arrays or a Parquet table hold a result."""
+    if isinstance(document, Table):
+        return "posekit" in document.about and RESULT_SCHEMA in document.about["posekit"][:200]
+    return schema_of(document).startswith("posekit.result/")
+
+
+def read(document: Any, path: str | Path, options: Options) -> Recovery:
+    """Read a result.
+
+    Raises
+    ------
+    InputError
+        If the document is damaged or of another version.
+    """
+    with undamaged(path, RESULT_SCHEMA), json_file.without_collection():
+        if isinstance(document, Table):
+            return _of_columns(_table_columns(document), _parsed(document.about["posekit"], path), path)
+        root = Node(document, path)
+        if check_schema(root, RESULT_SCHEMA, EARLIER_SCHEMA) == EARLIER_SCHEMA:
+            from posekit.formats.earlier_result import document_of
+
+            root = Node(document_of(root), path)
+        if "about" in root.value:
+            return _of_columns(document, _parsed(root.at("about").text(), path), path)
+        return _of_json(root)
+
+
+def write(path: str | Path, recovery: Recovery) -> None:
+    """Write a result: ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise, or the file cannot be written.
+    """
+    name = Path(path).name.lower()
+    if name.endswith((".json", ".json.gz")):
+        head = {"schema": RESULT_SCHEMA, **plain({field: getattr(recovery, field) for field in ABOUT})}
+        head["lengths"] = {name: value * PER_METRE[recovery.unit] for name, value in recovery.lengths.items()}
+        if recovery.path is not None:
+            head["paths"] = _paths_fields(recovery)
+        json_file.write(path, head, "frames", _frame_fields(recovery))
+    elif name.endswith(".npz"):
+        from posekit.formats.npz_file import packed
+
+        about = json.dumps(_about(recovery), allow_nan=False)
+        arrays = {"schema": np.array(RESULT_SCHEMA), "about": np.array(about), **_arrays(recovery)}
+        write_bytes(path, packed(arrays))
+    elif name.endswith(".parquet"):
+        from posekit.formats.parquet import packed_table
+
+        tables = {name: nullable(values) for name, values in _other_arrays(recovery).items()}
+        about = json.dumps({**_about(recovery), "arrays": tables}, allow_nan=False)
+        write_bytes(path, packed_table(_flat(recovery), {"posekit": about}))
+    else:
+        got = f"the ending {shown(Path(path).suffix)}"
+        raise refusal(path, "", got, ".json, .json.gz, .npz or .parquet", "rename it")
+
+
+def plain(value: Any) -> Any:
+    """Turn mappings, sequences and arrays into what JSON spells, with None for NaN."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return nullable(np.asarray(value))
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+def _columns(recovery: Recovery) -> dict[str, NDArray[Any]]:
+    """Return the survivors' columns that say something, without margins."""
+    found = {}
+    for name in SHAPES:
+        values, fill = getattr(recovery.survivors, name), FILL.get(name, np.nan)
+        empty = np.isnan(values) if isinstance(fill, float) and np.isnan(fill) else values == fill
+        if name in ("joints", "q", "probability") or not empty.all():
+            found[name] = values
+    return found
+
+
+def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
+    """Go through the frames as JSON has them, in the file's unit."""
+    per = PER_METRE[recovery.unit]
+    lists = {
+        name: nullable(values * per ** POWER[name] if name in POWER else values)
+        for name, values in _columns(recovery).items()
+    }
+    checks = list(recovery.survivors.margins)
+    margins = list(zip(*(nullable(values) for values in recovery.survivors.margins.values()), strict=True))
+    names, frames, answer = list(lists), recovery.frames, recovery.answer
+    joints = nullable(answer.joints * per)
+    for k in range(len(recovery)):
+        rows = recovery.rows(k)
+        held = zip(*(lists[name][rows] for name in names), strict=True)
+        postures = [dict(zip(names, row, strict=True)) for row in held]
+        for posture, one in zip(postures, margins[rows], strict=False):
+            posture["margins"] = dict(zip(checks, one, strict=True))
+        fields: dict[str, Any] = {"time": nullable(frames.time[k])}
+        if frames.pictures:
+            fields["picture"] = frames.pictures[k]
+        start = rows.start
+        yield {
+            **fields,
+            "camera": plain(_scaled(frames.camera[k], CAMERA_LENGTHS, per)),
+            "rejected": plain(frames.rejected[k]),
+            "levels": plain(frames.levels[k]),
+            "unlisted": int(frames.unlisted[k]),  # type: ignore[index]
+            "unlisted_probability": float(frames.unlisted_probability[k]),  # type: ignore[index]
+            "reason": frames.reason[k],
+            "root": plain(_scaled(frames.root[k], ROOT_LENGTHS, per)),
+            "judged": frames.judged[k],
+            "answer": {
+                "joints": joints[k],
+                "sure": nullable(answer.sure[k]),
+                "sure_of": answer.sure_of[k],
+                "survivor": int(answer.survivor[k]) - start if answer.survivor[k] >= 0 else None,  # type: ignore[index]
+                "representatives": (np.asarray(answer.representatives[k]) - start).tolist(),
+                "represented": plain(np.asarray(answer.represented[k])),
+                "nearer": answer.nearer[k].tolist(),  # type: ignore[index]
+                "nearer_sure": nullable(answer.nearer_sure[k]),  # type: ignore[index]
+            },
+            "postures": postures,
+        }
+
+
+def _scaled(fields: Mapping[str, Any] | None, lengths: tuple[str, ...], per: float) -> dict[str, Any] | None:
+    """Multiply the lengths among a frame's fields; a residual is a length if the camera has an f, else pixels."""
+    if fields is None:
+        return None
+    found = dict(fields)
+    for name in (*lengths, *(("residual",) if fields.get("f") is not None else ())):
+        if found.get(name) is not None:
+            found[name] = np.asarray(found[name], dtype=np.float64) * per
+    if found.get("scale") is not None:
+        found["scale"] = np.asarray(found["scale"], dtype=np.float64) / per
+    return found
+
+
+def _paths_fields(recovery: Recovery) -> list[dict[str, Any]]:
+    starts = np.array([recovery.rows(k).start for k in range(len(recovery))])
+    path, per = recovery.path, PER_METRE[recovery.unit]
+    assert path is not None  # only called where there are paths
+    local = np.where(path.survivor >= 0, path.survivor - starts, -1)
+    columns = path.probability.tolist(), local.tolist(), nullable(path.joints * per)
+    return [
+        dict(zip(("probability", "survivor", "joints"), row, strict=True))
+        for row in zip(*columns, strict=True)
+    ]
+
+
+def _of_json(root: Node) -> Recovery:
+    """Make a recovery of a JSON document."""
+    document, per = root.value, PER_METRE[root.at("unit").text(PER_METRE)]
+    frames, nq = document["frames"], len(document["configuration_names"])
+    held = [frame["postures"] for frame in frames]
+    postures = [posture for each in held for posture in each]
+    answers = [frame.get("answer") or {} for frame in frames]
+    starts = np.cumsum([0, *map(len, held)])
+    columns: dict[str, Any] = {"frame": np.repeat(np.arange(len(frames)), np.diff(starts))}
+    for name, shape in SHAPES.items():
+        if name == "branch":
+            columns[name] = np.array([str(posture.get(name, "")) for posture in postures])
+        elif name in ("joints", "q") or any(name in posture for posture in postures):
+            columns[name] = stacked(postures, name, *(nq if extent is None else extent for extent in shape))
+    margins = [posture.get("margins") or {} for posture in postures]
+    for check in dict.fromkeys(check for one in margins for check in one):
+        columns[f"margin.{check}"] = stacked(margins, check)
+    columns |= {f"frames.{name}": stacked(frames, name) for name in FRAME_ARRAYS}
+    columns |= {f"answer.{name}": stacked(answers, name, *_answer_shape(name)) for name in ANSWER_ARRAYS}
+    columns["answer.survivor"] = np.nan_to_num(columns["answer.survivor"] + starts[:-1], nan=-1)
+    if paths := document.get("paths"):
+        local = stacked(paths, "survivor", len(frames))
+        columns["path.survivor"] = np.where(local >= 0, local + starts[:-1], -1)
+        columns["path.probability"] = stacked(paths, "probability")
+        columns["path.joints"] = stacked(paths, "joints", len(frames), len(JOINTS), 3)
+    for name in columns:
+        power = 1 if name in ("answer.joints", "path.joints") else POWER.get(name, 0)
+        columns[name] = columns[name] / per**power if power else columns[name]
+    about = {name: document.get(name) for name in ABOUT}
+    about["lengths"] = {name: value / per for name, value in (about["lengths"] or {}).items()}
+    about["frames"] = {name: [frame.get(name) for frame in frames] for name in FRAME_LISTS}
+    about["frames"] |= {
+        "pictures": [frame.get("picture", "") for frame in frames],
+        "camera": [_scaled(frame.get("camera") or {}, CAMERA_LENGTHS, 1 / per) for frame in frames],
+        "root": [_scaled(frame.get("root"), ROOT_LENGTHS, 1 / per) for frame in frames],
+    }
+    about["answer"] = {
+        "sure_of": [one.get("sure_of", "") for one in answers],
+        "represented": [one.get("represented") or [] for one in answers],
+        "representatives": [
+            np.array(one.get("representatives") or [], dtype=np.intp) + start
+            for one, start in zip(answers, starts[:-1], strict=True)
+        ],
+    }
+    return _of_columns(columns, about, root.source)
+
+
+def stacked(holders: Sequence[Mapping[str, Any]], name: str, *shape: int) -> Array:
+    """Gather one field of many objects into an array (N, *shape); NaN where it is null or absent."""
+    nothing = np.full(shape, np.nan).tolist() if shape else np.nan
+    values = [nothing if (value := one.get(name)) is None else value for one in holders]
+    return np.array(values, dtype=np.float64).reshape(len(holders), *shape)
+
+
+def _about(recovery: Recovery) -> dict[str, Any]:
+    """Return everything that is no array."""
+    return {
+        "schema": RESULT_SCHEMA,
+        **plain({name: getattr(recovery, name) for name in ABOUT}),
+        "frames": plain({name: getattr(recovery.frames, name) for name in FRAME_LISTS}),
+        "answer": plain({name: getattr(recovery.answer, name) for name in ANSWER_LISTS}),
+    }
+
+
+def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
+    """Return all arrays by name, metres."""
+    return {
+        "frame": recovery.survivors.frame,
+        **_columns(recovery),
+        **{f"margin.{check}": values for check, values in recovery.survivors.margins.items()},
+        **_other_arrays(recovery),
+    }
+
+
+def _other_arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
+    path = recovery.path
+    held = {f"frames.{name}": np.asarray(getattr(recovery.frames, name)) for name in FRAME_ARRAYS}
+    held |= {f"answer.{name}": np.asarray(getattr(recovery.answer, name)) for name in ANSWER_ARRAYS}
+    if path is not None:
+        held |= {f"path.{name}": getattr(path, name) for name in ("survivor", "probability", "joints")}
+    return held
+
+
+def _flat(recovery: Recovery) -> dict[str, NDArray[Any]]:
+    """Return the survivors as flat columns, named as `Recovery.to_pandas` names them."""
+    columns, frame = _columns(recovery), recovery.survivors.frame
+    found = {"frame": frame, "time": np.asarray(recovery.frames.time)[frame]}
+    found |= {name: values for name, values in columns.items() if not SHAPES[name]}
+    found |= {f"margin_{check}": values for check, values in recovery.survivors.margins.items()}
+    for name in (name for name in columns if SHAPES[name]):
+        width = int(np.prod(columns[name].shape[1:]))
+        flat = columns[name].reshape(len(frame), width)
+        found |= dict(zip(_flat_names(name, width), flat.T, strict=True))
+    return found
+
+
+def _flat_names(name: str, width: int) -> list[str]:
+    """Name the flat columns of one column of the survivors."""
+    if name == "q":
+        return [f"q_{k}" for k in range(width)]
+    if name in ("joints", "head"):
+        points = JOINTS if name == "joints" else HEAD_POINTS
+        return [f"{point}_{axis}" for point in points for axis in "xyz"]
+    return [f"{joint}_{name}" for joint in JOINTS]
+
+
+def _table_columns(table: Table) -> dict[str, Any]:
+    """Gather the survivors' columns of a flat table."""
+    names = set(table.names)
+    found: dict[str, Any] = {"frame": table.column("frame").astype(np.intp)}
+    width = sum(name.removeprefix("q_").isdecimal() for name in names if name.startswith("q_"))
+    for name, shape in SHAPES.items():
+        flat = _flat_names(name, width)
+        if not shape and name in names:
+            found[name] = np.array(table.texts(name)) if name == "branch" else table.column(name)
+        elif shape and set(flat) <= names:
+            values, rows = np.array([table.column(one) for one in flat]).T, len(found["frame"])
+            found[name] = values.reshape(rows, *(width if extent is None else extent for extent in shape))
+    margins = {name for name in table.names if name.startswith("margin_")}
+    return found | {f"margin.{name.removeprefix('margin_')}": table.column(name) for name in margins}
+
+
+def _parsed(text: str, path: str | Path) -> dict[str, Any]:
+    about = json_file.parse(text.encode(), f"{path}: about")
+    if not isinstance(about, dict):
+        raise refusal(path, "about", shown(about), "an object", "write the result again")
+    return about
+
+
+def _of_columns(columns: Mapping[str, Any], about: Mapping[str, Any], path: str | Path) -> Recovery:
+    """Make a recovery of arrays by name and of everything that is no array."""
+    root = Node(about, path)
+    held: dict[str, Any] = {**dict(about.get("arrays") or {}), **columns}
+    arrays = Node(held, path)
+    frame = arrays.at("frame").array(None).astype(np.intp)
+    rows = len(frame)
+    survivors: dict[str, Any] = {}
+    for name, shape in SHAPES.items():
+        if name == "branch":
+            survivors[name] = None if name not in held else np.asarray(held[name])
+        elif name in held:
+            survivors[name] = _as_floats(arrays, name, rows, *shape)
+    for name, dtype in (("group", np.intp), ("inferred", np.bool_)):
+        if name in survivors:
+            survivors[name] = survivors[name].astype(dtype)
+    margins = {
+        name.removeprefix("margin."): arrays.at(name).array(rows, unknown=True)
+        for name in held
+        if name.startswith("margin.")
+    }
+    frames, answer = root.at("frames").object(), root.at("answer").object()
+    count = len(_as_floats(arrays, "frames.time", None))
+    if rows and (frame.min() < 0 or frame.max() >= count or (np.diff(frame) < 0).any()):
+        raise arrays.at("frame").refused(f"ascending frames below {count}", "write the result again")
+    other = {name: _as_floats(arrays, f"frames.{name}", count) for name in FRAME_ARRAYS}
+    lists: dict[str, Any] = {
+        name: [fill if one is None else one for one in frames.get(name) or [fill] * count]
+        for name, fill in FRAME_FILL.items()
+    }
+    pictures = [str(name) for name in frames.get("pictures") or ()]
+    of_answer: dict[str, Any] = {
+        name: _as_floats(arrays, f"answer.{name}", count, *_answer_shape(name)) for name in ANSWER_ARRAYS
+    }
+    for name in ("survivor", "nearer"):
+        of_answer[name] = np.nan_to_num(of_answer[name]).astype(np.intp)
+    if (of_answer["survivor"] >= rows).any():
+        raise arrays.at("answer.survivor").refused(f"rows of {rows} postures", "write the result again")
+    path_arrays = None
+    if "path.survivor" in held:
+        survivor = _as_floats(arrays, "path.survivor", None, count).astype(np.intp)
+        path_arrays = Paths(
+            survivor=survivor,
+            probability=_as_floats(arrays, "path.probability", len(survivor)),
+            joints=_as_floats(arrays, "path.joints", len(survivor), count, len(JOINTS), 3),
+        )
+    names = root.at("joint_names").texts()
+    if names != JOINTS:
+        raise root.at("joint_names").refused("the 14 joints in tree order", "write the result again")
+    mappings: dict[str, Any] = {name: about.get(name) or {} for name in MAPPINGS}
+    none: list[list[Any]] = [[]] * count
+    return Recovery(
+        survivors=Survivors(frame=frame, margins=margins, **survivors),
+        frames=Frames(
+            time=other["time"],
+            unlisted=np.nan_to_num(other["unlisted"]).astype(np.intp),
+            unlisted_probability=np.nan_to_num(other["unlisted_probability"]),
+            pictures=pictures if any(pictures) else (),
+            **lists,
+        ),
+        answer=Answer(
+            **of_answer,
+            sure_of=list(answer.get("sure_of") or [""] * count),
+            representatives=[np.array(one, dtype=np.intp) for one in answer.get("representatives") or none],
+            represented=[np.array(one, dtype=np.float64) for one in answer.get("represented") or none],
+        ),
+        path=path_arrays,
+        **mappings,
+        configuration_names=root.at("configuration_names").texts(),
+        unit=root.at("unit").text(PER_METRE),
+        source=str(about.get("source") or ""),
+    )
+
+
+def _answer_shape(name: str) -> tuple[int, ...]:
+    return (len(JOINTS), 3) if name == "joints" else (len(TREE_SEGMENTS),) if "nearer" in name else ()
+
+
+def _as_floats(arrays: Node, name: str, *shape: int | None) -> Array:
+    """Return an array of numbers, truth values as 0 and 1."""
+    node = arrays.at(name)
+    if isinstance(node.value, np.ndarray) and node.value.dtype.kind == "b":
+        node = Node(node.value.astype(np.float64), node.source, node.place)
+    return node.array(*shape, unknown=True)

@@ -1,0 +1,418 @@
+"""Configurations of a robot over time: arrays and tables of a root's place and rotation and of joints.
+
+The layouts of kind ``robot-file`` in ``urdf/layouts`` say which arrays or columns are what. Configurations are returned
+in Pinocchio's convention: x, y, z in metres, the unit quaternion qx, qy, qz, qw, joints in radians.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import InputError, refusal, shown
+from posekit.formats.body_checks import METRES, times
+from posekit.formats.layout import Layout, load_layout
+from posekit.formats.options import Options
+from posekit.formats.tables import Table
+from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, quaternion_rotate
+from posekit.geometry.units import FARTHEST_COORDINATE
+from posekit.motion import Motion
+
+ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
+RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
+TIMES: Final = ("time", "times", "timestamp", "timestamps", "t", "time_s")
+COUNTS: Final = ("frame", "index", "frame#", "")
+#: Layouts of files in the order in which they are tried: a simulator's file may have arrays of the root, too.
+KINDS: Final = "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
+LAYOUTS: Final = tuple(f"robot_{kind}" for kind in KINDS)
+SPELT: Final = {"xyzw": "x, y, z, w", "wxyz": "w, x, y, z"}
+
+#: Difference of the median lean by which one order of a quaternion lets the robot stand and the other does not.
+LEAN_DEGREES: Final = 20.0
+#: Difference of the median lean below which both orders let the robot stand alike.
+SAME_LEAN_DEGREES: Final = 1.0
+#: Way of the root along the ground from which its direction is compared with the robot's heading.
+TRAVEL_METRES: Final = 0.3
+#: Difference of the angles between heading and travel by which one order is chosen.
+HEADING_DEGREES: Final = 60.0
+#: Median lean above which a robot does not stand.
+STANDING_DEGREES: Final = 60.0
+#: Length below which a quaternion is unknown; deviations from length 1 that are noted, and that are refused.
+ZERO_LENGTH, UNIT_LENGTH_ERROR, NO_QUATERNION = 1e-6, 0.01, 0.25
+#: Angle that 1 % of all values must exceed to be degrees: more than a turn in radians.
+DEGREES_FROM: Final = 7.0
+#: Median height of a root below which its place is in the unit.
+HEIGHTS: Final = {"m": 10.0, "cm": 300.0, "mm": np.inf}
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether arrays or a table hold a robot's motion."""
+    return _layout_of(_columns(document)) is not None
+
+
+def _columns(document: Any) -> Mapping[str, Any]:
+    """Return arrays by name: of a table with names the table by each, of one without its numbers under ``""``."""
+    if not isinstance(document, Table):
+        both = isinstance(document, Mapping) and getattr(document.get("joints"), "ndim", 0) == 3
+        return document if isinstance(document, Mapping) and not both else {}
+    if "schema" in document.about or document.names:
+        return {} if "schema" in document.about else dict.fromkeys(document.names, document)
+    wide = bool(document.lines) and len(document.parted(document.lines[0])) > len(ROOT_NAMES)
+    return {"": document.numbers} if wide else {}
+
+
+def _layout_of(columns: Mapping[str, Any]) -> Layout | None:
+    return next((one for one in map(load_layout, LAYOUTS) if _fits(one.fields, columns)), None)
+
+
+def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
+    if "whole" in parts:
+        return _whole(parts, columns) is not None
+    joints = parts["joints"]
+    found = [_names(parts[part], columns) for part in ("position", "rotation")]
+    return all(found) and ("arrays" not in joints or bool(_names(joints, columns)))
+
+
+def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
+    """Return the arrays or columns that a part of a layout names; empty if they are not all there."""
+    if "arrays" in part:  # the first of several names
+        return [name for name in part["arrays"] if _is_array(columns.get(name))][:1]
+    if "each" in part:  # one a coordinate
+        return list(part["each"]) if set(part["each"]) <= set(columns) else []
+    by_axis: dict[str, str] = {}
+    for name in columns:
+        if match := re.fullmatch(part["pattern"], name, re.IGNORECASE):
+            by_axis.setdefault(match[1].lower(), name)
+    return [by_axis[axis] for axis in part["axes"]] if set(part["axes"]) <= set(by_axis) else []
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim > 1 and value.dtype.kind in "iuf"
+
+
+def _labels(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> tuple[str, ...]:
+    names = next((columns[one] for one in parts["joints"].get("labels", ()) if one in columns), ())
+    return tuple(_joint_name(str(one)) for one in np.ravel(names))
+
+
+def _whole(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> str | None:
+    """Return the array that holds root and joints; those of joints must be wider than their names by the root."""
+    wide = len(_labels(parts, columns)) + len(ROOT_NAMES)
+    for name in parts["whole"]["arrays"]:
+        values = columns.get(name)
+        sure = name in parts["whole"].get("sure", ("",))
+        if isinstance(values, np.ndarray) and values.ndim == 2 and (sure or values.shape[1] == wide):
+            return str(name)
+    return None
+
+
+def read(document: Any, path: str, options: Options) -> Motion:
+    """Read a robot's motion.
+
+    Raises
+    ------
+    InputError
+        If arrays are missing or of other shapes, or a quaternion is none.
+    """
+    columns = _columns(document)
+    about = document.about if isinstance(document, Table) else columns
+    notes: list[str] = []
+    warnings: list[str] = []
+    layout, order = _stated_layout(columns, path, options)
+    time, rate = _time(columns)
+    parts = layout.fields
+    if "whole" in parts:
+        place, turn, joints, labels, time = _of_whole(parts, columns, time, notes)
+    else:
+        place, turn, joints, labels = _of_parts(parts, columns, path, notes)
+    if labels and len(labels) != joints.shape[1]:
+        got = f"{len(labels)} names"
+        raise refusal(path, "joint names", got, f"{joints.shape[1]}, one a joint", "correct the file")
+    if any((np.abs(values) > FARTHEST_COORDINATE).any() for values in (place, turn, joints)):
+        raise refusal(path, "", "a number too large", f"numbers below {FARTHEST_COORDINATE:g}")
+    up = options.up or str(about.get("up", ""))
+    if place.shape[1]:
+        joints = _radians(joints, parts["joints"].get("unit", ""), notes)
+        how = parts.get("rotation", parts.get("whole", {}))
+        if turn.shape[1] == 3:
+            turn, how = _euler(turn, how), {"order": "xyzw"}
+        turn, up = root_quaternion(turn, how.get("order", ""), place, up, path, notes, warnings)
+        place = _metres(place, options.unit or parts.get("position", {}).get("unit", ""), up, notes)
+    labels, joints = _named(labels, joints, order or _order(parts, columns, joints.shape[1]), options, notes)
+    robot = options.urdf or str(about.get("robot", "")) or _robot_of(labels)
+    if not robot:
+        notes.append("which robot it is the file does not say (--urdf)")
+    return Motion(
+        q=np.hstack([place, turn, joints]),
+        q_names=(*(ROOT_NAMES if place.shape[1] else ()), *labels) if labels else (),
+        robot=robot,
+        time=times(len(joints), time, rate, options, notes, warnings),
+        up=up,
+        source=path,
+        layout=layout.name,
+        notes=notes,
+        warnings=warnings,
+    )
+
+
+def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> tuple[Layout, str]:
+    """Return the layout of the file, and the name of a stated order of its joints."""
+    stated = load_layout(options.layout) if options.layout else None
+    if stated is not None and stated.kind not in ("robot-file", "robot"):
+        raise refusal(path, "layout", shown(options.layout), "a layout of a robot", "choose another layout")
+    own = stated if stated is not None and stated.kind == "robot-file" else _layout_of(columns)
+    if own is None or not _fits(own.fields, columns):
+        expected = "a root's place and rotation, and joints"
+        raise refusal(path, "", "no robot's motion", expected, "check the file")
+    return own, options.layout if stated is not None and stated is not own else ""
+
+
+def _of_whole(
+    parts: Mapping[str, Any], columns: Mapping[str, Any], time: Array | None, notes: list[str]
+) -> tuple[Array, Array, Array, tuple[str, ...], Array | None]:
+    """Part rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
+    labels = _labels(parts, columns)
+    values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
+    first = values[:, 0]
+    even = len(first) > 2 and first[0] == 0 and np.allclose(np.diff(first), first[1], rtol=1e-3, atol=2e-6)
+    if "" not in parts["whole"]["arrays"] and "q" in columns and labels[: len(ROOT_NAMES)] != ROOT_NAMES:
+        return values[:, :0], values[:, :0], values, labels, time  # another root than a free flyer
+    labels = labels[len(ROOT_NAMES) :] if labels[: len(ROOT_NAMES)] == ROOT_NAMES else labels
+    whole = values[np.isfinite(values).all(axis=1)]
+    if not len(whole):
+        return values[:, :3], values[:, 3:7], values[:, 7:], labels, time
+    off = [np.median(np.abs(np.linalg.norm(whole[:, k : k + 4], axis=1) - 1)) for k in (3, 4)]
+    if even and first[1] > 0 and off[1] < NO_QUATERNION and off[0] > UNIT_LENGTH_ERROR:
+        counts = first[1] % 1 == 0
+        notes.append(f"the first column is {'frame numbers' if counts else 'seconds'}")
+        values, time = values[:, 1:], time if counts else first
+    return values[:, :3], values[:, 3:7], values[:, 7:], labels, time
+
+
+def _of_parts(
+    parts: Mapping[str, Any], columns: Mapping[str, Any], path: str, notes: list[str]
+) -> tuple[Array, Array, Array, tuple[str, ...]]:
+    """Return the root's place (T, 3), its rotation (T, 3 or 4), joints (T, K), and names."""
+    joint_part, labels = parts["joints"], _labels(parts, columns)
+    names = {part: _names(parts[part], columns) for part in ("position", "rotation")}
+    if "arrays" in joint_part:
+        joints = _stacked(columns, _names(joint_part, columns))
+    else:
+        prefix, used = joint_part.get("prefix", ""), {*names["position"], *names["rotation"]}
+        own = [one for one in columns if one.startswith(prefix) and one not in used]
+        own = [one for one in own if one.lower() not in (*TIMES, *COUNTS)]
+        stripped = [_joint_name(one.removeprefix(prefix)) for one in own]
+        if not own or len(set(stripped)) != len(stripped):
+            got = f"{len(own)} columns of joints, {len(set(stripped))} different"
+            raise refusal(path, "columns", got, "each joint once", "correct the names")
+        signs = [joint_part.get("signs", {}).get(one, 1.0) for one in stripped]
+        joints = _stacked(columns, own) * np.array(signs)
+        labels = tuple(joint_part.get("renamed", {}).get(one, one) for one in stripped)
+    place, turn = (_stacked(columns, names[part]) for part in ("position", "rotation"))
+    if place.ndim == turn.ndim == 3:  # all bodies, the root first
+        root = int([str(one) for one in np.ravel(columns.get("body_names", ()))][:1] == ["world"])
+        place, turn = place[:, root], turn[:, root]
+    if labels and len(labels) + len(ROOT_NAMES) == joints.shape[-1]:
+        notes.append("the joints begin with the root's place and quaternion")
+        place, turn, joints = joints[:, :3], joints[:, 3:7], joints[:, 7:]
+    count = len(joints)
+    fits = joints.ndim == 2 and place.shape == (count, 3) and turn.shape in ((count, 4), (count, 3))
+    if not fits:
+        got = f"shapes {place.shape}, {turn.shape}, {joints.shape}"
+        raise refusal(path, "root and joints", got, "(T, 3), (T, 4), (T, K)", "correct the file")
+    return place + np.array(parts["position"].get("offset", 0.0)), turn, joints, labels
+
+
+def _stacked(columns: Mapping[str, Any], names: Sequence[str]) -> Array:
+    """Return one array, or columns side by side (T, K)."""
+    found = [_value(columns, name) for name in names]
+    if len({one.shape for one in found}) > 1:
+        raise InputError(f"{names[0]}: got columns of different lengths; expected one; correct the file")
+    return found[0] if len(found) == 1 and found[0].ndim > 1 else np.stack(found, axis=1)
+
+
+def _value(columns: Mapping[str, Any], name: str) -> Array:
+    values = columns[name]
+    with np.errstate(invalid="ignore"):
+        return values.checked(name) if isinstance(values, Table) else np.asarray(values, dtype=np.float64)
+
+
+def _joint_name(name: str) -> str:
+    """Take from a column's name what is no part of the joint's: ``dof_elbow(rad)``, ``elbow_dof`` are ``elbow``."""
+    return re.sub(r"^dof_|_dof$|_pos$", "", re.sub(r"\s*[(\[](rad|deg)[)\]]$", "", name.strip()))
+
+
+def _time(columns: Mapping[str, Any]) -> tuple[Array | None, float | None]:
+    """Return the file's times and its rate, where it has them."""
+    name = next((name for name in columns if name.lower() in TIMES), None)
+    key = next((name for name in RATES if name in columns), None)
+    rate = np.empty(0) if key is None else np.ravel(_value(columns, key))
+    return (None if name is None else np.ravel(_value(columns, name))), float(rate[0]) if rate.size else None
+
+
+def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:
+    """Return the layout of unnamed joints: of simulators breadth first, unless the bodies are depth first.
+
+    Breadth first, the first two bodies are the left and right hip, equally far from the root.
+    """
+    order = str(parts["joints"].get("orders", {}).get(str(count), ""))
+    bodies = np.asarray(columns.get("body_pos_w", ()))
+    if order.endswith("_isaac") and bodies.ndim == 3 and bodies.shape[1] > 2:
+        first, second = (np.median(np.linalg.norm(bodies[:, k] - bodies[:, 0], axis=1)) for k in (1, 2))
+        if first > 0 and abs(first - second) > 0.05 * first:
+            return order.removesuffix("_isaac")
+    return order
+
+
+def _named(
+    labels: tuple[str, ...], joints: Array, order: str, options: Options, notes: list[str]
+) -> tuple[tuple[str, ...], Array]:
+    """Name unnamed joints by a layout's order, and bring those of a G1 into its own, with zeros where they lack."""
+    names = load_layout(order).fields["joints"] if order and not labels else ()
+    if len(names) == joints.shape[1] and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
+        notes.append(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
+        labels = tuple(names)
+    elif not labels:
+        notes.append("joints are in the robot's own order: the file does not name them")
+    if not _robot_of(labels):
+        return labels, joints
+    missing = [name for name in _g1() if name not in labels]
+    if missing:
+        notes.append(f"{', '.join(missing)} are not in the file and set to 0")
+    joints = np.hstack([joints, np.zeros((len(joints), len(missing)))])
+    return tuple(_g1()), joints[:, [(*labels, *missing).index(name) for name in _g1()]]
+
+
+def _g1() -> Sequence[str]:
+    return load_layout("g1_29").fields["joints"]  # type: ignore[no-any-return]
+
+
+def _robot_of(labels: Sequence[str]) -> str:
+    return "g1" if labels and set(labels) <= set(_g1()) else ""
+
+
+def _radians(joints: Array, unit: str, notes: list[str]) -> Array:
+    known = np.abs(joints[np.isfinite(joints)])
+    if not unit and len(known) and np.percentile(known, 99) > DEGREES_FROM:
+        notes.append(f"joints are in degrees: values reach {known.max():.4g}")
+        unit = "deg"
+    return np.radians(joints) if unit == "deg" else joints
+
+
+def _metres(place: Array, unit: str, up: str, notes: list[str]) -> Array:
+    """Return the root's place in metres; its height tells centimetres and millimetres."""
+    heights = np.abs(place[:, "xyz".index(up[1])])
+    height = float(np.nanmedian(heights)) if np.isfinite(heights).any() else 0.0
+    found = next(name for name, most in HEIGHTS.items() if height < most or name == "mm")
+    if not unit and found != "m":
+        notes.append(f"the root's place is in {found}: its height is {height:.4g}")
+    return place * METRES[unit or found]
+
+
+def _euler(angles: Array, part: Mapping[str, Any]) -> Array:
+    """Return quaternions (T, 4) of intrinsic angles (T, 3) about the axes that a layout names."""
+    angles = angles * np.array(part.get("signs", (1.0, 1.0, 1.0)))
+    angles = np.radians(angles) if part.get("unit") == "deg" else angles
+    R = np.eye(3)
+    for k, axis in enumerate(part["euler"]):
+        R = R @ coordinate_rotation("xyz".index(axis), angles[:, k])
+    return quaternion_from_rotation(R)
+
+
+def root_quaternion(
+    values: Array, order: str, place: Array, up: str, source: str, notes: list[str], warnings: list[str]
+) -> tuple[Array, str]:
+    """Bring quaternions into the order x, y, z, w, and find the axis along which the robot stands.
+
+    Without a stated order both are compared, in this order: by how upright the robot stands, by whether it heads where
+    it travels (its x axis points forward), and by custom (x, y, z, w). The length of each step of the rotation is the
+    same in both orders, so continuity decides nothing more.
+
+    Parameters
+    ----------
+    values : array (T, 4)
+        As the file has them.
+    order : str
+        ``xyzw`` or ``wxyz``; empty if the file does not say it.
+    place : array (T, 3)
+        The root in the world.
+    up : str
+        Axis that points up, if it is stated.
+
+    Returns
+    -------
+    q : array (T, 4)
+        Unit quaternions x, y, z, w; NaN where the file has zeros.
+    up : str
+    """
+    length = np.linalg.norm(values, axis=1)
+    zero = length <= ZERO_LENGTH
+    off = np.where(zero | np.isnan(length), 0.0, np.abs(length - 1))
+    if off.max(initial=0.0) > NO_QUATERNION:
+        frame = int(np.argmax(off))
+        got = f"a quaternion of length {length[frame]:.4g}"
+        raise refusal(source, f"rotation[{frame}]", got, "1", "give quaternions x, y, z, w or w, x, y, z")
+    if off.max(initial=0.0) > UNIT_LENGTH_ERROR:
+        warnings.append(f"quaternions are up to {off.max():.1%} off length 1: they are scaled to it")
+    if zero.any():
+        warnings.append(f"the quaternion is zero: no rotation is known in {zero.sum()} of {len(zero)} frames")
+    values = values / np.where(zero, np.nan, length)[:, None]
+    known = np.isfinite(values).all(axis=1)
+    if not known.any():
+        return values, up or "+z"
+    both = {"xyzw": values, "wxyz": values[:, [1, 2, 3, 0]]}
+    order = order or _likely({name: q[known] for name, q in both.items()}, place[known], notes, warnings)
+    return both[order], _standing(both[order][known], up, warnings)
+
+
+def _lean(q: Array, axis: int = 2) -> float:
+    """Return the median angle between the robot's z axis and an axis of the world, degrees."""
+    z = quaternion_rotate(q, np.tile([0.0, 0.0, 1.0], (len(q), 1)))
+    return float(np.degrees(np.arccos(np.clip(np.median(z[:, axis]), -1, 1))))
+
+
+def _likely(both: Mapping[str, Array], place: Array, notes: list[str], warnings: list[str]) -> str:
+    """Return the order by which the robot stands, or else heads where it travels."""
+    lean = {name: min(_lean(q), _lean(q, 1)) for name, q in both.items()}
+    first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
+    off = {name: _off_heading(q, place) for name, q in both.items()}
+    ahead, other = sorted(off, key=lambda name: off[name])
+    reading = "the root's quaternion is read as"
+    if lean[second] - lean[first] <= LEAN_DEGREES and off[other] - off[ahead] > HEADING_DEGREES:
+        (notes if ahead == first else warnings).append(
+            f"{reading} {SPELT[ahead]}: the robot stands by both; it heads {off[ahead]:.0f} degrees from its way "
+            f"by this, {off[other]:.0f} by the other"
+        )
+        return ahead
+    if lean[second] - lean[first] > SAME_LEAN_DEGREES:
+        by = f"the robot leans {lean[first]:.0f} degrees by this order, {lean[second]:.0f} by the other"
+        notes.append(f"{reading} {SPELT[first]}: {by}")
+        return first
+    notes.append(f"{reading} x, y, z, w, by custom: the robot stands by both orders")
+    return "xyzw"
+
+
+def _off_heading(q: Array, place: Array) -> float:
+    """Return the median angle between heading and travel, degrees; 0 if the robot hardly travels."""
+    steps = np.diff(place[:, :2], axis=0)
+    moved = np.linalg.norm(steps, axis=1)
+    if not np.nansum(moved) > TRAVEL_METRES:
+        return 0.0
+    heading = quaternion_rotate(q, np.tile([1.0, 0.0, 0.0], (len(q), 1)))[:-1, :2]
+    cosine = (heading * steps).sum(axis=1) / np.maximum(moved * np.linalg.norm(heading, axis=1), 1e-12)
+    return float(np.degrees(np.arccos(np.clip(np.median(cosine[moved > 0.2 * np.nanmax(moved)]), -1, 1))))
+
+
+def _standing(q: Array, stated: str, warnings: list[str]) -> str:
+    """Return the stated axis, or the one along which the robot stands in most frames; +z if it stands along none."""
+    for axis, name in ((2, "+z"), (1, "+y"), (0, "+x")):
+        if _lean(q, axis) < STANDING_DEGREES:
+            if name != (stated or "+z"):
+                warnings.append(f"the robot stands along {name}: this axis is up, or the robot lies (--up)")
+            return stated or name
+    how = "upside down" if _lean(q) > 180 - STANDING_DEGREES else "lying"
+    warnings.append(f"the robot is {how} in most frames: check the quaternion's order and the up axis")
+    return stated or "+z"

@@ -1,0 +1,94 @@
+"""`save`: write any object in the format that the file's name says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from posekit.errors import refusal, shown
+from posekit.formats.open import named, suffix_of
+
+if TYPE_CHECKING:
+    from posekit.motion import Motion
+
+WRITERS: Final[dict[str, dict[str, str]]] = {
+    # class of the object: ending to "module:write", where write(path, object, **options) writes the file whole
+    "Motion": {
+        ".bvh": "figure_tree:write_bvh",
+        ".trc": "trc:write",
+        ".c3d": "c3d:write",
+        ".csv": "joint_arrays:write_csv",
+        ".tsv": "joint_arrays:write_csv",
+        ".npz": "joint_arrays:write_npz",
+        ".parquet": "joint_arrays:write_parquet",
+        ".glb": "glb:write",
+        ".json": "postures_file:write",
+    },
+    "View": {".json": "view_file:write"},
+    "Recovery": dict.fromkeys((".json", ".npz", ".parquet"), "result_file:write"),
+    "Report": dict.fromkeys((".json", ".csv", ".npz", ".parquet", ".md"), "report_file:write"),
+    "dict": dict.fromkeys((".toml", ".json"), "cameras_file:write"),
+}
+#: Formats of points or of the figure: a robot's joints are placed first.
+POINT_FORMATS: Final = (".trc", ".c3d", ".bvh", ".glb")
+
+
+def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: Any) -> None:
+    """Write an object in the format that the file's name says, whole or not at all.
+
+    Parameters
+    ----------
+    thing : Motion, View, Recovery, Report, or dict of cameras
+    path : path
+        Its ending is the format; ``.gz`` behind it packs the file.
+    which : {"", "answer", "path", "all", "first"}
+        Postures of a recovery that files of motion get; the followed path if there is one, else the answer.
+    **options
+        Of the format, such as ``unit="m"`` for BVH.
+
+    Raises
+    ------
+    InputError
+        If the format cannot hold the object, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> posekit.save(posekit.open("samples/jump.bvh"), "jump.trc")
+    """
+    path = Path(path)
+    suffix = suffix_of(path)
+    kind = type(thing).__name__
+    if kind == "Recovery" and (which or suffix not in WRITERS[kind]):
+        followed = thing.path
+        thing = thing.motion(which or ("path" if followed is not None and len(followed) else "answer"))
+        kind = "Motion"
+    known = WRITERS.get(kind, {})
+    if suffix not in known:
+        expected = ", ".join(known) or "a motion, view, result or report"
+        got = f"the ending {shown(suffix)} for a {kind}"
+        raise refusal(path, "", got, f"one that is written: {expected}", "choose one of these")
+    if kind == "Motion" and suffix in POINT_FORMATS and thing.joints is None and thing.document is None:
+        thing = with_points(thing)
+    named(known[suffix])(path, thing, **options)
+
+
+def with_points(motion: Motion) -> Motion:
+    """Return a motion of configurations with the robot's 14 joints, metres, by forward kinematics.
+
+    Raises
+    ------
+    InputError
+        If it is not known which robot it is, or the robot has other joints.
+    """
+    if not motion.robot or motion.q is None:
+        raise refusal(motion.source, "robot", "no name", "the robot of the configurations", "give --urdf")
+    from posekit.robots import load_robot
+
+    robot = load_robot(motion.robot, bodies="none")
+    q = motion.q
+    if motion.q_names and tuple(motion.q_names) != tuple(robot.configuration_names):
+        q, _ = robot.q_from_columns(motion.q_names, q)
+    return replace(motion, joints=robot.points(q))

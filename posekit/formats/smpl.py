@@ -1,0 +1,122 @@
+"""The SMPL family: AMASS and its like, the angles of a body model over time (NPZ, pickle, PyTorch).
+
+Keys: ``poses`` (T, 3 K), rotation vectors of the joints in the model's order, or ``root_orient`` (T, 3) and
+``pose_body`` (T, 63), or ``global_orient`` and ``body_pose``; ``trans`` or ``transl`` (T, 3), metres; ``betas`` (B,); a
+frame rate (Mahmood et al. 2019, *AMASS: Archive of Motion Capture as Surface Shapes*). z is up by custom.
+
+Joints at rest are those of the neutral SMPL model's mean shape unless the file has its own: shapes (``betas``) need the
+model's own files, which are not free to be shared. They change lengths by some per cent and no angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from posekit.errors import refusal
+from posekit.formats.body_checks import points_motion
+from posekit.formats.layout import load_layout
+from posekit.formats.options import Options
+from posekit.formats.robot_tables import RATES
+from posekit.geometry import FARTHEST_COORDINATE, Array, rotation_from_vector
+
+if TYPE_CHECKING:
+    from posekit.motion import Motion
+
+#: Joints of the body, which SMPL, SMPL+H and SMPL-X have alike and first.
+N_JOINTS: Final = 22
+_ANGLES: Final = ("poses", "pose", "root_orient pose_body", "global_orient body_pose", "fullpose")
+_PLACES: Final = ("trans", "transl", "translation", "Th")
+
+
+def looks_like(document: Any) -> bool:
+    """Tell whether arrays are the angles of a body model."""
+    return bool(_angles(document)[1])
+
+
+def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return the arrays of a body model, also those of a dict in a dict, and the names of its angles."""
+    inner = document.values() if isinstance(document, Mapping) else ()
+    for arrays in (document, *inner):
+        if isinstance(arrays, Mapping) and any(name in arrays for name in _PLACES):
+            for keys in map(str.split, _ANGLES):
+                if all(isinstance(arrays.get(k), np.ndarray) and arrays[k].ndim in (2, 3) for k in keys):
+                    return arrays, tuple(keys)
+    return {}, ()
+
+
+def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
+    """Place the 22 joints of the body by the model's angles (Loper et al. 2015, *SMPL*, eq. 3 and 4).
+
+    Raises
+    ------
+    InputError
+        If arrays are missing, infinite or of other shapes.
+    """
+    outer, (document, keys) = document, _angles(document)
+    parts = [np.asarray(document[key], dtype=np.float64).reshape(len(document[key]), -1) for key in keys]
+    count = N_JOINTS
+    if len({len(part) for part in parts}) > 1 or sum(part.shape[1] for part in parts) < 3 * count:
+        got = f"{' and '.join(keys)} of shapes {', '.join(str(part.shape) for part in parts)}"
+        expected = f"{3 * count} numbers a frame or more: rotation vectors of {count} joints"
+        raise refusal(path, keys[0], got, expected, "correct the file")
+    poses = np.concatenate(parts, axis=1)
+    place = np.asarray(document[next(name for name in _PLACES if name in document)], dtype=np.float64)
+    if place.shape != (len(poses), 3) or not len(poses):
+        raise refusal(path, "trans", f"shape {place.shape}", f"({len(poses)}, 3)", "correct the file")
+    used = poses[:, : 3 * count].reshape(len(poses), count, 3)
+    if not (np.abs(used) < FARTHEST_COORDINATE).all() or not (np.abs(place) < FARTHEST_COORDINATE).all():
+        raise refusal(path, keys[0], "a number that is not finite", "finite numbers", "correct the file")
+    rest, notes = _rest(document)
+    held = {**outer, **document}
+    rate = next((np.ravel(held[name]) for name in RATES if name in held), np.empty(0))
+    return points_motion(
+        placed(rest, used, place),
+        (),
+        path,
+        options,
+        layout=load_layout("smpl_22"),
+        rate=float(rate[0]) if rate.size and rate.dtype.kind in "iuf" else None,
+        unit="m",
+        up_by_custom="+z",
+        notes=notes,
+        in_world=True,
+    )
+
+
+def _rest(document: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    """Return the joints at rest (22, 3): the file's own, or the mean shape's."""
+    own = np.asarray(document.get("J", document.get("joints_rest", ())))
+    if own.ndim == 2 and own.shape[0] >= N_JOINTS and own.shape[1] == 3:
+        return own[:N_JOINTS].astype(np.float64), ["joints at rest are the file's own"]
+    layout = load_layout("smpl_22").fields
+    rest = np.array(layout["rest"])
+    for k in range(1, N_JOINTS):
+        rest[k] += rest[layout["parents"][k]]
+    betas = np.ravel(document.get("betas", ()))
+    shape = "; the file's shape (betas) needs the model and is left out" if np.any(betas) else ""
+    return rest, [f"limbs have the lengths of SMPL's mean shape{shape}"]
+
+
+def placed(rest: Array, poses: Array, place: Array) -> Array:
+    """Place joints (T, 22, 3) by forward kinematics.
+
+    Parameters
+    ----------
+    rest : array (22, 3)
+        Joints at rest, metres.
+    poses : array (T, 22, 3)
+        Rotation vectors, the root's in the world, the others' in their parent's frame.
+    place : array (T, 3)
+        Translation of the root, metres.
+    """
+    turned = rotation_from_vector(poses)
+    joints, parents = np.empty((len(poses), N_JOINTS, 3)), load_layout("smpl_22").fields["parents"]
+    joints[:, 0] = rest[0] + place
+    for k in range(1, N_JOINTS):
+        parent = parents[k]
+        joints[:, k] = joints[:, parent] + turned[:, parent] @ (rest[k] - rest[parent])
+        turned[:, k] = turned[:, parent] @ turned[:, k]
+    return joints

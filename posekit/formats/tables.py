@@ -1,0 +1,183 @@
+"""Tables of text: CSV, TSV, TRC, MOT and the like, parted into rows of cells. No column is interpreted here."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import refusal, shown
+from posekit.formats.files import text
+from posekit.geometry import Array
+
+#: Rows of names before the numbers: DeepLabCut has 4.
+MAX_HEAD_ROWS: Final = 10
+_DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+#: Cells that hold no value, in lower case.
+MISSING: Final = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"})
+
+
+class Table:
+    """Rows of cells.
+
+    Attributes
+    ----------
+    lines : list of str
+        The text's lines, without empty ones.
+    numbers_of_lines : list of int
+        The number of each line in the file, from 1.
+    delimiter : str
+        Character between cells; empty for any white space.
+    about : dict
+        Metadata of a container that has some.
+    """
+
+    def __init__(self, lines: list[str], delimiter: str, source: str, numbers: Sequence[int] = ()) -> None:
+        self.lines, self.delimiter, self.source = lines, delimiter, source
+        self.numbers_of_lines = list(numbers or range(1, len(lines) + 1))
+        self.about: dict[str, str] = {}
+        self._columns: dict[str, Any] = {}
+
+    @classmethod
+    def of_columns(cls, columns: dict[str, Any], about: dict[str, str], source: str) -> Table:
+        """Make a table of named arrays, as binary containers hold them."""
+        table = cls([], ",", source)
+        table.about, table._columns = about, columns
+        return table
+
+    def parted(self, line: str) -> list[str]:
+        """Part a line into stripped cells; quotes are taken off."""
+        if not self.delimiter:
+            return line.split()
+        if '"' in line:
+            try:
+                return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter), [])]
+            except csv.Error:
+                pass
+        return [cell.strip() for cell in line.split(self.delimiter)]
+
+    @cached_property
+    def head(self) -> list[list[str]]:
+        """Rows before the first that holds a number."""
+        rows: list[list[str]] = []
+        for line in self.lines[:MAX_HEAD_ROWS]:
+            cells = self.parted(line)
+            if any(_is_number(cell) for cell in cells):
+                break
+            rows.append(cells)
+        return rows
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns: the last row before the numbers; empty if there is none."""
+        return tuple(self._columns) or tuple(self.head[-1] if self.head else ())
+
+    @cached_property
+    def cells(self) -> list[list[str]]:
+        """Rows after the names, all of one width.
+
+        Raises
+        ------
+        InputError
+            If a row has another number of cells than the names or the first row.
+        """
+        start = len(self.head)
+        rows = [self.parted(line) for line in self.lines[start:]]
+        width = len(self.names) or (len(rows[0]) if rows else 0)
+        for k, row in enumerate(rows):
+            if len(row) == width + 1 and not row[-1]:
+                row.pop()  # a delimiter at the end of the line
+            if len(row) != width:
+                where = f"line {self.numbers_of_lines[start + k]}"
+                raise refusal(self.source, where, f"{len(row)} cells", f"{width}", "complete the row")
+        return rows
+
+    @cached_property
+    def numbers(self) -> Array:
+        """All cells as numbers (N, C), NaN where a cell holds none."""
+        if self._columns:
+            return np.stack([_floats(column) for column in self._columns.values()], axis=1)
+        return numbers([cell for row in self.cells for cell in row]).reshape(len(self.cells), -1)
+
+    def column(self, name: str) -> Array:
+        """Return a column as numbers (N,), NaN where a cell holds none."""
+        if self._columns:
+            return _floats(self._columns[name])
+        place = self.names.index(name)
+        return numbers([row[place] for row in self.cells])
+
+    def texts(self, name: str) -> list[str]:
+        """Return a column as text."""
+        if self._columns:
+            return [str(value) for value in self._columns[name]]
+        place = self.names.index(name)
+        return [row[place] for row in self.cells]
+
+    def checked(self, name: str) -> Array:
+        """Return a column as numbers (N,), or refuse a cell that is neither a number nor empty."""
+        values = self.column(name)
+        if not self._columns and np.isnan(values).any():
+            place = self.names.index(name)
+            for k in np.flatnonzero(np.isnan(values)).tolist():
+                if (cell := self.cells[k][place]).casefold() not in MISSING:
+                    where = f"line {self.numbers_of_lines[len(self.head) + k]}, {name}"
+                    raise refusal(self.source, where, shown(cell), "a number, or nothing", "correct the cell")
+        return values
+
+
+def parse(data: bytes, source: str) -> Table:
+    """Part a table of text into lines and find its delimiter: tab, semicolon, comma, else white space."""
+    lines = text(data, source).splitlines()
+    pairs = [(number, line) for number, line in enumerate(lines, 1) if line.strip(" ,;\t\r")]
+    if not pairs:
+        raise refusal(source, "", "no rows", "a table", "check how it was written")
+    kept = [line for _, line in pairs]
+    sample = kept[: 2 * MAX_HEAD_ROWS]
+    delimiter = next((one for one in "\t;," if min(line.count(one) for line in sample[-3:]) > 0), "")
+    return Table(kept, delimiter, source, [number for number, _ in pairs])
+
+
+def numbers(cells: list[str]) -> Array:
+    """Turn cells into numbers (N,), NaN for those that hold none; commas as decimal points are understood."""
+    try:
+        return np.array(cells, dtype=np.float64)
+    except ValueError:
+        return np.array([_number(cell) for cell in cells], dtype=np.float64)
+
+
+def _number(cell: str) -> float:
+    if cell.casefold() in MISSING or "_" in cell:  # float() reads 1_000 as a thousand
+        return np.nan
+    try:
+        return float(cell)
+    except ValueError:
+        return float(cell.replace(",", ".")) if _DECIMAL_COMMA.fullmatch(cell) else np.nan
+
+
+def _is_number(cell: str) -> bool:
+    return not np.isnan(_number(cell)) or cell.casefold() == "nan"
+
+
+def _floats(column: Any) -> Array:
+    values = np.asarray(column)
+    return values.astype(np.float64) if values.dtype.kind in "iufb" else numbers([str(one) for one in values])
+
+
+def csv_text(columns: dict[str, Any], delimiter: str = ",") -> str:
+    """Write columns of one length as CSV; numbers read back exactly, NaN is an empty cell."""
+    cells = []
+    for values in map(np.asarray, columns.values()):
+        if values.dtype.kind == "f":
+            cells.append(["" if np.isnan(value) else repr(value) for value in values.tolist()])
+        else:
+            cells.append(["" if value is None else str(value) for value in values.tolist()])
+    lines = io.StringIO()
+    writer = csv.writer(lines, delimiter=delimiter, lineterminator="\n")
+    writer.writerow(list(columns))
+    writer.writerows(zip(*cells, strict=True))
+    return lines.getvalue()
