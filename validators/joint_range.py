@@ -1,267 +1,249 @@
-"""Joint ranges: some configuration inside the limits must give the posture.
+"""Joint ranges: the angles of neck, pelvis and limbs, in any of the ways in which they can be written.
 
-Two kinds: the URDF's own angles (this file), or those of the paper's Table 1 (`table1_angles`).
+Limbs and pelvis are read by `posekit.solver.Limits`, the same numbers that the solver keeps to. A limb is legal if
+every angle of one way to write it is within its range and couplings.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from posekit.body import Figure
-from posekit.body.closed_form import ClosedForm
-from posekit.body.frames import hips_frame, torso_frame
-from posekit.compiled import screen_kinds as kernels
-from posekit.geometry import Array
-from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
-from posekit.tree import Check, Findings, Loosening, Place, Rule
-from posekit.validators.ranges import URDF_RANGES, Ranges
+from posekit.body import ClosedForm, Figure, load_figure
+from posekit.body.frames import torso_frame
+from posekit.geometry import Array, perpendicular, unit
+from posekit.skeleton import DOFS, HEAD_POINTS, HIPS, JOINT, JOINTS, TORSO
+from posekit.solver import Limits
+from posekit.solver.limits import (
+    ENDS,
+    KINDS,
+    LIMBS,
+    MIDDLES,
+    PELVIS_SIGNS,
+    STARTS,
+    hips_frame,
+    limb_angles,
+    limb_directions,
+    pelvis_angles,
+)
+from posekit.solver.limits import torso_frame as torso_rows
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement
+from posekit.validators.hinges import bent_backward
+from posekit.validators.measured import Shape
+from posekit.validators.ranges import load_ranges, of_person
+from posekit.validators.table1 import table1_angles
 
-ANGLE_TOLERANCE = 1e-3
-"""Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
+#: Tolerance from which an axial rotation is not determined, degrees.
+UNSEEN_DEGREES: Final = 45.0
 
-UNSEEN_DEGREES = 45.0
-"""Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
+#: Bend of an elbow or knee below which measured bodies do not determine the rotation of shoulder or hip, degrees: 4
+#: degrees of valgus turn it by 15 there.
+STRAIGHT_DEGREES: Final = 15.0
 
-TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
-HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
+#: Tolerance of angles that are exact, degrees: 5 µm at a wrist.
+ROUNDING_DEGREES: Final = 1e-3
+
+PARTS: Final = ("neck", "pelvis", *LIMBS)
 
 
-def joint_range(
-    figure: Figure,
-    ranges: Ranges = URDF_RANGES,
-    *,
-    tolerance: float = ANGLE_TOLERANCE,
-    directions: bool = False,
-) -> list[Check]:
-    """Make the checks of the joint ranges.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointRange:
+    """An angle of a joint is outside its range.
 
-    With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
-    laid onto the posture, and the limbs' directions are the posture's. Shoulder and hip are judged when
-    elbow and knee are known, with the axial rotation free, and again, with it, when wrist and ankle are.
-    With ``rotation`` and ``projected``, tables of the paper's angles, they judge the posture itself. Anatomical ranges
-    are of kind ``configuration`` with couplings: the limbs are judged by `AnatomicalLimb`.
+    The rotation of a limb that is almost straight is hardly determined: its tolerance is that of directions over the
+    sine of the bend, and it is undecided for measured bodies below `straight_degrees`.
 
     Parameters
     ----------
-    figure : Figure
-        Its limits are the ranges where `ranges` gives none.
-    ranges : Ranges
-        The table of ranges; by default the URDF's own.
-    tolerance : float
-        Degrees by which the direction of a segment may be off; see `LimbRange` for what follows for axial rotations.
-    directions : bool
-        Whether the same follows for the first angles of shoulder and hip: see `LimbRange`.
+    part : str
+        ``neck``, ``pelvis``, ``right_shoulder`` and so on; all of them by default.
+    upper_only : bool
+        Judge the upper segment of the limb alone.
+    straight_degrees : float
+        Bend below which the rotation of a measured limb is undecided.
     """
-    if ranges.kind != "configuration":
-        from posekit.validators.table1_angles import table1_angles
 
-        return table1_angles(figure, ranges, tolerance=tolerance)
-    ranges = ranges.of(figure)
-    ik, anatomy = figure.ik, ranges.anatomy
-    if anatomy is not None:
-        from posekit.validators.anatomical_checks import AnatomicalLimb
+    name = "joint-range"
+    unit = "deg"
+    reads = ("joints",)
 
-        # The figure itself is left alone: to write a URDF and read it again takes as long as many frames.
-        ik = limited(figure, ranges)
-    elif ranges.limits:
-        figure = figure.with_limits(
-            {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
-        )
-        ik = figure.ik
-    limits_alone = anatomy is None
-    checks: list[Check] = [
-        Neck(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
-        Pelvis(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
-    ]
-    for side in SIDES:
-        for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
-            joints = tuple(f"{side}_{joint}" for joint in limb)
-            for part in (joints[:2], joints):
-                if anatomy is None:
-                    checks.append(
-                        LimbRange(figure=figure, limb=part, tolerance=tolerance, directions=directions)
-                    )
-                else:
-                    checks.append(
-                        AnatomicalLimb(figure=figure, anatomy=anatomy, limb=part, tolerance=tolerance)
-                    )
-    return checks
+    part: str = ""
+    upper_only: bool = False
+    straight_degrees: float = STRAIGHT_DEGREES
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points that are read."""
+        if self.part == "neck":
+            return (*TORSO, *HEAD_POINTS)
+        if self.part == "pelvis":
+            return (*TORSO, *HIPS[1:])
+        if not self.part:
+            return (*JOINTS, *HEAD_POINTS)
+        limb = LIMBS.index(self.part)
+        ends = [STARTS[limb], MIDDLES[limb]] + [ENDS[limb]] * (not self.upper_only)
+        rigid = TORSO if "shoulder" in self.part else (*TORSO, *HIPS[1:])
+        return (*rigid, *(JOINTS[k] for k in ends if JOINTS[k] not in rigid))
+
+    def parts(self) -> list[JointRange]:
+        """Return a check for neck, pelvis, and each limb without and with its lower segment."""
+        early = [JointRange(part=limb, upper_only=True) for limb in LIMBS]
+        whole = [JointRange(part=part) for part in PARTS]
+        return [*whole[:2], *early, *whole[2:]]
+
+    def judge(self, body: Body) -> Judgement:
+        """Measure the angles of the parts."""
+        table = load_ranges(body.settings.ranges)
+        parts = (self.part,) if self.part else PARTS
+        if table is not None and table["kind"] in ("rotation", "projected"):
+            return table1_angles(body, table, parts, upper_only=self.upper_only)
+        measured = body.tolerance is None and not body.settings.strict
+        forward = body.person.hips_forward if measured else math.nan
+        limits, ik = _limits(body.figure, body.settings.ranges, forward)
+        found = [_neck(ik, body) if part == "neck" else self._part(limits, part, body) for part in parts]
+        return _stacked(found)
+
+    def _part(self, limits: Limits, part: str, body: Body) -> Judgement:
+        joints = body.joints
+        if part == "pelvis":
+            return _pelvis(limits, body)
+        limb = LIMBS.index(part)
+        if self.upper_only:
+            joints = joints.copy()
+            joints[:, ENDS[limb]] = np.nan
+        segments = ((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
+        tolerance = body.angle_tolerance(*segments)
+        straight = self.straight_degrees if body.tolerance is None and not body.settings.strict else 0.0
+        over_time = body.dt if body.motion and body.tolerance is None and not self.upper_only else math.nan
+        return _limb_range(limits, joints, limb, tolerance, straight, over_time)
 
 
-def limited(figure: Figure, ranges: Ranges) -> ClosedForm:
-    """Return the closed form of a figure within its own `ranges`; angles that these do not list keep its limits."""
-    lower, upper = figure.limits.lower.copy(), figure.limits.upper.copy()
-    for dof, ends in ranges.limits.items():
-        lower[DOFS.index(dof)], upper[DOFS.index(dof)] = np.radians(ends)
-    return figure.ik.with_limits(lower, upper)
+def _limb_range(
+    limits: Limits, joints: Array, limb: int, tolerance: float, straight: float, dt: float
+) -> Judgement:
+    """Judge one limb (N, 14, 3): in the usual way of writing, else in the one that is least outside.
+
+    Over time, neighbouring frames tell which way a hinge bends.
+    """
+    parent = torso_rows(joints) if limb < 2 else hips_frame(joints, bool(limits.numbers["between_hips"]))
+    upper_segment, lower_segment = limb_directions(joints, limb)
+    rotations = limb_angles(parent, upper_segment, lower_segment)
+
+    def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array]:
+        """Return value, lower, upper and tolerance (4, n, W, 4), degrees, and how far the worst is outside (n, W)."""
+        *found, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
+        numbers = np.empty((4, *found[0].shape))
+        np.degrees(np.stack(found), out=numbers[:3])
+        least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
+        numbers[3] = tolerance
+        numbers[3, ..., 2] /= np.maximum(np.where(np.isnan(sine), 1.0, sine), least)[:, None]
+        away = np.maximum(numbers[1] - numbers[0], numbers[0] - numbers[2]) - numbers[3]
+        open_rotation = (numbers[3, ..., 2] > UNSEEN_DEGREES) | (sine < math.sin(math.radians(straight)))[
+            :, None
+        ]
+        turned = np.where(open_rotation, np.nan, away[..., 2])
+        strict = np.fmax.reduce(away, axis=2)
+        away[..., 2] = turned
+        numbers[0, ..., 2] = np.where(open_rotation, np.nan, numbers[0, ..., 2])
+        return numbers, np.stack([np.fmax.reduce(away, axis=2), strict])
+
+    # The closed form bends hinges about +y; elbows flex the other way.
+    usual = np.full(len(joints), int(limb < 2))
+    numbers, (worst, strict) = read(slice(None), usual)
+    found, outside = numbers[:, :, 0], worst[:, 0]
+    backward = np.full(len(joints), np.nan)
+    if dt > 0:
+        backward = bent_backward(upper_segment, lower_segment, strict[:, 0] <= 0, dt)
+    rows = np.flatnonzero((outside > 0) | (backward < 0))
+    if len(rows):
+        numbers, (worst, _) = read(rows, None)
+        worst = np.where((backward[rows] < 0)[:, None] & (numbers[0, ..., 3] >= 0), np.inf, worst)
+        best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)
+        found[:, rows] = numbers[:, np.arange(len(rows)), best]
+    found[0, backward < 0, 2] = np.nan  # the hinge is named, not the ball joint above it
+    side = LIMBS[limb].split("_")[0]
+    places = [f"{side}_{angle}" for angle in KINDS[limb // 2]]
+    keep = [0, 1, 2, 3]
+    if limb < 2 and limits.numbers["by_elevation"]:
+        keep, places[0] = [0, 2, 3], f"{side}_shoulder.elevation"
+    value, lower, upper, slack = found[..., keep]
+    return Judgement([places[k] for k in keep], value, lower, upper, slack)
 
 
-def _rule(ik: ClosedForm, where: tuple[str, ...], kind: int, more: Sequence[float]) -> Rule:
-    """Write a screen as numbers: signs and limits of some angles, radians, then tolerances and what else there is."""
-    rows = [DOFS.index(dof) for dof in where]
-    limits = ik.limits
-    numbers = np.concatenate([limits.sign[rows], limits.lower[rows], limits.upper[rows], more])
-    return Rule(kind=kind, numbers=numbers)
+def _pelvis(limits: Limits, body: Body) -> Judgement:
+    joints, numbers = body.joints, limits.numbers
+    hips = hips_frame(joints, bool(numbers["between_hips"]))
+    value = np.degrees(pelvis_angles(torso_rows(joints), hips) * PELVIS_SIGNS)
+    lower, upper = np.degrees(numbers["pelvis"]).T
+    reads = ((JOINT["neck"], JOINT["pelvis"]), (JOINT["pelvis"], JOINT["right_hip"]))
+    return Judgement(DOFS[3:6], value, lower, upper, body.angle_tolerance(*reads))
 
 
-def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
-    rows = [DOFS.index(dof) for dof in where]
-    return Findings(
-        value=np.degrees(angles),
-        lower=np.degrees(ik.limits.lower[rows]),
-        upper=np.degrees(ik.limits.upper[rows]),
-        tolerance=tolerance,
+def _neck(ik: ClosedForm, body: Body) -> Judgement:
+    """Judge flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
+    value = np.full((len(body), 3), np.nan)
+    seen = np.isfinite(body.head).all(axis=(1, 2))
+    if seen.any():
+        joints = body.joints[seen]
+        R_torso = torso_frame(*(joints[:, JOINT[name]] for name in TORSO))
+        value[seen] = np.degrees(ik.neck(R_torso, joints[:, 0], body.head[seen]))
+    lower, upper = (np.degrees(one[:3]) for one in (ik.limits.lower, ik.limits.upper))
+    return Judgement(DOFS[:3], value, lower, upper, body.angle_tolerance())
+
+
+def _stacked(found: Sequence[Judgement]) -> Judgement:
+    """Put the places of several judgements of the same frames side by side."""
+    columns: dict[str, list[Array]] = {"value": [], "lower": [], "upper": [], "tolerance": []}
+    for one in found:
+        for name, arrays in columns.items():
+            arrays.append(np.broadcast_to(np.asarray(getattr(one, name), dtype=np.float64), one.value.shape))
+    stacked = {name: np.concatenate(arrays, axis=1) for name, arrays in columns.items()}
+    return Judgement([place for one in found for place in one.places], **stacked)
+
+
+@lru_cache(maxsize=32)
+def _limits(figure: Figure | Shape, name: str, forward: float) -> tuple[Limits, ClosedForm]:
+    """Return the ranges of a figure as numbers, and its closed form with the same limits of the neck.
+
+    The hips of a measured person lie `forward` degrees before the trunk's line.
+    """
+    table, anatomical = load_ranges(name) or {}, False
+    own = np.degrees(np.stack([figure.limits.lower, figure.limits.upper], axis=1))
+    ends = own[:3].copy()
+    if table.get("kind") == "configuration":
+        joints = {joint: one for joint, one in table.items() if isinstance(one, dict)}
+        angles = {
+            f"{joint}.{angle}": limits for joint, one in joints.items() for angle, limits in one.items()
+        }
+        table = {"kind": "configuration", "joints": angles}
+        ends = np.array([angles.get(dof, own[k]) for k, dof in enumerate(DOFS[:3])])
+    elif table.get("kind") == "anatomical":
+        anatomical = True
+        table = of_person(table, forward, _hips_outward(figure)) if math.isfinite(forward) else table
+        signs = (("lower", -table["spreads"]), ("upper", table["spreads"]))
+        neck = [table["neck"][dof.partition(".")[2]] for dof in DOFS[:3]]
+        ends = np.array([[one[end]["mean"] + out * one[end]["spread"] for end, out in signs] for one in neck])
+    pelvis, right, left = (figure.neutral_points[JOINT[joint]] for joint in HIPS)
+    limits = Limits.of(
+        table if anatomical or "joints" in table else None,
+        own,
+        above_hips=float(np.linalg.norm(perpendicular(right - pelvis, unit(left - right)))),
+        pelvis_between_hips=figure.pelvis_between_hips,
     )
+    lower, upper = figure.limits.lower.copy(), figure.limits.upper.copy()
+    lower[:3], upper[:3] = np.radians(ends).T
+    return limits, figure.ik.with_limits(lower, upper)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Neck(Check):
-    """Flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
-
-    ik: ClosedForm
-    tolerance: float
-    name: str = "joint_range"
-    places: tuple[Place, ...] = Place.of_angles("neck.flexion", "neck.bending", "neck.rotation")
-    unit: str = "deg"
-    points: tuple[int, ...] = TORSO_POINTS + HEAD
-    of_configuration: bool = True
-    noise = Loosening.DIRECTIONS
-
-    def judge(self, points: Array) -> Findings:
-        """Judge the neck's three angles; see `posekit.tree.Check`."""
-        R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        angles = self.ik.neck(R_torso, points[:, 0], points[:, 4:])
-        return _findings(self.ik, self.where, angles, self.tolerance)
-
-    @cached_property
-    def rule(self) -> Rule:
-        """The screen as numbers: limits, tolerance, and where the head's points are."""
-        return _rule(
-            self.ik,
-            self.where,
-            kernels.OF_NECK,
-            [np.radians(self.tolerance), *np.ravel(self.ik.head_offsets)],
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pelvis(Check):
-    """Flexion, bending and rotation of the hips under the torso."""
-
-    ik: ClosedForm
-    tolerance: float
-    name: str = "joint_range"
-    places: tuple[Place, ...] = Place.of_angles("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
-    unit: str = "deg"
-    points: tuple[int, ...] = TORSO_POINTS + HIPS_POINTS[1:]
-    of_configuration: bool = True
-    noise = Loosening.DIRECTIONS
-
-    def judge(self, points: Array) -> Findings:
-        """Judge the pelvis's three angles; see `posekit.tree.Check`."""
-        R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        neck = points[:, 0] if self.ik.middle_pelvis else None
-        R_hips = hips_frame(points[:, 3], points[:, 4], points[:, 5], neck)
-        angles = self.ik.pelvis(R_torso, R_hips)
-        return _findings(self.ik, self.where, angles, self.tolerance)
-
-    @cached_property
-    def rule(self) -> Rule:
-        """The screen as numbers: limits, tolerance, and whether the neck turns the hips."""
-        return _rule(
-            self.ik, self.where, kernels.OF_PELVIS, [np.radians(self.tolerance), self.ik.middle_pelvis]
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LimbRange(Check):
-    """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
-
-    A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
-    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be
-    off; beyond `UNSEEN_DEGREES` it is undecided.
-
-    Parameters
-    ----------
-    limb : tuple of str
-        ``("right_shoulder", "right_elbow", "right_wrist")``, or the first two.
-    directions : bool
-        Whether the first angle of an upper segment near the second one's pole is treated likewise, and both as
-        refinement measures them (`posekit.refinement.limits`): what it leaves within the tolerance is then valid.
-    """
-
-    figure: Figure
-    limb: tuple[str, ...]
-    tolerance: float
-    directions: bool = False
-    name: str = "joint_range"
-    unit: str = "deg"
-    noise = Loosening.DIRECTIONS
-    of_configuration = True
-
-    @cached_property
-    def places(self) -> tuple[Place, ...]:
-        """The angles judged."""
-        return Place.of_angles(*(self._angles[:2] if len(self.limb) == 2 else self._angles))
-
-    @cached_property
-    def _angles(self) -> tuple[str, ...]:
-        """The four angles of the whole limb."""
-        first = DOFS.index(f"{self.limb[0]}.flexion")
-        return DOFS[first : first + 4]
-
-    @property
-    def _on_torso(self) -> bool:
-        return self.limb[0].endswith("shoulder")
-
-    @property
-    def _parent(self) -> tuple[int, ...]:
-        return TORSO_POINTS if self._on_torso else self.figure.ik.hips_joints
-
-    @cached_property
-    def points(self) -> tuple[int, ...]:
-        """The rigid part the limb hangs on, then the limb's joints."""
-        return self._parent + tuple(JOINT[joint] for joint in self.limb)
-
-    def judge(self, points: Array) -> Findings:
-        """Judge the limb's angles; see `posekit.tree.Check`."""
-        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
-        R_parent = (torso_frame if self._on_torso else hips_frame)(*rigid)
-        end = limb[2] if len(limb) == 3 else None
-        angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
-        angles = angles[:, : 2 if end is None else 4].copy()
-        tolerance = np.full(angles.shape, self.tolerance, dtype=np.float64)
-        if end is not None:
-            bend = np.abs(np.sin(angles[:, 3]))
-            least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
-            tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
-            angles[tolerance[:, 2] > UNSEEN_DEGREES, 2] = np.nan
-        if self.directions:
-            level = np.abs(np.cos(angles[:, 1]))
-            tolerance[:, 0] = self._turn(np.where(np.isnan(level), 1.0, level))
-            if end is not None:
-                tolerance[:, 2] = self._turn(np.where(np.isnan(bend), 1.0, bend))
-            angles[tolerance > UNSEEN_DEGREES] = np.nan
-        return _findings(self.figure.ik, self._angles[: angles.shape[1]], angles, tolerance)
-
-    def _turn(self, sine: Array) -> Array:
-        """Return by how many degrees a direction may turn about an axis to which it has an angle of that sine (N,)."""
-        share = np.radians(self.tolerance) / np.maximum(sine, np.finfo(np.float64).tiny)
-        return np.asarray(np.degrees(np.tan(np.arcsin(np.minimum(share, 1.0)))))
-
-    @property
-    def rule(self) -> Rule | None:
-        """The screen as numbers: what the limb hangs on, whether it is whole, limits and tolerances."""
-        # With directions each angle has a tolerance of its own, which the screen does not know.
-        return None if self.directions else self.passing
-
-    @cached_property
-    def passing(self) -> Rule:
-        """The screen by the tolerance alone: with directions angles may be as far off, or farther."""
-        sizes = self.figure.ik.rigid_kind(self._parent), len(self.limb) == 3
-        more = [np.radians(self.tolerance), np.radians(UNSEEN_DEGREES), *sizes]
-        return _rule(self.figure.ik, self._angles, kernels.OF_LIMB, more)
+def _hips_outward(figure: Figure | Shape) -> float:
+    """Return by how many degrees straight thighs lean inward because hips are wider apart than usual."""
+    hips, thigh, usual = "right_hip-left_hip", "right_hip-right_knee", load_figure().lengths
+    lengths = figure.lengths
+    return math.degrees(math.atan((lengths[hips] / lengths[thigh] - usual[hips] / usual[thigh]) / 2))

@@ -1,161 +1,322 @@
-r"""What the checks of a figure allow people who were measured: what bodies give, and what measuring noise does.
+r"""What the frames of a recording tell about the person in it, and what is allowed in the postures of one.
 
-A coordinate is off by :math:`\sigma`, a distance between two points so by :math:`\sqrt 2\,\sigma`, and the direction of
-a segment of length l by :math:`\sqrt 2\,\sigma / l`. Three deviations are allowed for (`ALLOWED_DEVIATIONS`), as
-squares beside what is allowed without noise: with :math:`e = 3 \sqrt 2\,\sigma`
+Bones keep their length: what a limb's length scatters over time is the measuring. Two ends with independent errors of
+standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
 
-- directions: :math:`\sqrt{(2^\circ)^2 + (e/l)^2}`, the widest of the segments that a check reads, of length l;
-- lengths of bones, each by its own noise, and shoulder to shoulder: :math:`\sqrt{(3\,\mathrm{cm})^2 + e^2}`;
-- spine, and shoulders to pelvis: the same with what a bending spine gives (`posekit.body.torso_bending`);
-- contact: bodies may penetrate by e.
+.. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
+
+over the eight segments i of arms and legs; mid is the mean of the middle half. The median absolute deviation (Rousseeuw
+& Croux 1993, J Am Stat Assoc 88:1273) and the middle half are robust against broken spans and limbs that drift.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, cast
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
-from posekit.body import Figure
-from posekit.body.measured import LIMB_NAMES, MeasuredPerson, hips_outward, noise_by_limb, usual_noise
-from posekit.body.torso_bending import bending_gives
-from posekit.geometry import Array
-from posekit.settings import ALLOWED_DEVIATIONS, MEASURED_TOLERANCE, RigidTolerance, ValidateSettings
-from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, segment_name
-from posekit.tree import Check, Loosening
-from posekit.validators.ranges import Ranges
+from posekit.body import ClosedForm, Figure, Limits
+from posekit.body.capsules import Capsule
+from posekit.body.frames import MIDDLE_PELVIS_PART
+from posekit.body.lengths import closed_lengths, hips_points, shoulders_are_behind, torso_points
+from posekit.errors import FigureError
+from posekit.geometry import Array, Record, cross, dot
+from posekit.skeleton import (
+    HIPS,
+    JOINT,
+    LIMB_JOINTS,
+    LIMB_SEGMENTS,
+    SEGMENT_NAMES,
+    SEGMENTS,
+    TORSO,
+    segment_name,
+)
 
-SPINE_SEGMENT: Final = (JOINT["neck"], JOINT["pelvis"])
-USUAL_LENGTH: Final = 0.2
-"""Metres: of the shortest segment by which directions are told."""
-NECK_TO_HEAD: Final = ("", 0.2)
-"""Where a check reads no segment, the length of one, metres: from neck to nose."""
+LIMB_NAMES: Final = tuple(map(segment_name, LIMB_SEGMENTS))
+
+#: Standard deviations of measuring noise that are allowed for: one point in 370 is beyond.
+ALLOWED_DEVIATIONS: Final = 3.0
+
+#: Standard deviation of normal numbers over their median absolute deviation.
+DEVIATION_OF_MAD: Final = 1.4826
+
+#: Frames from which noise is estimated: of ten frames and eight limbs it is within a quarter of the true one.
+LEAST_FRAMES: Final = 10
+
+#: Distance of both knees together in front of the middles between hip and ankle, metres, in a frame that tells the
+#: side.
+BENT_METRES: Final = 0.04
+
+#: Largest noise of a limb that is believed, in multiples of the usual noise: more is a defect.
+WORST_OF_USUAL: Final = 3.0
+
+#: Sizes of people, in multiples of the figure (1.75 m): newborns 0.28, the tallest man known 1.55.
+SIZE_BOUNDS: Final = (0.25, 1.6)
+
+#: Lengths of limbs that are believed, in multiples of the figure's at the person's size: adults vary by 5 %, and a
+#: newborn's legs are two thirds of an adult's.
+LIMB_BOUNDS: Final = (0.6, 1.6)
+
+#: Overlap that is allowed between capsules scaled to a person, metres: their radii are the built-in figure's, and flesh
+#: gives.
+MADE_UP_METRES: Final = 0.01
+
+#: Bending of the spine to the side (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
+SIDE_BENDING_DEGREES: Final = 38.2
+
+#: Length of a clavicle, as a share of the distance from the neck's middle line to the shoulder.
+CLAVICLE_SHARE: Final = 0.8
+
+#: Rotation of a clavicle about its inner end, forward or upward with the shoulder (Inman, Saunders & Abbott 1944, J
+#: Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
+CLAVICLE_DEGREES: Final = 30.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Allowance:
-    """What is allowed in the postures of one person.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Person(Record):
+    """A person as the frames of a recording show them.
 
     Parameters
     ----------
-    settings : ValidateSettings
-        What was asked: a tolerance that is given stays as it is.
-    person : MeasuredPerson, optional
-        Whose noise is allowed for; none where it is not known.
+    lengths : mapping
+        Median length of each segment, metres, by segment name; segments that are never seen are left out.
+    behind : bool or None
+        Whether the shoulders lie behind the line from neck to pelvis in most frames.
+    noise : float
+        Standard deviation of measured coordinates, metres; NaN of fewer than ten frames.
+    limb_noise : mapping
+        The same from each limb's segment alone.
+    hips_forward : float
+        Angle by which the hips lie before the line from neck to pelvis, at the pelvis, in the median frame, degrees;
+        NaN of fewer than ten frames.
     """
 
-    settings: ValidateSettings
-    person: MeasuredPerson | None = None
+    lengths: Mapping[str, float]
+    behind: bool | None
+    noise: float
+    limb_noise: Mapping[str, float]
+    hips_forward: float
 
-    def off(self, segment: str = "") -> float:
-        """Return what noise may change a distance between two points by, metres: a segment, or any two."""
-        noise = self.settings.noise
-        if noise is None:
-            known = not self.settings.strict and self.person is not None and math.isfinite(self.person.noise)
-            noise = self.person.noise_of(segment) if known and self.person is not None else 0.0
-        return ALLOWED_DEVIATIONS * math.sqrt(2) * noise
+    def noise_of(self, segment: str) -> float:
+        """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse."""
+        own = self.limb_noise.get(segment, self.noise)
+        return min(max(own, self.noise), WORST_OF_USUAL * self.noise)
+
+
+def person_of(joints: Array, lengths_of: Array | None = None) -> Person:
+    """Measure the person in the frames of a recording (T, 14, 3), metres; NaN is unknown.
+
+    The lengths (17, T) of the frames' segments are measured if not given. Numbers are rounded to 0.01 mm and whole
+    degrees, so that clips of one skeleton have the same figure.
+    """
+    lengths = dict(
+        zip(SEGMENT_NAMES, segment_lengths(joints) if lengths_of is None else lengths_of, strict=True)
+    )
+    known = {name: one[np.isfinite(one)] for name, one in lengths.items()}
+    medians = {name: float(np.median(one)) for name, one in known.items() if len(one)}
+    limbs = {}
+    for name in LIMB_NAMES:
+        if len(known[name]) >= LEAST_FRAMES:
+            deviation = np.median(np.abs(known[name] - medians[name]))
+            limbs[name] = round(float(DEVIATION_OF_MAD * deviation / math.sqrt(2)), 5)
+    forward = _hips_forward(joints)
+    return Person(
+        lengths={name: round(length, 5) for name, length in medians.items()},
+        behind=_shoulders_behind(joints),
+        noise=round(_middle_half(limbs), 5),
+        limb_noise=limbs,
+        hips_forward=round(forward) if math.isfinite(forward) else forward,
+    )
+
+
+def segment_lengths(joints: Array) -> Array:
+    """Return the length of each of `posekit.skeleton.SEGMENTS` in each frame (17, T), metres."""
+    by_joint = np.ascontiguousarray(np.moveaxis(joints, 0, -1))
+    found = np.empty((len(SEGMENTS), len(joints)))
+    for k, (start, end) in enumerate(SEGMENTS):
+        x, y, z = by_joint[end] - by_joint[start]
+        np.sqrt(x * x + y * y + z * z, out=found[k])
+    return found
+
+
+def _middle_half(noise: Mapping[str, float]) -> float:
+    each = sorted(noise.values())
+    outer = len(each) // 4
+    return float(np.mean(each[outer : len(each) - outer])) if each else math.nan
+
+
+def _hips_forward(joints: Array) -> float:
+    neck, pelvis, right, left = (
+        joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_hip", "left_hip")
+    )
+    down, hips = pelvis - neck, (right + left) / 2 - pelvis
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down = down / np.linalg.norm(down, axis=1, keepdims=True)
+        forward = cross(down, left - right)
+        angles = np.arctan2(dot(hips, forward) / np.linalg.norm(forward, axis=1), dot(hips, down))
+    known = angles[np.isfinite(angles)]
+    return math.degrees(float(np.median(known))) if len(known) >= LEAST_FRAMES else math.nan
+
+
+def _shoulders_behind(joints: Array) -> bool | None:
+    """Tell the side by the frames whose knees bend forward: in others left and right may be exchanged."""
+    neck, pelvis, right, left = (
+        joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
+    )
+    forward = cross(pelvis - neck, left - right)
+    bent = np.zeros(len(joints))
+    for hip, knee, ankle in LIMB_JOINTS[2:]:
+        bent += dot(joints[:, knee] - (joints[:, hip] + joints[:, ankle]) / 2, forward)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        bent /= np.linalg.norm(forward, axis=1)
+    rows = bent > BENT_METRES
+    if np.sum(rows) < LEAST_FRAMES:
+        rows = np.ones(len(joints), dtype=np.bool_)
+    return shoulders_are_behind(joints[rows])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """The part of a figure that positions are compared with, for other lengths and without a URDF.
+
+    It has the attributes of `posekit.body.Figure` that checks of positions read, with the same values as
+    `Figure.scaled` gives.
+
+    Parameters
+    ----------
+    base : Figure
+        The figure whose limits, head and capsules it has.
+    lengths : mapping
+        Lengths that close, metres, by segment name.
+    behind : bool
+        Whether the shoulders lie behind the line from neck to pelvis.
+    side_known : bool
+        Whether that is known.
+    """
+
+    base: Figure
+    lengths: Mapping[str, float]
+    behind: bool
+    side_known: bool
+
+    @cached_property
+    def neutral_points(self) -> Array:
+        """The 19 points of the posture that stands (19, 3), metres."""
+        points, torso = self.base.neutral_points.copy(), torso_points(self.lengths, behind=self.behind)
+        points[[JOINT[name] for name in TORSO]] = torso
+        points[[JOINT[name] for name in HIPS]] = hips_points(self.lengths) + torso[3]
+        for (start, end), name in zip(LIMB_SEGMENTS, LIMB_NAMES, strict=True):
+            points[end] = points[start] - [0.0, 0.0, self.lengths[name]]
+        return points
+
+    @cached_property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """The collision bodies, which grow with their part; the torso with the width of the shoulders."""
+        old, new = self.base.neutral_points, self.neutral_points
+        across = "right_shoulder-left_shoulder"
+        wide = self.lengths[across] / self.base.lengths[across]
+        found = []
+        for one in self.base.capsules:
+            before, after = (
+                np.linalg.norm(points[list(one.end)].mean(axis=0) - points[list(one.start)].mean(axis=0))
+                for points in (old, new)
+            )
+            ratio = float(after / before)
+            found.append(
+                replace(
+                    one,
+                    center=one.center * ratio,
+                    half_length=one.half_length * ratio,
+                    radius=one.radius * (wide if one.link == "torso" else ratio),
+                )
+            )
+        return tuple(found)
 
     @property
-    def contact_margin(self) -> float:
-        """Metres that bodies must keep from each other."""
-        return self.settings.contact_margin - self.off()
+    def capsule_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Index pairs into `capsules` that are checked."""
+        return self.base.capsule_pairs
 
-    def rigid(self, figure: Figure) -> RigidTolerance:
-        """Return what distances inside a figure may be off."""
-        usual = self.settings.rigid
-        if self.settings.strict or self.settings.rigid_tolerance is not None:
-            return RigidTolerance.uniform(usual)
-        sides = math.hypot(max(usual, bending_gives(figure.lengths)), self.off())
-        bones = {
-            segment: math.hypot(usual, self.off(segment_name(segment)))
-            for segment in SEGMENTS
-            if segment not in RIGID_SEGMENTS
-        }
-        bone = math.hypot(usual, self.off())
-        return RigidTolerance(
-            shoulders=bone, sides=sides, hips=bone, own=tuple({**bones, SPINE_SEGMENT: sides}.items())
-        )
+    @property
+    def limits(self) -> Limits:
+        """Limits of the 22 angles, radians."""
+        return self.base.limits
 
-    def ranges(self, ranges: Ranges) -> Ranges:
-        """Return joint ranges that begin where the person's skeleton has its pelvis.
+    @cached_property
+    def ik(self) -> ClosedForm:
+        """The closed form from points to angles."""
+        return replace(self.base.ik, middle_pelvis=self.pelvis_between_hips)
 
-        That is told by frames of a recording alone: who is judged by the model's lengths, as the survivors of a result
-        are, has its pelvis.
-        """
-        if self.person is None or self.settings.strict or not math.isfinite(self.person.hips_forward):
-            return ranges
-        if self.settings.lengths == "model":
-            return ranges
-        return ranges.with_hips(self.person.hips_forward, hips_outward(self.person.lengths))
+    @cached_property
+    def pelvis_between_hips(self) -> bool:
+        """Whether the pelvis is so near to the line between the hips that it spans no plane with them."""
+        pelvis, right = self.neutral_points[[JOINT["pelvis"], JOINT["right_hip"]]]
+        return bool(pelvis[2] - right[2] < MIDDLE_PELVIS_PART * self.lengths["right_hip-left_hip"])
 
-    def angle(self, segment: str, length: float) -> float:
-        """Return by how much the direction of a segment may be off, degrees, by its length, metres."""
-        if self.settings.strict or self.settings.angle_tolerance is not None:
-            return self.settings.angle
-        return math.hypot(MEASURED_TOLERANCE.angle, math.degrees(self.off(segment) / length))
+    @property
+    def shoulder_offset(self) -> float:
+        """Distance of the shoulders in front of the line from neck to pelvis, metres; negative behind it."""
+        return float(self.neutral_points[1, 0])
 
-    def of_robot(self, settings: ValidateSettings, *, made_up: bool) -> ValidateSettings:
-        """Return a robot's settings with what noise asks for: its limits are its own, and known.
-
-        Bodies may penetrate by what noise puts them off where they are made up; meshes have no depth.
-        """
-        off = self.off()
-        shortest = min(self.person.lengths.values(), default=USUAL_LENGTH) if self.person else USUAL_LENGTH
-        angle = math.degrees(off / max(shortest, USUAL_LENGTH))
-        changes: dict[str, float] = {}
-        if settings.rigid_tolerance is None:
-            changes["rigid_tolerance"] = math.hypot(settings.rigid, off)
-        if settings.angle_tolerance is None:
-            changes["angle_tolerance"] = math.hypot(settings.angle, angle)
-        if made_up:
-            changes["contact_margin"] = settings.contact_margin - off
-        return settings.changed(**changes)
-
-    def applied(self, checks: Iterable[Check], figure: Figure) -> list[Check]:
-        """Return the checks of a figure, each that judges directions with the tolerance that its own segments ask."""
-        return [
-            replace(cast(Any, check), tolerance=self._widest_angle(check.points, figure))
-            if check.noise is Loosening.DIRECTIONS and hasattr(check, "tolerance")
-            else check
-            for check in checks
-        ]
-
-    def _widest_angle(self, points: tuple[int, ...], figure: Figure) -> float:
-        read = [segment_name(segment) for segment in SEGMENTS if set(segment) <= set(points)]
-        return max(
-            (self.angle(name, figure.lengths[name]) for name in read), default=self.angle(*NECK_TO_HEAD)
-        )
-
-    def told(self, figure: Figure) -> dict[str, Any]:
-        """Say what was allowed, as reports do: of angles and bones the least and the most."""
-        rigid = self.rigid(figure)
-        limbs = [self.angle(name, figure.lengths[name]) for name in LIMB_NAMES]
-        bones = [rigid.of(SEGMENTS[SEGMENT_NAMES.index(name)]) for name in LIMB_NAMES]
-        noise = self.settings.noise
-        if noise is None and self.person is not None and math.isfinite(self.person.noise):
-            noise = round(self.person.noise, 6)
-        return {
-            "noise": noise,
-            "angle_tolerance": [round(min(limbs), 4), round(max(limbs), 4)],
-            "rigid_tolerance": [f"{100 * min(bones):.3g}cm", f"{100 * max(bones):.3g}cm"],
-            "torso_tolerance": f"{100 * rigid.sides:.3g}cm",
-            "contact_margin": f"{round(100 * self.contact_margin, 3) + 0.0:g}cm",
-        }
+    @property
+    def shoulder_side(self) -> str:
+        """Side of that line on which they are; undecided if unknown, and for a flat torso."""
+        if not self.side_known or self.shoulder_offset == 0:
+            return "undecided"
+        return "behind" if self.shoulder_offset < 0 else "front"
 
 
-def recorded_noise(joints: Array, settings: ValidateSettings) -> float:
-    """Return the noise that checks over time allow for, metres: what is stated, else what limbs tell, else 0.
+def shape_of(figure: Figure, person: Person) -> Figure | Shape:
+    """Return the shape of a figure with the lengths of a person, as far as they are a person's.
 
-    Parameters
-    ----------
-    joints : array (T, 14, 3)
-        Frames of one recording, metres; NaN where unknown.
-    settings : ValidateSettings
-        Where it is stated; strict ones allow for none.
+    Lengths that nobody has are left to the figure at the person's size; if no body is near the lengths, all but the
+    limbs are.
     """
-    if settings.noise is not None or settings.strict:
-        return settings.noise or 0.0
-    return float(np.nan_to_num(usual_noise(noise_by_limb(joints))))
+    ratios = {
+        name: person.lengths[name] / figure.lengths[name] for name in LIMB_NAMES if name in person.lengths
+    }
+    size = float(np.median(list(ratios.values()))) if ratios else 1.0
+    if not SIZE_BOUNDS[0] <= size <= SIZE_BOUNDS[1]:
+        return figure
+    low, high = LIMB_BOUNDS
+    usual = {name: size * length for name, length in figure.lengths.items()}
+    believed = {
+        name: length
+        for name, length in person.lengths.items()
+        if length > 0 and (name not in ratios or low <= ratios[name] / size <= high)
+    }
+    try:
+        closed, _ = closed_lengths({**usual, **believed})
+    except FigureError:
+        limbs = {name: length for name, length in believed.items() if name in ratios}
+        closed, _ = closed_lengths({**usual, **limbs})
+    behind = figure.shoulder_offset < 0 if person.behind is None else person.behind
+    return Shape(base=figure, lengths=closed, behind=behind, side_known=person.behind is not None)
+
+
+def spine_gives(lengths: Mapping[str, float]) -> float:
+    r"""Return by how much bending to the side brings a shoulder nearer to the pelvis, metres.
+
+    A spine of length h bent evenly by an angle :math:`\varphi` has a chord :math:`c = h \sin(\varphi/2) / (\varphi/2)`
+    that leans by half the angle; a shoulder at w beside the neck is then at
+    :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}` from the pelvis.
+    """
+    half = math.radians(SIDE_BENDING_DEGREES) / 2
+    h, w = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
+    c = h * math.sin(half) / half
+    return math.hypot(h, w) - math.sqrt(c * c + w * w - 2 * c * w * math.sin(half))
+
+
+def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
+    r"""Return how much the shoulder girdle changes two distances, metres: shoulder to shoulder, and shoulder to pelvis.
+
+    A clavicle of length c turns by up to :math:`\varphi` about its inner end, forward or upward. The shoulders then
+    come nearer to each other by :math:`2 c (1 - \cos\varphi)`, and one rises by :math:`c \sin\varphi`.
+    """
+    clavicle = CLAVICLE_SHARE * lengths["right_shoulder-left_shoulder"] / 2
+    turn = math.radians(CLAVICLE_DEGREES)
+    return 2 * clavicle * (1 - math.cos(turn)), clavicle * math.sin(turn)

@@ -1,9 +1,9 @@
-"""Where the ground of a clip is, by where its body rests, and how high frames are above it.
+"""The ground of a clip, estimated from where its body rests, and the height of frames above it.
 
-The ground is not measured: it is where points of the body are at rest. Its lowest level is the 5th percentile of the
-lowest point over the frames in which something rests, its highest level the 98th: feet are seldom flat, some stand on
-stairs, and a recording's volume is never quite level. What is below the lowest level is in the ground, what is above
-the highest without rest is in the air; between them nothing is said.
+The ground is not measured: it is where points of the body rest. Its lowest level is the 5th percentile of the lowest
+point over the frames in which something rests, its highest level the 98th: feet are seldom flat, some stand on stairs,
+and a recording's volume is never quite level. A point below the lowest level is in the ground; a body above the highest
+without rest is in the air; between them no verdict is given.
 """
 
 from __future__ import annotations
@@ -14,54 +14,51 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.stature import SHANK_OF_STATURE, THIGH_OF_STATURE
-from posekit.geometry import Array
-from posekit.ranking.centre_of_mass import centre_of_mass
+from posekit.geometry import Array, runs
+from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES
-from posekit.validators.motion.carried import carried
-from posekit.validators.motion.clip import MotionClip, once_a_clip
+from posekit.validators.body import Body, once
 from posekit.validators.motion.lifted import lifted_by
 from posekit.validators.motion.timeline import norm, timeline_of
 
+#: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
 TOE_METRES: Final = 0.02
-"""Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it."""
 
+#: Length of the foot, as a share of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1).
 FOOT_SHARE: Final = 0.152
-"""Length of the foot, of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1)."""
 
+#: Part of the foot that is in front of the ankle, as a share of its length.
 FORWARD_SHARE: Final = 0.75
-"""Of the foot's length, that is before the ankle."""
 
+#: Height of the ankle over the sole, as a share of the stature (same figure).
 ANKLE_SHARE: Final = 0.039
-"""Height of the ankle over the sole, of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1)."""
 
-LEG_SHARE: Final = THIGH_OF_STATURE + SHANK_OF_STATURE
-"""Thigh and shank, of the stature (same figure)."""
+#: Length of thigh and shank, as a share of the stature (same figure).
+LEG_SHARE: Final = 0.245 + 0.246
 
+#: Stature that is assumed where no leg is known, metres.
 USUAL_STATURE: Final = 1.7
-"""Metres, of whoever has no legs to tell it by."""
 
+#: Speed below which a point rests, metres a second: parts of a foot are slower in stance and faster in a swing.
 REST_SPEED: Final = 0.25
-"""Metres a second below which a point rests; a foot's parts move so slowly in stance, in no part of a swing."""
 
 HEELS_OF_SIDES: Final = (FEET_POINTS.index("right_heel"), FEET_POINTS.index("left_heel"))
 
+#: Height of a resting point above the body's lowest point up to which it carries the body, metres.
 NEAR_METRES: Final = 0.30
-"""What rests carries where it is not this much higher than the body's lowest point."""
 
+#: Least number of frames at rest from which the ground is estimated.
 BY_CHANCE: Final = 3
-"""Frames at rest below which nothing is known of the ground."""
 
+#: Height above the highest level of the ground from which a body without support is in the air, metres.
 AIR_METRES: Final = 0.03
-"""Above the highest level of the ground by which a body that nothing holds is in the air."""
 
+#: Rise of the ankle of a foot that stands on its toes, as a share of the stature; it counts where toes are not known.
 TIPTOE_SHARE: Final = np.hypot(FORWARD_SHARE * FOOT_SHARE, ANKLE_SHARE) - ANKLE_SHARE
-"""Of the stature, by which the ankle rises of a foot that is held by its toes: more than that is in the air, where toes
-are not known."""
 
 
+#: Frames per second; at fewer, the frames before and after the top of a jump have one height, and look like rest.
 TURNING_RATE: Final = 20.0
-"""Frames a second: at fewer, who is at the top of a jump is at one height before and after it, and rests nowhere."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,26 +70,26 @@ class Ground:
     low : float
         Its lowest level.
     high : float
-        How far its highest level is above that.
-    offset : float
-        How far `low` is above the ground that was given; 0 where none was.
+        Height of its highest level above that.
+    height : array (T,)
+        The lowest sole, or joint, along up.
     lifted : array (T,)
-        By how much frames are lifted as a whole against those around them.
+        Height by which frames are lifted as a whole against those around them.
     lowest : array (T,)
-        The lowest sole, or joint, over `low`, without what `lifted` says.
+        The lowest sole, or joint, over `low`, less `lifted`.
     resting : bool array (T,)
         Whether something that can carry the body rests.
     hanging : bool array (T,)
-        Whether what rests got there with no step and no jump.
+        Whether a resting part got there without a step or a jump.
     centre : array (T,)
         The centre of mass, along up.
     in_air : bool array (T,)
-        Whether nothing rests, and the body is above all levels of the ground: higher than on the toes that it has.
+        Whether nothing rests, and the body is above all levels of the ground, standing on its toes included.
     """
 
     low: float
     high: float
-    offset: float
+    height: Array
     lifted: Array
     lowest: Array
     resting: NDArray[np.bool_]
@@ -101,11 +98,11 @@ class Ground:
     in_air: NDArray[np.bool_]
 
 
-@once_a_clip
-def stature_of(clip: MotionClip) -> float:
+@once
+def stature_of(body: Body) -> float:
     """Return the stature, metres, by the median length of the legs; NaN where no leg is known."""
     legs = [
-        norm(clip.joints[:, JOINT[f"{side}_{upper}"]] - clip.joints[:, JOINT[f"{side}_{lower}"]])
+        norm(body.joints[:, JOINT[f"{side}_{upper}"]] - body.joints[:, JOINT[f"{side}_{lower}"]])
         for side in SIDES
         for upper, lower in (("hip", "knee"), ("knee", "ankle"))
     ]
@@ -113,48 +110,46 @@ def stature_of(clip: MotionClip) -> float:
     return 2 * float(np.mean(medians)) / LEG_SHARE if medians else np.nan
 
 
-def _stature(clip: MotionClip) -> float:
-    stature = stature_of(clip)
+def _stature(body: Body) -> float:
+    stature = stature_of(body)
     return stature if stature > 0 else USUAL_STATURE
 
 
-def soles(clip: MotionClip) -> tuple[Array, Array]:
+def soles(body: Body) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
-    ankles = clip.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]
-    toes = TOE_METRES if clip.q is None else 0.0  # a robot's are the ends of its soles
-    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(clip)] * 2)
-    return np.concatenate([clip.feet, ankles], axis=1), over
+    ankles = body.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]
+    toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
+    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(body)] * 2)
+    return np.concatenate([body.feet, ankles], axis=1), over
 
 
-def speeds(clip: MotionClip, points: Array, frames: int = 1) -> Array:
+def speeds(body: Body, points: Array, frames: int = 1) -> Array:
     """Return how fast points (T, P, 3) move, metres a second, from so many frames before to after; NaN at ends.
 
     Under `TURNING_RATE` frames a second it is the faster of the way before and of that after a frame.
     """
-    line = timeline_of(clip)
+    line = timeline_of(body)
     placed = line.spread(points)
     fast = np.full(placed.shape[:2], np.nan)
     if len(placed) > 2 * frames:
-        if clip.rate < TURNING_RATE:
-            ways = norm(placed[frames:] - placed[:-frames]) / (frames * clip.step)
+        if body.rate < TURNING_RATE:
+            ways = norm(placed[frames:] - placed[:-frames]) / (frames * body.dt)
             fast[frames:-frames] = np.maximum(ways[:-frames], ways[frames:])
         else:
-            fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (
-                2 * frames * clip.step
-            )
+            fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (2 * frames * body.dt)
     return line.of_frames(fast)
 
 
-@once_a_clip
-def ground_of(clip: MotionClip) -> Ground:
-    """Find the ground of a clip whose way up is known; of one clip once."""
-    feet, over = soles(clip)
-    up = np.zeros(3) if clip.up is None else clip.up
-    line = timeline_of(clip)
-    points = np.concatenate([clip.joints, feet[:, : len(FEET_POINTS)]], axis=1)
+@once
+def ground_of(body: Body) -> Ground:
+    """Estimate the ground of a body whose direction up is known."""
+    feet, over = soles(body)
+    up = np.zeros(3) if body.up is None else body.up
+    line = timeline_of(body)
+    points = np.concatenate([body.joints, feet[:, : len(FEET_POINTS)]], axis=1)
     height = points @ up
     legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them
-    lifted = line.of_frames(lifted_by(line.spread(height), legs, clip.rate, clip.noise))
+    lifted = line.of_frames(lifted_by(line.spread(height), legs, body.rate, body.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
     over_ground = feet @ up - over
     for side in range(len(SIDES)):
@@ -164,10 +159,10 @@ def ground_of(clip: MotionClip) -> Ground:
     sole = np.fmin.reduce(over_ground, axis=1)
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
-    slow = speeds(clip, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(clip)
-    centre = up @ centre_of_mass(np.moveaxis(clip.joints, 0, -1))
+    slow = speeds(body, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(body)
+    centre = centre_of_mass(body.joints) @ up
     still = (near & slow).any(axis=1)
-    resting = carried(still, lowest, centre, clip.step)
+    resting = carried(still, lowest, centre, body.dt)
     held = lowest[resting & np.isfinite(lowest)]
     if len(held) < BY_CHANCE:
         held = lowest[np.isfinite(lowest)]
@@ -175,11 +170,11 @@ def ground_of(clip: MotionClip) -> Ground:
     else:
         low, high = np.percentile(held, (5, 98))
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(clip))
+    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(body))
     return Ground(
         low=float(low),
         high=float(high - low),
-        offset=0.0 if clip.ground is None else float(low - clip.ground),
+        height=lowest + lifted,
         lifted=lifted,
         lowest=lowest - low,
         resting=resting,
@@ -189,12 +184,71 @@ def ground_of(clip: MotionClip) -> Ground:
     )
 
 
-def _speed_noise(clip: MotionClip) -> float:
+def _speed_noise(body: Body) -> float:
     """Return the standard deviation of a speed between the neighbours of a frame."""
-    frames = 1.0 if clip.rate < TURNING_RATE else 2.0
-    return np.sqrt(2) * clip.noise / (frames * clip.step) if clip.step > 0 else 0.0
+    frames = 1.0 if body.rate < TURNING_RATE else 2.0
+    return np.sqrt(2) * body.noise / (frames * body.dt) if body.dt > 0 else 0.0
 
 
-def ground_unknown(clip: MotionClip) -> str:
-    """Say why nothing is known of the ground under a clip whose way up is known; empty where something is."""
-    return "" if np.isfinite(ground_of(clip).low) else "no height of a foot or a joint is known"
+#: Difference of levels of one ground, metres.
+LEVEL_METRES: Final = 0.05
+
+#: Shortest flight whose fall is separable from the motion of limbs, seconds.
+SHORTEST_FLIGHT: Final = 0.25
+
+#: Acceleration of gravity, metres a second squared.
+GRAVITY_ACCELERATION: Final = 9.81
+
+#: Least number of frames from which the fall of a centre of mass is measured.
+FEWEST_FRAMES: Final = 6
+
+#: Least share of gravity by which the centre of mass of a body in the air falls; whole jumps have 0.8 to 1.1.
+FALL_SHARE: Final = 0.5
+
+
+def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: float) -> NDArray[np.bool_]:
+    """Leave out rests that hang in the air: at another level than those before, without a step or a jump to it.
+
+    Parameters
+    ----------
+    resting : bool array (T,)
+        Whether something rests.
+    lowest, centre : array (T,)
+        Heights of the lowest point and of the centre of mass, metres.
+    step : float
+        Seconds from a frame to the next.
+
+    Returns
+    -------
+    bool array (T,)
+        Those of `resting` that carry the body.
+    """
+    rests = runs(resting)
+    if len(rests) < 2 or not step > 0:
+        return resting
+    group = np.zeros(len(rests), dtype=np.intp)
+    levels = np.array([np.median(lowest[start:stop]) for start, stop in rests])
+    for k in range(1, len(rests)):
+        # A rest may belong to an earlier group: the body comes down again to where it rested.
+        alike = np.flatnonzero(~(np.abs(levels[:k] - levels[k]) > LEVEL_METRES))
+        between = slice(rests[k - 1][1], rests[k][0])
+        if len(alike):
+            group[k] = group[alike[-1]]
+        elif (between.stop - between.start) * step >= SHORTEST_FLIGHT and falls(centre[between], step):
+            group[k] = group[k - 1]
+        else:
+            group[k] = group.max() + 1
+    count = np.bincount(group, weights=[stop - start for start, stop in rests])
+    left = resting.copy()
+    for (start, stop), of in zip(rests, group, strict=True):
+        left[start:stop] = of == count.argmax()
+    return left
+
+
+def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
+    """Return whether a centre of mass (N,) falls by a share of gravity (its parabola); True where it is not known."""
+    known = np.isfinite(centre)
+    if known.sum() < FEWEST_FRAMES:
+        return True
+    curve = np.polyfit(np.arange(len(centre))[known] * step, centre[known], 2)[0]
+    return bool(2 * curve <= -share * GRAVITY_ACCELERATION)

@@ -1,4 +1,11 @@
-"""How far joints, and the body, are from where the frames before and after them say."""
+r"""Distances of joints, and of the body, from where neighbouring frames predict them.
+
+How far a body is displaced for good, at once or over a sixth of a second, by what nothing can push it.
+
+A body that goes a way D beyond what its velocities before and after explain, in a time T, is sped up and
+slowed down again: by :math:`4 D / T^2` at least, half of the time each way. Where people are faster than that, in
+rolls, kicks and flips, their joints do not all go the same way; a body that is displaced does.
+"""
 
 from __future__ import annotations
 
@@ -10,33 +17,32 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.validators.motion.displaced_body import displaced_by, middle
 from posekit.validators.motion.timeline import centred, filtered, norm
 
+#: Jump from which a frame is not judged as motion, metres.
 LEAST_JUMP: Final = 0.06
-"""Metres by which a frame must jump to be left out of what is judged as motion."""
 
+#: Least jump of one frame, as a share of a lasting displacement near it.
 DISPLACED_SHARE: Final = 0.5
-"""Of a displacement for good near it, that a jump of one frame is more than."""
 
+#: Frames on either side by which a jump is measured.
 SIDE_FRAMES: Final = 3
-"""Frames on either side that a jump is told by."""
 
+#: Multiples of the neighbours' own misfit that are subtracted from a jump: of one that comes back, and at an end of the
+#: clip. Fast motion at few frames per second fits no smooth curve, and is no jump.
 JOINT_MISFITS, END_MISFITS = 3.0, 5.0
-"""Times by which the neighbours' own misfit is taken off a jump: of a joint or body that comes back, and at an end of
-the clip. Fast motion at few frames a second fits no smooth curve, and is no jump."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Jumps:
-    """Metres of (T,) frames, above what the neighbours' own misfit explains; NaN where they are not known.
+    """Jumps of (T,) frames above the neighbours' own misfit, metres; NaN where not known.
 
     Parameters
     ----------
     joint : array (T, 14)
-        Of single joints, beside the body's.
+        Jumps of single joints beside the body's.
     body : array (T,)
-        Of the body: the median joint.
+        Jumps of the body: the median joint.
     """
 
     joint: Array
@@ -44,7 +50,7 @@ class Jumps:
 
 
 class _Filter(NamedTuple):
-    """Weights of a jump (K,), and of what neighbours are off from a smooth curve (2, K), a unit of length each."""
+    """Weights of a jump (K,), and of the misfit of neighbours from a smooth curve (2, K), each of unit length."""
 
     jump: Array
     misfit: Array
@@ -80,7 +86,7 @@ def jumps_of(joints: Array, step: float) -> Jumps:
     moved = alone > 0
     displaced = displaced_by(joints, step)
     if (alone > LEAST_JUMP).any():
-        # Beside a body that goes aside, what is off from a curve is off from where it went.
+        # Beside a displaced body a misfit is measured from where the body went.
         beside = sliding_window_view(np.pad(np.nan_to_num(displaced), SIDE_FRAMES), 2 * SIDE_FRAMES + 1)
         alone[alone < DISPLACED_SHARE * beside.max(axis=1)] = np.nan
         if (alone > LEAST_JUMP).any():
@@ -95,7 +101,7 @@ def jumps_of(joints: Array, step: float) -> Jumps:
         for at, by in _NEAR_END.items():
             for end, frame, window in ((0, at, joints[:7]), (-1, -1 - at, joints[:-8:-1])):
                 jump = _near_end(window, by)
-                # A last frame that jumps is off from the curve of those next to it, not they.
+                # If the last frame jumps, its neighbours do not.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
     return Jumps(joint=joint, body=np.fmax(alone, displaced))
 
@@ -108,7 +114,107 @@ def _near_end(window: Array, by: _Filter) -> Array:
 
 
 def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
-    """Return jumps (S, 14, 3) and misfits (S, 14), said of the fourth frame of the filter."""
+    """Return jumps (S, 14, 3) and misfits (S, 14), placed at the fourth frame of the filter."""
     parts = [filtered(joints, weights) for weights in by.misfit]
     misfit = np.sqrt(sum(np.einsum("tji,tji->tj", part, part) for part in parts))
     return centred(filtered(joints, by.jump), count, SIDE_FRAMES), centred(misfit, count, SIDE_FRAMES)
+
+
+#: Longest time over which a body is displaced, seconds: slower displacements are motion.
+LONGEST_SECONDS: Final = 1.0 / 6.0
+
+#: Step between the times over which displacements are looked for, seconds.
+BETWEEN_SECONDS: Final = 1.0 / 30.0
+
+#: Time before and after over which the velocity of joints is measured, seconds.
+VELOCITY_SECONDS: Final = 1.0 / 15.0
+
+#: Largest acceleration of a whole body, metres a second squared: three times its weight, less its own; runners and
+#: jumpers reach it (Cavanagh & Lafortune 1980, J. Biomech. 13).
+PUSHED_ACCELERATION: Final = 20.0
+
+#: Least speed of another displacement beside one, as a share of its speed: half of it follows from misled velocities.
+BESIDE_SHARE: Final = 0.75
+
+#: Multiple of the median difference of joints from the body's displacement that is subtracted from it.
+APART_TIMES: Final = 2.0
+
+
+def displaced_by(joints: Array, step: float) -> Array:
+    """Return lasting displacements of the body, in the frames in which it moves (S,); NaN in others.
+
+    Parameters
+    ----------
+    joints : array (S, 14, 3)
+        Metres, in slots of even time; NaN where unknown.
+    step : float
+        Seconds a slot; if it is NaN, only displacements within one frame are found.
+
+    Returns
+    -------
+    array (S,)
+        Metres beyond what forces and the joints' own motion explain.
+    """
+    timed = step > 0
+    side, apart = (
+        max(round(seconds / step), 1) if timed else 2 for seconds in (VELOCITY_SECONDS, BETWEEN_SECONDS)
+    )
+    most = int(LONGEST_SECONDS / step + 1e-6) if timed else 1
+    known = np.isfinite(joints[..., 0])
+    # The mean is a fast screen: it is displaced with the body.
+    centre = np.nan_to_num(joints).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, None]
+    gaps = np.concatenate([[0], np.cumsum(~known.any(axis=1))])
+    best, over = np.full(len(joints), -np.inf), np.ones(len(joints), dtype=np.intp)
+    for count in sorted({1, *range(max(apart, 2), most + 1, apart)}):
+        pushed = PUSHED_ACCELERATION * (count * step) ** 2 / 4 if timed else 0.0
+        beyond = _beyond(joints, centre, gaps, count, side, pushed) / count
+        better = beyond > best
+        best[better], over[better] = beyond[better], count
+    # The fastest window is the displacement: a window that ends amid it is misled by a velocity of half of it.
+    found = np.full(len(joints), np.nan)
+    while best.max(initial=0.0) > 0:
+        first = int(best.argmax()) + 1
+        last = first + int(over[first - 1]) - 1
+        found[first : last + 1] = best[first - 1] * over[first - 1]
+        # Windows with these frames repeat it; slower windows beside them follow from it.
+        starts, fastest = np.arange(len(best)), best[first - 1]
+        again = (starts < last) & (starts + over >= first)
+        beside = (starts - side < last + apart) & (starts + over + side >= first - apart)
+        best[again | (beside & (best < BESIDE_SHARE * fastest))] = 0.0
+    return found
+
+
+def _beyond(
+    joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
+) -> Array:
+    """Return the unexplained displacement (S,) within so many slots after each; 0 where all is explained.
+
+    It needs the joints, their mean (S, 3), and the number of empty slots before each (S + 1,).
+    """
+    weights = np.zeros(count + 2 * side + 1)
+    share = count / (2.0 * side)
+    weights[[0, side, side + count, -1]] = share, -1.0 - share, 1.0 + share, -share
+    beyond = np.zeros(len(joints))
+    at = np.flatnonzero(norm(filtered(centre, weights)) > pushed / 2.0)
+    at = at[gaps[at + len(weights)] == gaps[at]]
+    if len(at):
+        ways = sum(weights[k] * joints[at + k] for k in np.flatnonzero(weights))
+        body = middle(ways)
+        apart = middle(norm(ways - body[:, None]))
+        beyond[at + side] = np.nan_to_num(norm(body) - APART_TIMES * apart - pushed)
+    return beyond
+
+
+def middle(values: Array) -> Array:
+    """Return the median over the known joints of (S, 14, ...)."""
+    known = np.isfinite(values)
+    if known.all():
+        half = values.shape[1] // 2
+        ordered = np.partition(values, (half - 1, half), axis=1)
+        return np.asarray((ordered[:, half - 1] + ordered[:, half]) / 2.0)
+    ordered = np.sort(values, axis=1)  # what is not known comes last
+    number = known.sum(axis=1, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(k, 0), axis=1) for k in ((number - 1) // 2, number // 2)
+    )
+    return np.asarray(((low + np.where(number % 2, low, high)) / 2.0)[:, 0])

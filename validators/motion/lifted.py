@@ -2,10 +2,9 @@ r"""Stretches of frames that are lifted or lowered as a whole against the frames
 
 A body on its feet never moves up or down by a step: from one frame to the next all its points would go the same way,
 which they do not a frame earlier and a frame later. The step at a frame is the median over points of
-:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, d the vertical way from frame to frame, where nine
-tenths of the points agree on its sign. A foot rests on both sides of the step: in the
-air many things are possible. A step and the next one back make a stretch: what lies between is lifted, not
-what lies around, since one stretch explains what two would be needed for else.
+:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, d the vertical way from frame to frame, if nine
+tenths of the points agree on its sign. A foot rests on both sides of the step: in the air many things are possible. A
+step and the next one back make a stretch.
 """
 
 from __future__ import annotations
@@ -16,32 +15,32 @@ import numpy as np
 
 from posekit.geometry import Array
 
+#: Least step, metres: clean recordings have steps of up to 0.7 cm where a foot is at rest, at 30 Hz.
 LEAST_STEP_METRES: Final = 0.012
-"""Steps below are motion: clean recordings have steps of up to 0.7 cm where a foot is at rest, at 30 Hz."""
 
+#: Step from which no foot need be at rest, metres, at this rate (Hz) or more: clean recordings have up to 13 cm, in a
+#: backflip.
 SURE_STEP_METRES, SURE_RATE = 0.15, 16.0
-"""Steps above need no foot at rest, in metres at so many frames a second and more: clean recordings have up to 13 cm,
-in a backflip."""
 
+#: Difference between a step and the step back, at most, as a share of the larger.
 SAME_SHARE: Final = 0.35
-"""By so much of the larger of the two the step back may be another."""
 
+#: Frames of the shortest stretch: shorter ones are jumps of the body.
 SHORTEST_FRAMES: Final = 3
-"""Shorter stretches are jumps of the body."""
 
+#: Vertical way of a resting foot in the frames before and after a step, at most, metres.
 REST_METRES: Final = 0.01
-"""A foot rests that goes less far up or down in the frame before a step, and in the one after it."""
 
 
 def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Array:
-    """Return by how much frames are lifted against those around them.
+    """Return the height by which frames are lifted against those around them.
 
     Parameters
     ----------
     height : array (S, P)
-        Of points of the body along up, metres; NaN where a point is not known.
+        Heights of points of the body along up, metres; NaN where a point is not known.
     feet : slice
-        Which of the points are a foot's: one of them rests where a step is a fault.
+        Points of the feet: one of them rests where a step is a defect.
     rate : float
         Frames a second; NaN where it is not known.
     noise : float
@@ -62,7 +61,7 @@ def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Ar
     rests = np.zeros(len(height), dtype=np.bool_)
     rests[1:] = (beside < REST_METRES + 3 * noise).any(axis=1)
     start = -1
-    # What falls is so much farther off from its neighbours the longer a frame lasts.
+    # A falling body moves farther between frames the longer these last.
     longer = SURE_RATE / rate if rate < SURE_RATE else 1.0
     large = np.abs(steps) >= SURE_STEP_METRES * longer**2
     for frame in np.flatnonzero(large | (rests & (np.abs(steps) >= max(LEAST_STEP_METRES, 4 * noise)))):

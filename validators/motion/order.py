@@ -1,4 +1,4 @@
-"""Frames whose order is not that in which they were taken, seen by the motion alone."""
+"""Frames in a wrong order, found by the motion alone."""
 
 from __future__ import annotations
 
@@ -12,37 +12,36 @@ from posekit.skeleton import JOINT
 from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS
 from posekit.validators.motion.timeline import norm
 
+#: Joints that have no side.
 MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
-"""Joints that have no side."""
 
+#: Frames that are ordered at once; longer stretches are ordered in parts.
 LONGEST_STRETCH: Final = 600
-"""Frames that are put into order at once; longer stretches are taken in parts."""
 
+#: Length of the way through a stretch in the right order, at most, as a share of the way in the given order.
 SHORTER_SHARE: Final = 0.6
-"""Of the way through a stretch as it is: another order is the right one where its way is shorter than this share of
-it."""
 
+#: Least number of frames out of place in a stretch.
 LEAST_FRAMES: Final = 3
-"""Out of place in a stretch before it counts."""
 
+#: Least motion of a joint between frames that shows their order, metres.
 LEAST_METRES: Final = 0.005
-"""A joint that moves less between frames does not say in which order they come."""
 
+#: Least number of moving joints: one or two that turn back tremble.
 LEAST_JOINTS: Final = 3
-"""That move: one or two that turn back tremble."""
 
+#: Frames per second from which motion shows the order: at fewer, people turn back between two frames.
 ORDERED_RATE: Final = 20.0
-"""Frames a second from which motion tells their order: at fewer, people turn back between two frames."""
 
+#: Frames between two turns back of one stretch, at most.
 TURNS_APART: Final = 6
-"""Frames between two turns back that are one stretch."""
 
+#: Frames before and after a stretch that are ordered with it, so that its ends find their places.
 AROUND_FRAMES: Final = 4
-"""Before and after a stretch that are put into order with it: its ends are to be in their places."""
 
 
 def displaced(joints: Array) -> NDArray[np.intp]:
-    """Say by how many frames each frame is out of its place (T,): 0 where the motion goes on evenly.
+    """Return the frames by which each frame is out of its place (T,); 0 where the motion is even.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
 
 
 def _without_sides(joints: Array) -> Array:
-    """Return what joints say whichever is the right one (T, 20, 3), metres: labels that flicker are no wrong order.
+    """Return a posture without sides (T, 20, 3), metres, so that flickering labels are no wrong order.
 
     Neck, pelvis and the middles of pairs; and the vector d between a pair as its outer product with itself over its
     length, which is that of -d.
@@ -94,7 +93,7 @@ def _without_sides(joints: Array) -> Array:
 
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Say which frames are in a stretch with frames out of place (T,): those that are in theirs by chance, too."""
+    """Return the frames of stretches with frames out of place (T,), including those in place by chance."""
     at = np.flatnonzero(places)
     inside = np.zeros(len(places), dtype=np.bool_)
     for part in np.split(at, np.flatnonzero(np.diff(at) > TURNS_APART) + 1) if len(at) else []:
@@ -132,7 +131,7 @@ def _shortest(points: Array) -> NDArray[np.intp]:
 
 
 def _with_moves(order: NDArray[np.intp], ways: Array) -> NDArray[np.intp]:
-    """Move single points to where the way is shortest, while that helps."""
+    """Move single points to where the way is shortest, as long as that helps."""
     for _ in range(2 * len(order)):
         gains = np.zeros(len(order))
         between = ways[order[:-1], order[1:]]

@@ -1,4 +1,4 @@
-"""Which of two joints is the right one: by where they were, by lengths, by which way a body faces.
+"""Exchanged right and left joints, found by continuity, by lengths and by the direction that a body faces.
 
 Each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is, in every frame, as labelled or
 exchanged. The 64 states of a frame have an energy: of the parts that join pairs, of the direction in which the body
@@ -17,47 +17,47 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINT, N_TRUNK_JOINTS
 from posekit.validators.motion.timeline import norm
 
+#: Parts with a right and a left joint.
 SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-"""What is there on the right and on the left."""
 
 RIGHT_JOINTS: Final = tuple(JOINT[f"right_{name}"] for name in SIDE_PAIRS)
 LEFT_JOINTS: Final = tuple(JOINT[f"left_{name}"] for name in SIDE_PAIRS)
 
+#: Which pairs are exchanged (64, 6).
 _PAIR_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
-"""Which pairs are exchanged (64, 6)."""
 
+#: Pairs that a segment of a limb joins.
 _LIMB_LINKS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
-"""Pairs that a segment of a limb joins."""
 
+#: Difference of fit that is full evidence of how two pairs belong together, as a share of the length.
 LENGTH_SHARE: Final = 0.1
-"""Of a length: by so much it must fit better before it is full evidence of how two pairs go together."""
 
+#: Usual deviation of a limb's length from its median from which its ends belong to two limbs, metres.
 TORN_METRES: Final = 0.02
-"""A limb whose length is mostly off its median by so much has ends of two limbs."""
 
+#: Distance of a knee or a toe in front of the leg that is full evidence of where the hips face, metres.
 BEND_METRES: Final = 0.03
-"""A knee or a toe so far before the line of its leg is full evidence of which way the hips face."""
 
+#: Standard deviations of measuring noise that are full evidence.
 NOISE_FACTOR: Final = 5.0
-"""Standard deviations of measuring that are full evidence."""
 
+#: Distance between two joints that is full evidence of their identity in the next frame, metres.
 APART_METRES: Final = 0.1
-"""Two joints so far apart are full evidence of which is which in the next frame; nearer ones may change places."""
 
+#: Cost of an exchange between two frames, in frames of evidence.
 TURNING_COST: Final = 1.0
-"""Frames of evidence that a pair must bring to be exchanged from one frame to the next."""
 
+#: Weight of continuity between two frames, in frames of evidence.
 CONTINUITY_WEIGHT: Final = 6.0
-"""Frames of evidence that one step between frames is worth."""
 
+#: Cost of an exchanged pair in a frame, in frames of evidence: labels are more often right than wrong.
 EXCHANGED_COST: Final = 0.03
-"""Frames of evidence against a pair's being exchanged, a frame: labels are more often right than wrong."""
 
 
 def exchanged_pairs(
     joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_] | None = None, noise: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Say which of `SIDE_PAIRS` have right and left exchanged (T, 6).
+    """Return which of `SIDE_PAIRS` have right and left exchanged (T, 6).
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def exchanged_pairs(
     follows : bool array (T - 1,), optional
         Whether each frame but the first is the next one in time; all are if not given.
     noise : float
-        Standard deviation of measuring, metres: what is not more than some of it is no full evidence.
+        Standard deviation of measured coordinates, metres.
     """
     count = len(joints)
     if not count:
@@ -109,7 +109,7 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
 
 
 def known_before(across: Array) -> NDArray[np.bool_]:
-    """Say between which frames something says how pairs go on (T - 1,)."""
+    """Return between which frames some pair is known in both (T - 1,)."""
     known = np.isfinite(across[..., 0])
     return np.asarray((known[1:] & known[:-1]).any(axis=1))
 
@@ -117,7 +117,7 @@ def known_before(across: Array) -> NDArray[np.bool_]:
 def _evidence(
     joints: Array, across: Array, feet: Array, head: Array, unsure: float
 ) -> tuple[Array, Array, Array]:
-    """Return, in -1 to 1 a frame, what says that pairs go as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
+    """Return the evidence, -1 to 1, that pairs are as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
@@ -149,7 +149,7 @@ def _evidence(
 
 
 def _length(straight: Array, crossed: Array, torn: float) -> float:
-    """Return a segment's length: the median as labelled or, where that spreads, what most lengths are together at.
+    """Return a segment's length: the median as labelled or, if that scatters, the mode of all lengths.
 
     The right length is half of all lengths, as labelled and crossed, whatever share of a clip is exchanged: the
     middle of the shortest interval with two fifths of them (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69,
@@ -171,7 +171,7 @@ def _median(lengths: Array) -> float:
 
 
 def _sure(evidence: Array) -> Array:
-    """Bound evidence to -1 and 1; what is not known is none."""
+    """Bound evidence to -1 and 1; unknown evidence is 0."""
     return np.asarray(np.nan_to_num(np.clip(evidence, -1.0, 1.0)))
 
 
@@ -180,7 +180,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _continuity(joints: Array, across: Array) -> Array:
-    """Return what says that a pair turned over since the frame before (T - 1, 6), -1 to 1.
+    """Return the evidence that a pair was exchanged since the frame before (T - 1, 6), -1 to 1.
 
     It is how much shorter the ways of both joints are when they change places, beside the way of the trunk.
     """
@@ -198,7 +198,7 @@ def _continuity(joints: Array, across: Array) -> Array:
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
-    """Return the states (N,) of least energy: (N, 64), and what says that pairs turned over between (N - 1, 6)."""
+    """Return the states (N,) of least energy, given energies (N, 64) and evidence of exchanges between (N - 1, 6)."""
     differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]

@@ -1,15 +1,13 @@
-r"""How fast feet slide that stand.
+r"""Speeds of feet that stand.
 
-A foot that stands flat neither rises nor turns: its ankle and its toes have one velocity, which is 0. In recordings of
-people it is not: skin and markers move, feet roll, and what is taken for a joint lies above the sole; so the speed of
-the slowest point alone, by which skating is often told, calls every other step of a real walk sliding. What real feet
-do not do is to go on evenly: a foot slides whose points have for a time one velocity, from frame to frame the same,
-and along the ground.
+A foot that stands flat neither rises nor turns: its ankle and its toes have one velocity, which is 0. In recordings it
+is not: skin and markers move, feet roll, and joints lie above the sole; so the speed of the slowest point alone, by
+which skating is often measured, calls every other step of a real walk sliding. Real feet never go on evenly: a foot
+slides if its points have for a time one velocity, the same from frame to frame, and along the ground.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,44 +15,60 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, runs
 from posekit.skeleton import JOINT, SIDES
-from posekit.tree import Findings
-from posekit.validators.motion.clip import MotionClip
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement, check
+from posekit.validators.motion.frames import needs_rate
 from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of
-from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm, timeline_of
 
+#: Height above the highest level of the ground up to which a foot is down, metres: a swinging foot's toes clear 1 to 6
+#: cm, and are faster.
 DOWN_METRES: Final = 0.04
-"""Above the highest level of the ground up to which a foot is down: a swinging foot's toes clear 1 to 6 cm, faster."""
 
+#: Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`.
 FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
-"""Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`."""
 
+#: Unevenness of a slide of several points, at most, as a share of its speed.
 EVEN_SHARE: Final = 0.3
-"""Of a fast slide's own speed, by which it may be uneven: of several points, as one alone says nothing of a roll."""
 
+#: Speed above which a foot swings, metres a second, if noise hides how uneven a swing is.
 SWINGING_SPEED: Final = 1.0
-"""Metres a second above which a foot swings, where noise hides how uneven a swing is."""
 
+#: Height of the hips above a foot that stands, as a share of the legs' length: crawling bodies drag their feet.
 UPRIGHT_SHARE: Final = 0.6
-"""Of the legs' length, by which hips are above a foot that stands: who crawls or lies drags feet."""
 
+#: Frames by which the ends of a slide are moved to where they fit best, at most.
 BEND_FRAMES: Final = 8
-"""How far the start of a slide may be from where it was first found."""
 
 VIDEO_RATE: Final = 29.0
+#: Factor of the least duration at fewer frames per second: medians over `USUAL_FRAMES` hide a foot's roll.
 SLOW_FACTOR: Final = 2.0
-"""Times as long a slide lasts at fewer frames a second than that: medians over `USUAL_FRAMES` hide a foot's roll."""
 
+#: Frames per second from which resting feet are visible.
 SLIDING_RATE: Final = 15.0
-"""Frames a second at which feet are seen to rest."""
 
+#: Frames over which the median velocity is taken: trembling changes from frame to frame.
 USUAL_FRAMES: Final = 5
-"""Frames of which the median velocity is taken: a point that trembles does so from frame to frame."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sliding(MotionCheck):
-    """Whether a standing foot slides evenly.
+#: Speeds of a drift of the whole body that are looked for, metres a second; real walks have up to 0.04 for a second.
+LEAST_DRIFT, LONGEST_DRIFT = 0.05, 1.0
+
+#: Least duration of a drift, and the windows whose median velocity is a candidate for its velocity, seconds.
+DRIFT_SECONDS, CANDIDATE_SECONDS = 0.8, 0.4
+
+#: Mean distance of velocities from a drift's, as a share of its speed, at most.
+DRIFT_FIT: Final = 0.55
+
+#: Share of its speed by which a drift must explain the velocity of each frame better than rest does.
+DRIFT_PENALTY: Final = 0.25
+
+
+@check("sliding", unit="m/s", reads=("joints", "up", "time", "ground"), over_time=True)
+def sliding(
+    body: Body, *, fastest: float = 0.04, lasting: float = 0.4, uneven: float = 0.02, rising: float = 0.05
+) -> Judgement:
+    """Feet that stand on the ground slide, or the whole body drifts along it.
 
     Parameters
     ----------
@@ -67,91 +81,131 @@ class Sliding(MotionCheck):
     rising : float
         Metres a second that a foot on the ground goes up or down at most.
     """
+    needs_rate(body, SLIDING_RATE)
+    line, ground = timeline_of(body), ground_of(body)
+    feet, over = soles(body)
+    up = np.zeros(3) if body.up is None else body.up
+    base = (ground.low + ground.high + ground.lifted)[:, None]
+    hips = body.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].min(axis=1)[:, None]
+    stands = ~(hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body))
+    down = line.spread((stands & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
+    spread = line.spread(feet)
+    count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
+    slides = [
+        _slides(body, spread[:, foot], down[:, foot], up, count, (fastest, uneven, rising))
+        for foot in FOOT_POINTS
+    ]
+    value = np.zeros((len(spread), len(SIDES)))
+    for start, stop in runs(np.any(slides, axis=0)):
+        which = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
+        points = spread[:, [point for k in which for point in FOOT_POINTS[k]]]
+        points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
+        along = (points[stop - 1] - points[start]).mean(axis=0)
+        along = along - (along @ up) * up
+        way = points @ along / norm(along)
+        speed = float(norm(along)) / ((stop - 1 - start) * body.dt)
+        rough = _roughly(np.diff(way.mean(axis=1)) - speed * body.dt / 2, start, stop - 1, count)
+        first = _bend(way, *rough, count)
+        last = len(way) - 1 - _bend(way[::-1], len(way) - 1 - rough[1], len(way) - 1 - rough[0], count)
+        value[first + 1 : last + 1, which] = speed
+    drift = _drift(_stance_velocity(spread, line.spread(np.asarray(over + base)), up, body.dt), body.dt)
+    if drift is not None and drift[2] > fastest + 3 * np.sqrt(2) * body.noise / body.dt:
+        start, stop, speed = drift
+        for first, last in runs(np.asarray(value.any(axis=1))):
+            if first < stop and last > start:
+                value[first:last] = 0.0  # one defect is named once
+        value[start:stop] = speed
+    return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(value), upper=fastest)
 
-    name = "sliding"
-    unit = "m/s"
-    meaning = "a foot slides that stands on the ground"
-    needs = ("up", "time", "ground")
 
-    fastest: float = 0.04
-    lasting: float = 0.4
-    uneven: float = 0.02
-    rising: float = 0.05
+def _slides(
+    body: Body,
+    points: Array,
+    down: NDArray[np.bool_],
+    up: Array,
+    count: int,
+    bounds: tuple[float, float, float],
+) -> NDArray[np.bool_]:
+    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for so many slots."""
+    fastest, uneven, rising = bounds
+    known = np.isfinite(points).all(axis=(0, 2))
+    none = np.zeros(len(points), dtype=np.bool_)
+    if not known.any():
+        return none
+    ways = np.diff(points[:, known], axis=0) / body.dt
+    if len(ways) < max(count, USUAL_FRAMES):
+        return none
+    velocity = _usual(ways)
+    noise = 3 * np.sqrt(2) * body.noise / body.dt
+    level = velocity - (velocity @ up)[..., None] * up
+    mean = level.mean(axis=1)
+    flat = (np.abs(velocity @ up).max(axis=1) < rising + noise) & (
+        norm(level - mean[:, None]).max(axis=1) < uneven + noise
+    )
+    flat &= down[1:, known].any(axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
+    even = windows.mean(axis=-1)
+    differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
+    share = EVEN_SHARE if known.sum() > 1 else 0.0
+    steady = differs < np.maximum(uneven, share * norm(even)) + noise
+    steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
+    # Where noise lets feet differ by more than they slide, evenness is no evidence.
+    steady &= norm(even) > max(fastest, noise / EVEN_SHARE)
+    if noise > uneven:
+        steady &= norm(even) < SWINGING_SPEED
+    slides = np.zeros(len(points), dtype=np.bool_)
+    for window in np.flatnonzero(steady):
+        slides[window : window + count + 1] = True
+    return slides
 
-    def places(self, clip: MotionClip) -> tuple[str, ...]:
-        """Name the feet; see `MotionCheck`."""
-        del clip
-        return tuple(f"{side}_foot" for side in SIDES)
 
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing of clips at few frames a second; see `MotionCheck`."""
-        few = f"it needs {SLIDING_RATE:g} frames a second" if clip.rate < SLIDING_RATE else ""
-        return super().not_asked(clip) or few
+def _stance_velocity(points: Array, over: Array, up: Array, step: float) -> Array:
+    """Return the velocity along the ground of the slowest point of both feet that is down (S, 3), metres a second.
 
-    def judge(self, clip: MotionClip) -> Findings:
-        """Measure how fast each foot slides; see `MotionCheck`."""
-        line, ground = timeline_of(clip), ground_of(clip)
-        feet, over = soles(clip)
-        up = np.zeros(3) if clip.up is None else clip.up
-        base = (ground.low + ground.high + ground.lifted)[:, None]
-        hips = clip.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].min(axis=1)[:, None]
-        stands = ~(hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(clip))
-        down = line.spread((stands & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
-        spread = line.spread(feet)
-        slides = [self._slides(clip, spread[:, foot], down[:, foot], up) for foot in FOOT_POINTS]
-        value = np.zeros((len(spread), len(SIDES)))
-        count = self._frames(clip)
-        for start, stop in runs(np.any(slides, axis=0)):
-            sliding = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
-            points = spread[:, [point for k in sliding for point in FOOT_POINTS[k]]]
-            points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
-            along = (points[stop - 1] - points[start]).mean(axis=0)
-            along = along - (along @ up) * up
-            way = points @ along / norm(along)
-            speed = float(norm(along)) / ((stop - 1 - start) * clip.step)
-            rough = _roughly(np.diff(way.mean(axis=1)) - speed * clip.step / 2, start, stop - 1, count)
-            first = _bend(way, *rough, count)
-            last = len(way) - 1 - _bend(way[::-1], len(way) - 1 - rough[1], len(way) - 1 - rough[0], count)
-            value[first + 1 : last + 1, sliding] = speed
-        return Findings(value=line.of_frames(value), lower=np.array(-np.inf), upper=np.array(self.fastest))
+    One foot of a walker always stands, so that it is near zero in every frame; NaN in frames without a foot down.
+    """
+    velocity = np.full(points.shape, np.nan)
+    velocity[1:] = np.diff(points, axis=0) / step
+    velocity = velocity - (velocity @ up)[..., None] * up
+    speed = np.where(points @ up < over + 2 * DOWN_METRES, norm(velocity), np.nan)
+    speed = np.where(np.isnan(speed), np.inf, speed)
+    slowest = speed.argmin(axis=1)
+    rows = np.arange(len(points))
+    return np.where(np.isfinite(speed[rows, slowest])[:, None], velocity[rows, slowest], np.nan)
 
-    def _frames(self, clip: MotionClip) -> int:
-        lasting = self.lasting * (SLOW_FACTOR if clip.rate < VIDEO_RATE else 1.0)
-        return max(3, round(lasting / clip.step))
 
-    def _slides(
-        self, clip: MotionClip, points: Array, down: NDArray[np.bool_], up: Array
-    ) -> NDArray[np.bool_]:
-        """Say in which slots (S,) a foot (S, 3, 3) slides."""
-        count, known = self._frames(clip), np.isfinite(points).all(axis=(0, 2))
-        none = np.zeros(len(points), dtype=np.bool_)
-        if not known.any():
-            return none
-        ways = np.diff(points[:, known], axis=0) / clip.step
-        if len(ways) < max(count, USUAL_FRAMES):
-            return none
-        velocity = _usual(ways)
-        noise = 3 * np.sqrt(2) * clip.noise / clip.step
-        level = velocity - (velocity @ up)[..., None] * up
-        mean = level.mean(axis=1)
-        flat = (np.abs(velocity @ up).max(axis=1) < self.rising + noise) & (
-            norm(level - mean[:, None]).max(axis=1) < self.uneven + noise
-        )
-        flat &= down[1:, known].any(axis=1)
-        windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
-        even = windows.mean(axis=-1)
-        differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
-        share = EVEN_SHARE if known.sum() > 1 else 0.0
-        steady = differs < np.maximum(self.uneven, share * norm(even)) + noise
-        steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
-        # Where noise lets feet differ by more than they slide, evenness is no evidence.
-        steady &= norm(even) > max(self.fastest, noise / EVEN_SHARE)
-        if noise > self.uneven:
-            steady &= norm(even) < SWINGING_SPEED
-        slides = np.zeros(len(points), dtype=np.bool_)
-        for window in np.flatnonzero(steady):
-            slides[window : window + count + 1] = True
-        return slides
+def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
+    """Find the stretch of slots in which feet stand with one common velocity: start, stop, and its speed.
+
+    The stretch maximizes the sum over frames of how much better the velocity explains them than rest does (the maximum
+    sum of consecutive numbers: Bentley 1984, Commun. ACM 27:865).
+    """
+    known = np.isfinite(velocity[:, 0])
+    count = max(round(CANDIDATE_SECONDS / step), 3)
+    at_rest, best, most = norm(velocity), None, 0.0
+    for first in range(0, len(velocity) - count, max(count // 2, 1)):
+        seen = velocity[first : first + count][known[first : first + count]]
+        if len(seen) < 0.6 * count:
+            continue
+        common = np.median(seen, axis=0)
+        for _ in range(2):
+            speed = float(np.linalg.norm(common))
+            if not LEAST_DRIFT < speed < LONGEST_DRIFT:
+                break
+            gain = np.minimum(at_rest, speed) - np.minimum(norm(velocity - common), speed)
+            total = np.concatenate([[0.0], np.cumsum(np.where(known, gain - DRIFT_PENALTY * speed, 0.0))])
+            stop = int(np.argmax(total - np.minimum.accumulate(total)))
+            start = int(np.argmin(total[: stop + 1]))
+            inside = velocity[start:stop][known[start:stop]]
+            if len(inside) < 3:
+                break
+            common = np.median(inside, axis=0)
+            speed = float(np.linalg.norm(common))
+            fits = np.minimum(norm(inside - common), speed).mean() < DRIFT_FIT * speed
+            worth = float(total[stop] - total[start])
+            if fits and (stop - start) * step >= DRIFT_SECONDS and worth > most and speed > LEAST_DRIFT:
+                best, most = (start, stop, speed), worth
+    return best
 
 
 def _roughly(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
@@ -182,7 +236,7 @@ def _usual(velocity: Array) -> Array:
     room = USUAL_FRAMES // 2
     padded = np.pad(velocity, ((room, room), (0, 0), (0, 0)), mode="reflect")
     a, b, c, d, e = (padded[k : k + len(velocity)] for k in range(USUAL_FRAMES))
-    # Of two pairs the least and the greatest are not the median of five; it is that of the two between and the fifth.
+    # The least and the greatest of two pairs are not the median of five; it is that of the two between and the fifth.
     low = np.maximum(np.minimum(a, b), np.minimum(d, e))
     high = np.minimum(np.maximum(a, b), np.maximum(d, e))
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))

@@ -1,78 +1,75 @@
-"""How fast joints move, and how suddenly that changes: bounds of what people have been measured to do."""
+"""Speeds, accelerations and jerks of joints, against bounds that people have been measured to keep."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import comb
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS
-from posekit.tree import Findings
-from posekit.validators.motion.clip import MotionClip
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.explained import explained
-from posekit.validators.motion.motion_check import MotionCheck
-from posekit.validators.motion.timeline import centred, filtered, norm
+from posekit.validators.motion.timeline import centred, filtered, norm, timeline_of
 
+#: Least time over which differences are taken, seconds: more frames per second add noise.
 SHORTEST_SECONDS: Final = 1.0 / 60.0
-"""Differences are taken over no less: bounds hold for motion of so many hertz, and more frames a second add noise."""
 
-NOISE_FACTOR: Final = 5.0
-"""Standard deviations of measuring by which a difference may be off."""
+#: Standard deviations of noise by which a difference may be off.
+NOISE_DEVIATIONS: Final = 5.0
+
+#: Velocity from which a URDF's number means that there is no limit, radians or metres a second.
+NO_LIMIT: Final = 1e6
 
 
-@dataclass(frozen=True, kw_only=True)
-class Derivative(MotionCheck):
-    """A derivative of the way of each joint against bounds for the trunk and for limbs.
+@check("speed", unit="m/s", reads=("joints", "time"), over_time=True)
+def speed(body: Body, *, trunk: float = 14.0, limbs: float = 30.0) -> Judgement:
+    """Joints move faster than people can.
 
     Parameters
     ----------
     trunk : float
-        Of neck, shoulders, pelvis and hips, in metres and seconds.
+        Bound for neck, shoulders, pelvis and hips, metres a second.
     limbs : float
-        Of the other joints.
-
-    Attributes
-    ----------
-    order : int
-        Of the derivative.
+        Bound for the other joints, metres a second.
     """
+    return _derivative(body, 1, trunk, limbs)
 
-    order: ClassVar[int]
-    needs: ClassVar[tuple[str, ...]] = ("time",)
 
-    trunk: float
-    limbs: float
+@check("acceleration", unit="m/s²", reads=("joints", "time"), over_time=True)
+def acceleration(body: Body, *, trunk: float = 400.0, limbs: float = 1200.0) -> Judgement:
+    """Speeds of joints change faster than those of people can; bounds as those of `speed`."""
+    return _derivative(body, 2, trunk, limbs)
 
-    def places(self, clip: MotionClip) -> tuple[str, ...]:
-        """Name the joints; see `MotionCheck`."""
-        del clip
-        return JOINTS
 
-    def judge(self, clip: MotionClip) -> Findings:
-        """Take the difference of that order over a sixtieth of a second or a frame; see `MotionCheck`."""
-        found = explained(clip)
-        stride = max(round(SHORTEST_SECONDS / clip.step), 1)
-        weights = np.zeros(self.order * stride + 1)
-        weights[::stride] = [(-1.0) ** (self.order - k) * comb(self.order, k) for k in range(self.order + 1)]
-        seconds = (stride * clip.step) ** self.order
-        values = norm(filtered(found.joints, weights)) / seconds
-        values = centred(values, found.timeline.count, (self.order * stride + 1) // 2)
-        if self.order == 1:
-            values = np.where(np.isnan(values), _over_gaps(found.joints) / clip.step, values)
-        spread = np.sqrt(3.0 * comb(2 * self.order, self.order)) * clip.noise / seconds
-        return Findings(
-            value=found.timeline.of_frames(values),
-            lower=np.array(-np.inf),
-            upper=np.where(np.arange(len(JOINTS)) < N_TRUNK_JOINTS, self.trunk, self.limbs),
-            tolerance=NOISE_FACTOR * float(spread),
-        )
+@check("jerk", unit="m/s³", reads=("joints", "time"), over_time=True)
+def jerk(body: Body, *, trunk: float = 48_000.0, limbs: float = 144_000.0) -> Judgement:
+    """Accelerations of joints change faster than those of people can; bounds as those of `speed`."""
+    return _derivative(body, 3, trunk, limbs)
+
+
+def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement:
+    """Judge the difference of an order over a sixtieth of a second or a frame."""
+    found = explained(body)
+    stride = max(round(SHORTEST_SECONDS / body.dt), 1)
+    weights = np.zeros(order * stride + 1)
+    weights[::stride] = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
+    seconds = (stride * body.dt) ** order
+    values = norm(filtered(found.joints, weights)) / seconds
+    values = centred(values, found.timeline.count, (order * stride + 1) // 2)
+    if order == 1:
+        values = np.where(np.isnan(values), _over_gaps(found.joints) / body.dt, values)
+    spread = float(np.sqrt(3.0 * comb(2 * order, order)) * body.noise / seconds)
+    upper = np.where(np.arange(len(JOINTS)) < N_TRUNK_JOINTS, trunk, limbs)
+    return Judgement(
+        JOINTS, found.timeline.of_frames(values), upper=upper, tolerance=NOISE_DEVIATIONS * spread
+    )
 
 
 def _over_gaps(joints: Array) -> Array:
-    """Return metres a slot from where each joint was last known (S, 14): NaN where it was not or is not."""
+    """Return metres a slot from where each joint was last known (S, 14); NaN where it was not or is not known."""
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)
@@ -85,40 +82,40 @@ def _over_gaps(joints: Array) -> Array:
     return ways
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointSpeed(Derivative):
-    """Whether joints move faster than people have been measured to; see `Derivative`."""
+@check("joint-velocity", unit="1", reads=("q", "robot", "time"), over_time=True)
+def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judgement:
+    """Robot joints move faster than their limits.
 
-    name = "speed"
-    unit = "m/s"
-    meaning = "a joint moves faster than people can"
-    order = 1
+    Parameters
+    ----------
+    share : float
+        Share of the URDF's velocity limit that a joint may use.
+    most : float
+        Bound for all revolute joints instead of the URDF's limits, radians a second; 0 for the URDF's limits.
+    """
+    robot = body.robot
+    if robot is None or body.q is None:
+        raise NotAskedError("there are no configurations of a robot (--urdf)")
+    import pinocchio as pin
 
-    trunk: float = 14.0
-    limbs: float = 30.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointAcceleration(Derivative):
-    """Whether joints change their speed faster than people can; see `Derivative`."""
-
-    name = "acceleration"
-    unit = "m/s²"
-    meaning = "the speed of a joint changes faster than that of people can"
-    order = 2
-
-    trunk: float = 400.0
-    limbs: float = 1200.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointJerk(Derivative):
-    """Whether the acceleration of joints changes faster than that of people can; see `Derivative`."""
-
-    name = "jerk"
-    unit = "m/s³"
-    meaning = "the acceleration of a joint changes faster than that of people can"
-    order = 3
-
-    trunk: float = 48_000.0
-    limbs: float = 144_000.0
+    model, line = robot.model, timeline_of(body)
+    limits = np.array(model.velocityLimit, dtype=np.float64)
+    names, revolute = [""] * model.nv, np.zeros(model.nv, dtype=np.bool_)
+    for joint in range(1, model.njoints):
+        for k in range(model.nvs[joint]):
+            at = model.idx_vs[joint] + k
+            names[at] = model.names[joint] if model.nvs[joint] == 1 else f"{model.names[joint]}.{k}"
+            revolute[at] = model.nvs[joint] == 1 and "P" not in model.joints[joint].shortname()
+    if most:
+        limits = np.where(revolute, most, np.inf)
+    # The root has no limit; 0 or a huge number in a URDF is none.
+    limited = np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))
+    if not len(limited):
+        raise NotAskedError("the URDF has no velocity limits")
+    q = line.spread(body.q)
+    velocity = np.full((len(q), model.nv), np.nan)
+    known = np.asarray(np.isfinite(q).all(axis=1))
+    for slot in np.flatnonzero(known[1:] & known[:-1]):
+        velocity[slot + 1] = pin.difference(model, q[slot], q[slot + 1]) / body.dt
+    value = line.of_frames(np.abs(velocity[:, limited])) / limits[limited]
+    return Judgement([names[k] for k in limited], value, upper=share)

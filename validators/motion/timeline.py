@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.validators.motion.clip import MotionClip, once_a_clip
+from posekit.validators.body import Body, once
 
+#: Largest number of slots of a gap: longer gaps are cut to it.
 LONGEST_GAP: Final = 16
-"""Slots that a gap is given at most: longer ones say nothing more."""
 
+#: Slots that are filtered at a time.
 CACHED_SLOTS: Final = 256
-"""Slots that are filtered at a time."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
-    """Which slot of an even grid each frame of a clip is in, and what its time stamps say of it.
+    """The slot of each frame of a clip on an even grid of time, and gaps and displacements by its time stamps.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Timeline:
     place : int array (T,)
         Frames by which each is out of its place in time.
     missing : array (T,)
-        Steps that lie between a frame and the one before it in time, beyond one; NaN where time says nothing.
+        Steps that lie between a frame and the one before it in time, beyond one; NaN where times are not known.
     """
 
     slots: NDArray[np.intp]
@@ -53,17 +53,17 @@ class Timeline:
         return found
 
 
-@once_a_clip
-def timeline_of(clip: MotionClip) -> Timeline:
-    """Place the frames of a clip by their times, or one after the other where those say nothing."""
-    count = len(clip)
+@once
+def timeline_of(body: Body) -> Timeline:
+    """Place the frames of a clip by their times, or one after the other where times are not known."""
+    count = len(body)
     frames = np.arange(count)
-    if not clip.step > 0 or not np.isfinite(clip.time).all():
+    if not body.dt > 0 or not np.isfinite(body.time).all():
         return Timeline(
             slots=frames, count=count, place=np.zeros(count, dtype=np.intp), missing=np.full(count, np.nan)
         )
-    order = np.argsort(clip.time, kind="stable")
-    steps = np.diff(clip.time[order], prepend=clip.time[order[:1]] - clip.step) / clip.step
+    order = np.argsort(body.time, kind="stable")
+    steps = np.diff(body.time[order], prepend=body.time[order[:1]] - body.dt) / body.dt
     # A stamp that is a quarter of a step off is still in its slot: videos have such; one that is no later has none.
     ways = np.clip(np.round(steps), 0, LONGEST_GAP).astype(np.intp)
     ways[(ways == 0) & (steps > 0.25)] = 1
@@ -79,7 +79,7 @@ def filtered(points: Array, weights: Array) -> Array:
     """Sum `weights` (K,) over K neighbouring slots of (S, ...): (S - K + 1, ...)."""
     room = max(len(points) - len(weights) + 1, 0)
     total = np.zeros((room, *points.shape[1:]))
-    # So many slots at a time stay in the cache while all weights are gone through.
+    # Blocks of this size stay in the cache.
     for start in range(0, room, CACHED_SLOTS):
         part = total[start : start + CACHED_SLOTS]
         for k, weight in enumerate(weights):
@@ -97,7 +97,7 @@ def centred(values: Array, count: int, first: int) -> Array:
 
 def norm(vectors: Array) -> Array:
     """Return the lengths of vectors (..., 3)."""
-    # By components: of thousands it takes 3/5 of the time of a sum over the last axis.
+    # Sums by component take 3/5 of the time of a sum over the last axis.
     squared = vectors[..., 0] * vectors[..., 0]
     squared += vectors[..., 1] * vectors[..., 1]
     squared += vectors[..., 2] * vectors[..., 2]

@@ -1,4 +1,4 @@
-"""How much joints tremble, and in which frames: what is left of motion when all that is smooth is taken off."""
+"""Trembling of joints, and its frames: the remainder of motion without its smooth part."""
 
 from __future__ import annotations
 
@@ -13,47 +13,47 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.validators.motion.timeline import centred, filtered, norm
 
+#: Frames over which trembling is measured.
 TREMBLING_FRAMES: Final = 15
-"""Over which trembling is measured."""
 
+#: Part of the second difference over three frames that fast motion leaves in the sixth difference.
 CURVED_SHARE: Final = 0.3
-"""Of the second difference, over three frames each way, that fast motion at few frames leaves in the sixth."""
 
+#: Standard deviations of noise that are subtracted from the trembling of a length: one number varies more than three.
 LENGTHS_NOISE: Final = 2.0
-"""Standard deviations of measuring that are taken off what a length trembles: one number varies more than three."""
 
+#: Part of the trembling of a length that counts as a joint's: its other end may tremble too.
 BOTH_ENDS: Final = 0.8
-"""Of the trembling of a length that is said to be a joint's: its other end may tremble, too."""
 
+#: Median length of a vector of three normal coordinates of unit deviation, and of one.
 MEDIAN_OF_THREE, MEDIAN_OF_ONE = 1.5382, 0.6745
-"""Median length of a vector of three normal coordinates of unit deviation, and of one."""
 
+#: Frames between two stretches that are one, at most.
 NEAR_FRAMES: Final = 4
-"""Between two stretches that are one."""
 
+#: Frames by which the edges of a stretch are looked for, either way.
 EDGE_FRAMES: Final = 20
-"""By which the edges of a stretch are looked for, either way."""
 
+#: Frames from which the usual trembling is measured.
 SAMPLED_FRAMES: Final = 2000
-"""That say how much joints usually tremble."""
 
+#: Frames before and after a stretch that show the trembling outside it.
 OUTSIDE_FRAMES: Final = 40
-"""Before and after a stretch that say how much joints tremble outside it."""
 
+#: Least ratio of outside to inside trembling; and the same if only a few frames show it.
 LEAST_SHARE, FEW_FRAMES_SHARE = 0.1, 0.3
-"""Of the trembling inside that there is outside at least; and where a few frames are all that says so."""
 
+#: Quantile of the trembling outside a stretch: beside it motion may be fast.
 OUTSIDE_QUANTILE: Final = 0.85
-"""Of what trembles outside a stretch: beside it motion may be fast."""
 
+#: Largest ratio of outside to inside trembling, and least trembling, metres.
 MOST_SHARE, LEAST_INSIDE = 0.6, 0.002
-"""Of the trembling inside that there is outside at most, and metres that are trembling at least."""
 
+#: Largest evidence of one joint in one frame: natural logarithm of a ratio of likelihoods.
 MOST_EVIDENCE: Final = 6.0
-"""Of one joint in one frame that it trembles, or not: natural logarithm of a ratio of likelihoods."""
 
+#: Order of the differences that measure what is not smooth.
 SIXTH_ORDER: Final = 6
-"""Of the differences that are taken for what is not smooth."""
 
 _SEGMENTS_OF: Final = tuple(
     [k for k, segment in enumerate(SEGMENTS) if joint in segment] for joint in range(len(JOINTS))
@@ -94,7 +94,7 @@ def usual_trembling(joints: Array) -> float:
 
 
 def _windows(rough: Array) -> Array:
-    """Return medians over windows of (N, K), of every third frame and said of its neighbours; unknown is still."""
+    """Return medians over windows of (N, K), of every third frame and repeated beside it; unknown is 0."""
     half = TREMBLING_FRAMES // 2
     padded = np.pad(np.nan_to_num(rough), ((half, half + 2), (0, 0)))
     windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
@@ -109,7 +109,7 @@ def _lengths(joints: Array) -> Array:
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Say in which frames joints tremble (S, 14), from where they do so over a window (S, 14).
+    """Return the frames in which joints tremble (S, 14), given windows in which they do (S, 14).
 
     Notes
     -----
@@ -135,7 +135,7 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
 
 
 def _evidence(rough: Array, first: int, last: int, numbers: int) -> Array:
-    """Return what says that each frame trembles (S,), of lengths (S, K) of vectors of so many numbers."""
+    """Return the evidence that each frame trembles (S,), from lengths (S, K) of vectors of so many numbers."""
     beyond = np.r_[max(first - OUTSIDE_FRAMES, 0) : max(first - 2, 0), last + 3 : last + OUTSIDE_FRAMES]
     outside = rough[beyond[beyond < len(rough)]]
     median = MEDIAN_OF_THREE if numbers > 1 else MEDIAN_OF_ONE
@@ -144,21 +144,21 @@ def _evidence(rough: Array, first: int, last: int, numbers: int) -> Array:
     spread = np.clip(_quantile(outside, OUTSIDE_QUANTILE) / median, share * inside, MOST_SHARE * inside)
     ratio = numbers * np.log(spread / inside) + rough**2 / 2.0 * (spread**-2.0 - inside**-2.0)
     bounded = np.clip(np.nan_to_num(ratio), -MOST_EVIDENCE, MOST_EVIDENCE)
-    # A segment that does not tremble inside says nothing of where that is.
+    # A segment that does not tremble inside is no evidence.
     return np.asarray(np.where(inside > LEAST_INSIDE, bounded, 0.0).sum(axis=1))
 
 
 def _edges(evidence: Array, low: int, middle: int) -> tuple[int, int]:
-    """Return the first and the last frame that tremble, of what says so from frame `low` on, around a middle."""
+    """Return the first and the last frame that tremble, given the evidence from frame `low` on, around a middle."""
     total = np.concatenate([[0.0], np.cumsum(evidence)])
-    # Two frames beyond the noise a fourth difference has a part of it: less than is evidence, the nearer one more.
+    # A fourth difference reaches two frames beyond the noise, with less evidence than inside.
     start = low + int(total[: middle - low + 1].argmin()) + 1
     end = middle + int(total[middle - low :].argmax()) - 2
     return min(start, end), max(start, end)
 
 
 def _quantile(rough: Array, share: float) -> Array:
-    """Return a quantile (K,) of lengths (N, K): little where nothing is known."""
+    """Return a quantile (K,) of lengths (N, K): small where nothing is known."""
     if not len(rough):
         return np.zeros(rough.shape[1])
     return np.maximum(np.quantile(np.nan_to_num(rough), share, axis=0), 1e-9)

@@ -1,0 +1,355 @@
+"""`repair`: the nearest motion that passes, in the user's own file, and what was invented for it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import InputError, refusal
+from posekit.geometry import Record
+from posekit.motion.motion import PER_FRAME, Motion
+from posekit.motion.repair.clip import Clip, RobotClip
+from posekit.motion.repair.files import in_bvh, in_table
+from posekit.motion.repair.time import mended
+from posekit.motion.validation import files_of, in_order, names_below
+from posekit.settings import ValidateSettings
+from posekit.validators.judge import Validator
+from posekit.validators.report import Report, joined, plural
+
+#: Times that a motion is repaired again: postures can tremble that time does not, and a file rounds.
+ROUNDS: Final = 3
+#: Change of a frame that counts, metres or radians.
+SEEN: Final = 1e-7
+#: Endings of a robot's tables of text.
+TABLES: Final = (".csv", ".tsv", ".txt")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Repaired(Record):
+    """A repaired motion, or the repaired files of a folder.
+
+    Parameters
+    ----------
+    motion : Motion or None
+        The repaired motion, with the frames that passed as they were; None for several files.
+    before, report : Report
+        What checks say of the given motion, and of the repaired one as it is read again.
+    notes : tuple of str
+        What was invented, and what is left, one sentence each.
+    text : str
+        The repaired table of a robot, in its own columns; empty for other motion.
+    """
+
+    motion: Motion | None
+    before: Report
+    report: Report
+    notes: tuple[str, ...]
+    text: str = ""
+
+    def _facts(self) -> list[str]:
+        return list(self.notes)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the repaired motion: a BVH file with its own hierarchy, a robot's table with its own columns.
+
+        Raises
+        ------
+        InputError
+            If the format cannot hold the motion, or there are several files.
+        """
+        import posekit
+
+        path = Path(path)
+        if self.motion is None:
+            remedy = "repair them into a folder: repair(source, target)"
+            raise refusal(path, "", "several files", "one motion", remedy)
+        source = Path(self.motion.source or "")
+        same = source.is_file() and source.suffix.lower() == path.suffix.lower()
+        if same and bool(self.before.ok.all()):
+            shutil.copyfile(source, path)
+        elif self.text and path.suffix.lower() in TABLES:
+            from posekit.formats.files import write_bytes
+
+            write_bytes(path, self.text.encode())
+        else:
+            posekit.save(self.motion, path)
+
+
+def repair(
+    source: Any,
+    target: str | PathLike[str] | None = None,
+    *,
+    urdf: Any = "",
+    settings: ValidateSettings | None = None,
+    layout: str = "",
+    unit: str | None = None,
+    up: str | None = None,
+    rate: float | None = None,
+    person: int | None = None,
+    progress: Callable[[str], None] | None = None,
+    **changes: Any,
+) -> Repaired:
+    """Find the nearest motion that passes all checks.
+
+    Over time, frames are put in order, sides exchanged back, lengths of limbs restored, jumps and frozen frames
+    interpolated, trembling smoothed by as little as helps, the body shifted to the ground, and standing feet held. Then
+    each posture that is rejected is replaced by the nearest one inside all bounds, with changes that are alike in
+    neighbouring frames. Frames that need no change stay as they are, byte for byte in BVH files and in a robot's table.
+
+    Parameters
+    ----------
+    source : path, sequence of path, Motion or array
+        A file, a folder, a motion, or an array as `posekit.Validator` takes it; an array is motion if `rate` is given.
+    target : path, optional
+        File to write; for a folder or several files a new folder of files of the same names, in which valid files are
+        copied unchanged.
+    urdf, settings, layout, unit, up, rate, person, **changes
+        As in `posekit.validate`.
+    progress : callable, optional
+        Called with the name of each file when it is done.
+
+    Returns
+    -------
+    Repaired
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or the target cannot hold the motion.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> standing = posekit.load_figure().neutral_points[:14].copy()
+    >>> posekit.repair(standing).notes
+    ('0 of 1 frame changed',)
+    >>> standing[[10, 12]] += [[0.35, 0, 0.1], [0.2, 0, 0.5]]  # a right knee bent forward
+    >>> bool(posekit.repair(standing).report.ok.all())
+    True
+    """
+    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
+
+    @cache
+    def judge(robot: str) -> Validator:
+        """Return the validator of the given body, else of the robot that a file names."""
+        return Validator(urdf or robot or "figure", settings, **changes)
+
+    paths = isinstance(source, str | PathLike) or (
+        isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source)
+    )
+    if not paths:
+        done = _repaired(_given(source, judge(""), up, rate), judge, facts)
+    else:
+        files = list(files_of(source))
+        if len(files) > 1 or not Path(files[0]).samefile(str(source)):
+            return _folder(files, target, judge, facts, urdf, progress)
+        done = _file(files[0], judge, facts, urdf)
+    if target is not None:
+        done.save(target)
+    return done
+
+
+def _given(source: Any, validator: Validator, up: str | None, rate: float | None) -> Motion:
+    motion = source if isinstance(source, Motion) else validator.motion(source)
+    fields: dict[str, Any] = {} if up is None else {"up": up if len(up) > 1 else f"+{up}"}
+    if rate is not None:
+        fields |= {"frame": np.arange(len(motion)), "time": np.arange(len(motion)) / rate}
+    return replace(motion, **fields)
+
+
+def _file(path: Path, judge: Callable[[str], Validator], facts: dict[str, Any], urdf: Any) -> Repaired:
+    import posekit
+
+    name = str(getattr(urdf, "name", urdf) or "")
+    held = posekit.open(
+        path,
+        **{key: value for key, value in facts.items() if value is not None},
+        urdf="" if name in ("figure", "stick_figure") else name,
+    )
+    if not isinstance(held, Motion):
+        raise refusal(path, "", f"a {type(held).__name__}", "postures or motion", "give a file of motion")
+    return _repaired(held, judge, facts)
+
+
+def _folder(
+    files: Sequence[Path],
+    target: str | PathLike[str] | None,
+    judge: Callable[[str], Validator],
+    facts: dict[str, Any],
+    urdf: Any,
+    progress: Callable[[str], None] | None,
+) -> Repaired:
+    """Repair files into a new folder; a file that cannot be read or written is named."""
+    folder = None if target is None else Path(target)
+    if folder is not None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise refusal(folder, "", "something that exists", "a new or empty folder", "name another")
+    names = names_below(str(path) for path in files)
+    done: list[Repaired] = []
+    notes: list[str] = []
+    refused: list[str] = []
+    for path in files:
+        try:
+            one = _file(path, judge, facts, urdf)
+            if folder is not None:
+                place = folder / names[str(path)]
+                place.parent.mkdir(parents=True, exist_ok=True)
+                one.save(place)
+            done.append(one)
+            if not one.before.ok.all():
+                notes.append(f"{names[str(path)]}: {'; '.join(one.notes)}")
+        except InputError as error:
+            refused.append(str(error))
+        if progress is not None:
+            progress(str(path))
+    if not done:
+        raise InputError(f"none of {plural(len(files), 'file')} can be repaired; the first: {refused[0]}")
+    valid = sum(bool(one.report.ok.all()) for one in done)
+    kept = sum(bool(one.before.ok.all()) for one in done)
+    first = f"{valid} of {plural(len(done), 'file')} valid: {kept} unchanged, {valid - kept} repaired"
+    before = joined([one.before for one in done], refused=refused)
+    report = joined([one.report for one in done], refused=refused)
+    return Repaired(motion=None, before=before, report=report, notes=(first, *notes, *refused))
+
+
+def _repaired(motion: Motion, judge: Callable[[str], Validator], facts: dict[str, Any]) -> Repaired:
+    """Repair every recording of a motion."""
+    validator = judge(motion.robot)
+    of_points = validator.robot is None and motion.joints is not None
+    if not of_points and motion.q is None:
+        got, remedy = "positions of a person", "leave --urdf out, or convert the file first"
+        raise refusal(motion.source or "repair", "urdf", got, "configurations of the robot", remedy)
+    if of_points and motion.q is not None:
+        motion = replace(motion, q=None, q_names=(), robot="")
+    names, own = tuple(motion.q_names), motion
+    if not of_points:
+        motion = in_order(motion, validator)
+    before = validator.check(motion)
+    if before.ok.all():
+        return Repaired(motion=own, before=before, report=before, notes=(_changed(0, len(motion)),))
+    parts = []
+    notes: list[str] = []
+    text = ""
+    for name, recording in motion.recordings():
+        done, own_notes, clip = _recording(recording, validator, facts)
+        parts.append(done)
+        notes += [f"{name}: {note}" if name else note for note in own_notes]
+        if not of_points and len(before.files) == 1 and Path(own.source).suffix.lower() in TABLES:
+            text = in_table(_as_in_file(clip, names), np.asarray(own.q), own.source, own.layout)
+    repaired = parts[0] if len(parts) == 1 else _concatenated(parts, motion)
+    report = validator.check(repaired)
+    left = [str(span) for span in report.spans if span.verdict == "invalid"]
+    if left:
+        notes.append(f"left: {'; '.join(left[:3])}" + (f"; {len(left) - 3} more" if len(left) > 3 else ""))
+    return Repaired(motion=repaired, before=before, report=report, notes=tuple(notes), text=text)
+
+
+def _as_in_file(clip: Clip, names: tuple[str, ...]) -> Clip:
+    """Return configurations in the order of a file's columns."""
+    body: Any = clip.validator.robot or clip.validator.figure
+    own = [name.removesuffix("_joint").lower() for name in body.configuration_names]
+    order = [own.index(name.removesuffix("_joint").lower()) for name in names if names]
+    return clip.with_state(clip.state[:, order]) if names else clip
+
+
+def _recording(motion: Motion, validator: Validator, facts: dict[str, Any]) -> tuple[Motion, list[str], Clip]:
+    """Repair one recording; return it, what was done, and the clip.
+
+    Where remedies do not suffice, the rejected frames are interpolated first.
+    """
+    kind = Clip if validator.robot is None and motion.joints is not None else RobotClip
+    given = kind.of(motion, validator)
+    found = _searched(given, facts)
+    if found[0] and motion.in_time:
+        bad = np.convolve(~validator.check(motion).ok, np.ones(3), mode="same") > 0
+        other = _searched(given.interpolated(bad), facts)
+        found = other if other[0] < found[0] else found
+    _, best, clip, done = found
+    return best, _told(given, clip, done), clip
+
+
+def _searched(start: Clip, facts: dict[str, Any]) -> tuple[int, Motion, Clip, list[str]]:
+    """Repair a clip; return the number of frames that are not valid, the motion, the clip, and the remedies."""
+    from posekit.formats.bvh import Bvh
+    from posekit.formats.options import Options
+
+    options = Options(layout=facts["layout"], unit=facts["unit"] or "", up=facts["up"] or "")
+    motion, validator = start.motion, start.validator
+    clip = total = start
+    document = motion.document
+    done: list[str] = []
+    tried: list[tuple[int, Motion, Clip, list[str]]] = []
+    for _ in range(ROUNDS):
+        for causes in (True, False) if motion.in_time else ():
+            clip, remedies = mended(clip, causes=causes)
+            done = [*done, *remedies]
+            clip = clip.legal()
+        clip = clip if motion.in_time else clip.legal()
+        if isinstance(document, Bvh) and not isinstance(clip, RobotClip) and len(clip) == len(motion):
+            now = in_bvh(clip, document, options)
+            total = clip.with_state(
+                clip.state_of(now),
+                motion=motion,
+                rows=total.rows[clip.rows],
+                filled=total.filled[clip.rows] | clip.filled,
+                mirrored=total.mirrored != clip.mirrored,
+            )
+            document, clip = now.document, type(clip).of(now, validator)  # as the file is read again
+        else:
+            now, total = clip.as_motion(), clip
+        tried.append((int((~validator.check(now).ok).sum()), now, total, done))
+        if not tried[-1][0]:
+            break
+    return min(tried, key=lambda one: one[0])
+
+
+def _told(given: Clip, clip: Clip, done: Sequence[str]) -> list[str]:
+    """Say what was changed and what was invented."""
+    rows = np.where(clip.rows < 0, 0, clip.rows)
+    moved = np.nan_to_num(clip.state - given.state[rows]).reshape(len(clip), -1)
+    inserted, filled = clip.rows < 0, clip.filled
+    changed = (np.abs(moved) > SEEN).any(axis=1) | inserted | (rows != np.arange(len(rows)))
+    notes = [_changed(int(changed.sum()), len(clip))]
+    if inserted.any():
+        notes.append(f"{plural(int(inserted.sum()), 'missing frame')} inserted")
+    if (filled & ~inserted).any():
+        notes.append(f"{plural(int((filled & ~inserted).sum()), 'frame')} interpolated")
+    if clip.mirrored:
+        notes.append("right and left exchanged in all frames")
+    elif "exchanged" in done:
+        notes.append("right and left exchanged back")
+    notes += [SAID[name] for name in dict.fromkeys(done) if name in SAID]
+    if not isinstance(clip, RobotClip) and not clip.mirrored:
+        way = np.nanmax(np.linalg.norm((clip.state - given.state[rows])[:, :14], axis=-1), initial=0.0)
+        notes.append(f"joints moved by up to {100 * way:.3g} cm")
+    return notes
+
+
+#: Sentences about remedies.
+SAID: Final = {
+    "reordered": "frames put in order",
+    "lengthened": "lengths of limbs restored",
+    "stepped back": "steps of the whole body taken out",
+    "smoothed": "trembling smoothed",
+    "shifted": "the body shifted to the ground",
+    "held": "standing feet held",
+}
+
+
+def _changed(count: int, frames: int) -> str:
+    return f"{count} of {plural(frames, 'frame')} changed"
+
+
+def _concatenated(parts: Sequence[Motion], motion: Motion) -> Motion:
+    """Return recordings one after the other."""
+    held = [name for name in PER_FRAME if getattr(parts[0], name) is not None]
+    fields: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in held}
+    fields["clip"] = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    names = [part.clips[0] if part.clips else "" for part in parts]
+    return replace(motion, **fields, clips=names if any(names) else (), document=None)

@@ -1,0 +1,522 @@
+"""`validate`: files, folders, arrays and results, judged clip by clip; folders of the clips that pass."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure, LengthUncertainty, load_figure
+from posekit.errors import InputError, refusal, shown
+from posekit.motion.motion import Motion
+from posekit.settings import EXACT, Tolerance, ValidateSettings, number
+from posekit.skeleton import JOINTS, POINTS
+from posekit.validators.judge import Validator, validate_motion
+from posekit.validators.report import GROUND_NOTE, ClipDecision, Report, clip_rows, joined, plural
+
+if TYPE_CHECKING:
+    from posekit.recovery import Recovery
+
+#: Endings of files in folders that hold no motion.
+SKIPPED: Final = (
+    ".md",
+    ".py",
+    ".png",
+    ".jpg",
+    ".jpeg",
+    ".gif",
+    ".mp4",
+    ".avi",
+    ".html",
+    ".pdf",
+    ".log",
+    ".lock",
+)
+
+#: Name of the table of clips in a folder of kept clips.
+CLIP_TABLE: Final = "clips.csv"
+
+#: Files without motion that a report names.
+MOST_NAMED: Final = 3
+
+#: Difference of two times that is rounding, seconds.
+ROUNDING_SECONDS: Final = 1e-6
+
+
+def validate(
+    given: Any,
+    settings: ValidateSettings | None = None,
+    *,
+    urdf: Any = "",
+    layout: str = "",
+    unit: str | None = None,
+    up: str | None = None,
+    rate: float | None = None,
+    person: int | None = None,
+    keep: str | Path | None = None,
+    keep_spans: float | None = None,
+    progress: Callable[[str], None] | None = None,
+    **changes: Any,
+) -> Report:
+    """Judge whatever holds postures: files, folders and patterns, arrays, motions, results.
+
+    Parameters
+    ----------
+    given : path, sequence of path, array, Motion or Recovery
+        Files, folders of them and patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
+        metres, NaN where unknown; configurations (T, nq) of `urdf`; or what `posekit.open` returns. Frames in time are
+        judged by the checks over time too; an array is motion if its `rate` is given.
+    settings : ValidateSettings, optional
+        What decides the verdicts; of a result its own.
+    urdf : str, path, Figure or Robot
+        The body that judges, as `posekit.Validator` takes it. By default the robot that a file names, else the figure.
+    layout, unit, up, rate, person
+        Facts about files and arrays that they do not state: see `posekit.open`. An array (T, J, 3) with a `layout` has
+        its points in the layout's order.
+    keep : path, optional
+        New folder for the clips that pass: see `keep_clips`.
+    keep_spans : float, optional
+        Least duration of the longest valid span, seconds, that is kept of other clips.
+    progress : callable, optional
+        Called with the name of each file when it is judged.
+    **changes
+        Single fields of the settings.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        If a single file cannot be read, none of several can be judged, or what is asked is impossible.
+
+    Examples
+    --------
+    >>> import numpy as np, posekit
+    >>> standing = np.repeat(posekit.load_figure().neutral_points[None, :14], 20, axis=0)
+    >>> posekit.validate(standing, rate=30, up="+z").decision
+    'keep 1 of 1 clip'
+    """
+    judge = _Judge(settings, urdf, changes)
+    if rate is not None and not 0 < rate < np.inf:
+        raise refusal("", "rate", shown(rate), "frames a second, above 0", "correct it")
+    if not _is_path(given) and not _paths(given) and _has_layout(given, layout):
+        from posekit.formats.joint_arrays import read
+        from posekit.formats.options import Options
+
+        facts_given = Options(layout=layout, unit=unit or "", up=up or "", rate=rate)
+        given = read({"": np.asarray(given, dtype=np.float64)}, "array", facts_given)
+    if not (_is_path(given) or _paths(given)):
+        if isinstance(given, Motion):
+            given = _stated(given, up, rate)
+        elif unit is not None and np.ndim(given) == 3:
+            given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
+        return judge.report(given, up=up, rate=rate)
+    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
+    report = _files(list(files_of(given)), judge, facts, progress)
+    if keep is not None:
+        report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=keep_spans)))
+    return report
+
+
+def _is_path(given: Any) -> bool:
+    return isinstance(given, str | os.PathLike)
+
+
+def _has_layout(given: Any, layout: str) -> bool:
+    """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's."""
+    shape = np.shape(given) if isinstance(given, list | tuple | np.ndarray) else ()
+    known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
+    return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
+
+
+def _paths(given: Any) -> bool:
+    """Tell whether several paths are given."""
+    return isinstance(given, list | tuple) and bool(given) and all(map(_is_path, given))
+
+
+def files_of(given: Any) -> Iterator[Path]:
+    """Yield the files that paths, folders and patterns stand for.
+
+    Raises
+    ------
+    InputError
+        If a path does not exist or a folder or pattern has no file.
+    """
+    for one in [given] if _is_path(given) else given:
+        path = Path(one)
+        if path.is_file():
+            yield path
+            continue
+        if path.is_dir():
+            found = list(_below(path))
+        else:
+            found = (
+                sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
+                if "*" in str(path)
+                else []
+            )
+        if not found:
+            what = "a folder without files of motion" if path.is_dir() else "no file"
+            raise refusal(one, "", what, "a file, a folder of files, or a pattern", "check the path")
+        yield from found
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Yield the files below a folder; a detector's folder, with one file a picture, is one input."""
+    from posekit.formats.keypoints import looks_like
+
+    inside = [one for one in sorted(folder.iterdir()) if not _is_hidden(one, folder)]
+    if inside and all(one.is_file() and one.suffix == ".json" for one in inside) and looks_like(folder):
+        yield folder
+        return
+    for one in inside:
+        if one.is_dir():
+            yield from _below(one)
+        elif one.is_file():
+            yield one
+
+
+def _is_hidden(file: Path, folder: Path) -> bool:
+    parts = file.relative_to(folder).parts
+    return any(part.startswith((".", "__")) for part in parts) or file.suffix.lower() in SKIPPED
+
+
+def _stated(motion: Motion, up: str | None, rate: float | None) -> Motion:
+    """Return a motion with facts that are stated beside it."""
+    changes: dict[str, Any] = {} if not up else {"up": up}
+    if rate:
+        changes["time"] = np.asarray(motion.frame) / rate
+    return replace(motion, **changes) if changes else motion
+
+
+class _Judge:
+    """The body and the settings that judge, loaded once for all files."""
+
+    def __init__(self, settings: ValidateSettings | None, urdf: Any, changes: Mapping[str, Any]) -> None:
+        self.settings, self.urdf, self.changes = settings, urdf, dict(changes)
+        self._made: dict[str, Validator] = {}
+        ValidateSettings().changed(**self.changes)
+
+    def validator(self, robot: str) -> Validator:
+        """Return the validator of the body that was given, else of the robot that a file names."""
+        if self.urdf and not _is_path(self.urdf):
+            return Validator(self.urdf, self.settings, **self.changes)
+        name = str(self.urdf or robot or "figure")
+        if name not in self._made:
+            self._made[name] = Validator(name, self.settings, **self.changes)
+        return self._made[name]
+
+    def report(self, given: Any, *, up: str | None = None, rate: float | None = None) -> Report:
+        """Judge an object.
+
+        Raises
+        ------
+        InputError
+            If it holds no postures.
+        """
+        if hasattr(given, "survivors"):
+            return self._of_recovery(given)
+        if not isinstance(given, Motion):
+            given = self._array(given, up, rate)
+        validator = self.validator(given.robot)
+        if given.q is not None and given.joints is None:
+            given = in_order(given, validator)
+        return validator.check(given)
+
+    def _array(self, given: Any, up: str | None, rate: float | None) -> Motion:
+        motion = self.validator("").motion(given)
+        if rate is None and up is None:
+            return motion
+        count = len(motion)
+        frame = np.arange(count) if rate is not None else np.asarray(motion.frame)
+        time = frame / rate if rate is not None else np.full(count, np.nan)
+        return replace(motion, frame=frame, time=time, up=up or "")
+
+    def _of_recovery(self, recovery: Recovery) -> Report:
+        """Judge every survivor of a result by its own settings: lengths, ranges, tolerances."""
+        fields = {name: value for name, value in recovery.settings.items() if name in SHARED}
+        settings = self.settings or ValidateSettings(**fields)
+        side = recovery.settings.get("shoulders", "")
+        figure = load_figure()
+        if recovery.lengths:
+            figure = figure.scaled(recovery.lengths, behind={"behind": True, "front": False}.get(side))
+        exact, loose, margin = _allowed(recovery.tolerances, settings.contact_margin)
+        motion, noisy = recovery.motion("all"), np.asarray(recovery.survivors.chi2) > 0
+        reports = []
+        for rows, tolerance, contact in ((~noisy, exact, settings.contact_margin), (noisy, loose, margin)):
+            if rows.any():
+                asked = settings.changed(**{"contact_margin": contact, **self.changes})
+                part = replace(motion.take(rows), q=None, q_names=(), robot="")
+                body = figure if tolerance is exact else _sided(figure, recovery.tolerances)
+                reports.append(validate_motion(part, asked, figure=body, tolerance=tolerance))
+        if not reports:
+            raise refusal(recovery.source or "result", "", "no posture", "at least one", "recover again")
+        return reports[0] if len(reports) == 1 else joined(reports)
+
+
+SHARED: Final = ("checks", "ranges", "rules", "walkers", "contact_margin")
+
+
+def _allowed(tolerances: Mapping[str, Any], margin: float) -> tuple[Tolerance, Tolerance, float]:
+    """Return the tolerance of exact frames, and tolerance and contact margin of noisy ones, as a result has them."""
+    exact, noisy = tolerances.get("tolerated", tolerances.get("exact")), tolerances.get("noisy", {})
+    loose = noisy.get("certified", exact)
+    made = [Tolerance(**one) if one else EXACT for one in (exact, loose)]
+    return made[0], made[1], float(noisy.get("contact_margin", margin))
+
+
+def _sided(figure: Figure, tolerances: Mapping[str, Any]) -> Figure:
+    """Return the figure as far as uncertain lengths determine the side of its shoulders."""
+    noisy = tolerances.get("noisy", {})
+    if "by_segment" not in noisy:
+        return figure
+    return figure.with_side_within(LengthUncertainty(common=noisy["size"], own=noisy["by_segment"]))
+
+
+def in_order(motion: Motion, validator: Validator) -> Motion:
+    """Return a motion of configurations in the order of the robot that judges."""
+    names = validator.configuration_names
+    if not motion.q_names or tuple(motion.q_names) == names:
+        return motion
+    if validator.robot is None:
+        got = f"configurations of {motion.robot or 'a robot'}"
+        raise refusal(motion.source, "q", got, "those of the figure", "name the robot with --urdf")
+    q, notes = validator.robot.q_from_columns(motion.q_names, motion.q)  # type: ignore[arg-type]
+    return replace(motion, q=q, q_names=names, notes=(*motion.notes, *notes))
+
+
+def _files(
+    paths: Sequence[Path], judge: _Judge, facts: Mapping[str, Any], progress: Callable[[str], None] | None
+) -> Report:
+    """Judge files one after the other; of several, those that cannot be read are listed."""
+    import posekit
+
+    reports: list[Report] = []
+    refused: list[str] = []
+    skipped: list[str] = []
+    for path in paths:
+        try:
+            held: Any = posekit.open(
+                path,
+                **{name: value for name, value in facts.items() if value is not None},
+                urdf=_named(judge.urdf),
+            )
+            if _holds_postures(held):
+                _refuse_without_joints(held, path)
+                reports.append(_called(judge.report(held), str(path)))
+            elif len(paths) == 1:
+                remedy = f"recover postures first: posekit recover {path} -o RESULT"
+                raise refusal(
+                    path, "", OTHERS.get(type(held).__name__, "no motion"), "postures or motion", remedy
+                )
+            else:
+                skipped.append(path.name)
+        except InputError as error:
+            if len(paths) == 1:
+                raise
+            (skipped if _is_view(path) else refused).append(path.name if _is_view(path) else str(error))
+        if progress is not None:
+            progress(str(path))
+    if not reports:
+        raise InputError(
+            f"none of {plural(len(paths), 'file')} can be judged; the first: {[*refused, *skipped][0]}"
+        )
+    if len(reports) > 1:
+        reports = [replace(one, notes=_of_file(one)) for one in reports]
+    report = joined(reports, refused=refused) if len(reports) > 1 or refused else reports[0]
+    if skipped:
+        more = ", …" if len(skipped) > MOST_NAMED else ""
+        said = (
+            f"{plural(len(skipped), 'file')} without motion left out: {', '.join(skipped[:MOST_NAMED])}{more}"
+        )
+        report = replace(report, notes=(*report.notes, said))
+    return report
+
+
+def _of_file(report: Report) -> tuple[str, ...]:
+    """Return the notes of one file's report with the name of the file; notes on the ground are counted together."""
+    name = Path(report.files[0]).name if report.files else ""
+    return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
+
+
+#: Other objects than motion that a file can hold, in words.
+OTHERS: Final = {
+    "Detections": "key points",
+    "View": "a view",
+    "dict": "cameras",
+    "Report": "a report",
+    "Robot": "a robot",
+}
+
+
+def _is_view(path: Path) -> bool:
+    """Tell whether a file is a view of another object than a person, which holds no motion."""
+    return path.suffix.lower() == ".json" and b"posekit.view/1" in path.read_bytes()[:200]
+
+
+def _refuse_without_joints(held: Any, path: Path) -> None:
+    """Refuse motion whose points are no joints of a body."""
+    if isinstance(held, Motion) and held.q is None and not np.isfinite(held.figure_joints).any():
+        got, remedy = (
+            "no joint of a body among its points",
+            "say which point is which joint with --layout FILE.toml",
+        )
+        raise refusal(path, "", got, "named joints or markers", remedy)
+
+
+def _named(urdf: Any) -> str:
+    """Return the name of a robot for readers of tables; readers need none for the figure."""
+    name = str(getattr(urdf, "name", urdf) or "")
+    return "" if name in ("figure", "stick_figure") else name
+
+
+def _holds_postures(held: Any) -> bool:
+    return isinstance(held, Motion) or hasattr(held, "survivors")
+
+
+def _called(report: Report, file: str) -> Report:
+    return replace(report, files=(file,) * len(report.files))
+
+
+def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None) -> str:
+    """Write the clips that pass into a new folder, whole or not at all, with a table of all clips.
+
+    A file that passes whole is copied unchanged. Of others the frames that pass are written in the file's own format.
+
+    Parameters
+    ----------
+    report : Report
+        Of files.
+    folder : path
+        New or empty.
+    spans : float, optional
+        Least duration of the longest valid span, seconds, that is kept of clips that do not pass.
+
+    Returns
+    -------
+    str
+        How many clips were kept, in a sentence.
+
+    Raises
+    ------
+    InputError
+        If the folder holds something, or a file cannot be read or written.
+    """
+    folder = Path(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise refusal(folder, "", "something that exists", "a new or empty folder", "name another")
+    part = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    try:
+        rows = list(_kept(report, part, spans))
+        _write_table(part / CLIP_TABLE, rows)
+        if folder.exists():
+            folder.rmdir()
+        part.rename(folder)
+    except OSError as error:
+        raise refusal(folder, "", str(error), "a folder that can be written", "check its place") from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    kept = [row for row in rows if row["written"]]
+    cut = sum(row["decision"] != "keep" for row in kept)
+    tail = f", {cut} of them cut to their longest valid span" if cut else ""
+    return f"{len(kept)} of {plural(len(rows), 'clip')} kept in {folder}{tail}"
+
+
+def _kept(report: Report, folder: Path, spans: float | None) -> Iterator[dict[str, Any]]:
+    """Write file by file, and yield a row for each clip."""
+    rows, clips = clip_rows(report), report.clips
+    by_file: dict[str, list[int]] = {}
+    for k, clip in enumerate(clips):
+        by_file.setdefault(clip.file, []).append(k)
+    names = names_below(by_file)
+    for file, numbers in by_file.items():
+        chosen = {k: _frames(report, clips[k], k, spans) for k in numbers}
+        wanted = np.concatenate(list(chosen.values()))
+        name = names[file]
+        if len(wanted):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            whole = len(wanted) == sum(clips[k].frames for k in numbers)
+            if whole and Path(file).is_file():
+                shutil.copyfile(file, folder / name)
+            else:
+                first = min(int(np.flatnonzero(report.clip == k)[0]) for k in numbers)
+                _cut(file, folder / name, np.sort(wanted) - first)
+        for k in numbers:
+            part = chosen[k]
+            yield {
+                **rows[k],
+                "written": name.as_posix() if len(part) else "",
+                "first_kept": int(report.frame[part[0]]) if len(part) else -1,
+                "last_kept": int(report.frame[part[-1]]) if len(part) else -1,
+            }
+
+
+def _frames(report: Report, clip: ClipDecision, number: int, spans: float | None) -> NDArray[np.intp]:
+    """Return the rows of the report that are kept of a clip."""
+    rows = np.flatnonzero(report.clip == number)
+    if clip.decision == "keep":
+        return rows
+    if spans is None or clip.good is None:
+        return rows[:0]
+    inside = (report.frame[rows] >= clip.good[0]) & (report.frame[rows] <= clip.good[1])
+    part = rows[inside]
+    seconds = float(report.time[part[-1]] - report.time[part[0]])
+    return part[:0] if seconds < spans - ROUNDING_SECONDS else part
+
+
+def _cut(source: str, target: Path, rows: NDArray[np.intp]) -> None:
+    """Write some frames of a file, in its own format."""
+    import posekit
+
+    motion = posekit.open(source)
+    kept = motion.take(rows)
+    time = np.asarray(kept.time)
+    posekit.save(replace(kept, time=time - time[0], frame=None), target)
+
+
+def names_below(files: Iterable[str]) -> dict[str, Path]:
+    """Return the name of each file below the folder that all of them are in."""
+    absolute = {file: Path(os.path.normpath(Path(file).absolute())) for file in files}
+    common = os.path.commonpath([path.parent for path in absolute.values()]) if absolute else ""
+    return {file: path.relative_to(common) for file, path in absolute.items()}
+
+
+def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    path.write_text(text.getvalue(), encoding="utf-8")
+
+
+def save_clips(report: Report, path: str | Path) -> None:
+    """Write the table of clips as ``.csv`` or ``.parquet``.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise.
+    """
+    rows, name = clip_rows(report), str(path).lower()
+    if name.endswith(".csv"):
+        _write_table(Path(path), rows)
+    elif name.endswith(".parquet"):
+        from posekit.formats.files import write_bytes
+        from posekit.formats.parquet import packed_table
+
+        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        write_bytes(path, packed_table(columns, {}))
+    else:
+        raise refusal(path, "", shown(Path(path).suffix), ".csv or .parquet", "rename it")

@@ -1,0 +1,318 @@
+"""`Body`: one recording of one body, as checks see it; what several checks need is found once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from posekit.geometry import Array, Record
+from posekit.motion.motion import Motion
+from posekit.settings import EXACT, MEASURED, Tolerance, ValidateSettings
+from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINT, JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
+from posekit.validators.measured import (
+    ALLOWED_DEVIATIONS,
+    MADE_UP_METRES,
+    Person,
+    Shape,
+    girdle_gives,
+    person_of,
+    segment_lengths,
+    shape_of,
+    spine_gives,
+)
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+    from posekit.robots import Robot
+
+Found = TypeVar("Found")
+
+#: Length by which the direction of the head is measured, neck to nose, metres.
+NECK_TO_HEAD_METRES = 0.2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Body(Record):
+    """T frames of one body.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres, in tree order; NaN where unknown.
+    head : array (T, 5, 3)
+        Nose, eyes and ears.
+    feet : array (T, 4, 3)
+        Right toe, left toe, right heel, left heel.
+    time : array (T,)
+        Seconds, in the order of the file; NaN where not known.
+    q : array (T, nq), optional
+        Configurations that are judged, in the robot's order.
+    robot : Robot, optional
+        The robot of `q`; None where positions are judged.
+    base : Figure, optional
+        The figure that positions are compared with.
+    up : array (3,), optional
+        Unit vector against gravity.
+    settings : ValidateSettings
+        What decides the verdicts.
+    tolerance : Tolerance, optional
+        Tolerance of postures of the figure `base` itself. None for people that were measured: `base` then takes their
+        lengths, and tolerances their noise.
+    motion : bool
+        Whether the frames follow each other in time.
+    residual : array (T, 14), optional
+        Distance of the given joints from those of `q`, where that was fitted to positions, metres.
+    """
+
+    joints: Array
+    head: Array = field(default_factory=lambda: np.empty(0))
+    feet: Array = field(default_factory=lambda: np.empty(0))
+    time: Array = field(default_factory=lambda: np.empty(0))
+    q: Array | None = None
+    robot: Robot | None = None
+    base: Figure | None = None
+    up: Array | None = None
+    settings: ValidateSettings = field(default_factory=ValidateSettings)
+    tolerance: Tolerance | None = None
+    motion: bool = True
+    residual: Array | None = None
+
+    def __post_init__(self) -> None:
+        count = len(self.joints)
+        for name, shape in (
+            ("head", (count, len(HEAD_POINTS), 3)),
+            ("feet", (count, len(FEET_POINTS), 3)),
+            ("time", (count,)),
+        ):
+            if getattr(self, name).shape != shape:
+                object.__setattr__(self, name, np.full(shape, np.nan))
+
+    @classmethod
+    def of(
+        cls,
+        motion: Motion,
+        settings: ValidateSettings,
+        *,
+        base: Figure | None = None,
+        robot: Robot | None = None,
+        tolerance: Tolerance | None = None,
+        residual: Array | None = None,
+        placed: bool = True,
+    ) -> Body:
+        """Return one recording as checks see it.
+
+        Its points are those of `robot` where it has configurations only, and unless they are not wanted (`placed`).
+        """
+        named = motion.joints is not None and tuple(motion.joint_names[: len(JOINTS)]) == JOINTS
+        joints = motion.joints[:, : len(JOINTS)] if named else motion.figure_joints  # type: ignore[index]
+        feet = motion.feet
+        if robot is not None and motion.joints is None and motion.q is not None:
+            joints = np.full((len(motion), len(JOINTS), 3), np.nan)
+            known = np.isfinite(motion.q).all(axis=1)
+            if placed:
+                joints[known] = robot.points(motion.q[known])
+        return cls(
+            joints=joints,
+            head=motion.head,
+            feet=feet,
+            time=np.asarray(motion.time),
+            q=motion.q if robot is not None else None,
+            robot=robot,
+            base=base,
+            # Where each frame has its own origin there is no ground, and nothing goes anywhere.
+            up=motion.up_vector if motion.in_world else None,
+            settings=settings,
+            tolerance=tolerance,
+            motion=motion.in_time,
+            residual=residual,
+        )
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.joints)
+
+    def knows(self, name: str) -> bool:
+        """Return whether something that a check may read is known: one of `posekit.validators.check.READABLE`."""
+        if name == "time":
+            return self.motion and self.dt > 0
+        if name == "ground":
+            return self.up is not None and self.ground is not None
+        found = getattr(self, name)
+        return found is not None and (name in ("robot", "up", "q") or bool(np.isfinite(found).any()))
+
+    @cached_property
+    def rate(self) -> float:
+        """Frames per second, from the median step of time; NaN where not known."""
+        step = np.diff(self.time)
+        step = step[step > 0]
+        return float(np.round(1.0 / np.median(step), 6)) if len(step) else math.nan
+
+    @property
+    def dt(self) -> float:
+        """Seconds from a frame to the next; NaN where not known."""
+        return 1.0 / self.rate
+
+    @cached_property
+    def height(self) -> Array:
+        """Height of each joint along `up` (T, 14), metres; NaN where up is not known."""
+        return (
+            np.full(self.joints.shape[:2], np.nan) if self.up is None else np.asarray(self.joints @ self.up)
+        )
+
+    @cached_property
+    def ground(self) -> float | None:
+        """Height of the ground along `up`, metres: as stated, else estimated from the frames; None where unknown."""
+        if self.settings.ground is not None:
+            return self.settings.ground
+        if not self.motion or self.up is None or not np.isfinite(self.joints).any():
+            return None
+        from posekit.validators.motion.ground import ground_of
+
+        low = ground_of(self).low
+        return low if math.isfinite(low) else None
+
+    @cached_property
+    def person(self) -> Person:
+        """Lengths, side and measuring noise of the person in the frames."""
+        return person_of(self.joints, self.segment_lengths)
+
+    @cached_property
+    def segment_lengths(self) -> Array:
+        """Length of each of `posekit.skeleton.SEGMENTS` in each frame (17, T), metres."""
+        return segment_lengths(self.joints)
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of measured coordinates that checks over time allow for, metres."""
+        if self.settings.noise is not None or self.settings.strict or self.q is not None:
+            return self.settings.noise or 0.0
+        return float(np.nan_to_num(self.person.noise))
+
+    @cached_property
+    def base_figure(self) -> Figure:
+        """`base`, or the built-in figure."""
+        if self.base is not None:
+            return self.base
+        from posekit.body import load_figure
+
+        return load_figure()
+
+    @cached_property
+    def figure(self) -> Figure | Shape:
+        """The figure that positions are compared with: the base, with the person's lengths if people were measured."""
+        base = self.base_figure
+        if self.tolerance is not None or self.settings.strict or not self.person.lengths:
+            return base
+        return _scaled(base, self.person)
+
+    @property
+    def lengths(self) -> Mapping[str, float]:
+        """Lengths of the figure's segments, metres, by segment name."""
+        return self.figure.lengths
+
+    @cached_property
+    def points(self) -> Array:
+        """Joints and head points (T, 19, 3)."""
+        return np.concatenate([self.joints, self.head], axis=1)
+
+    def noise_allowed(self, segment: str = "") -> float:
+        """Return by how much noise may change the distance between the ends of a segment, or of any two, metres."""
+        noise = self.settings.noise
+        if noise is None:
+            measured = (
+                self.tolerance is None and not self.settings.strict and math.isfinite(self.person.noise)
+            )
+            noise = self.person.noise_of(segment) if measured else 0.0
+        return ALLOWED_DEVIATIONS * math.sqrt(2) * noise
+
+    @property
+    def contact_margin(self) -> float:
+        """Distance that capsules of the figure must keep, metres; negative allows overlap."""
+        made_up = MADE_UP_METRES if self.tolerance is None and not self.settings.strict else 0.0
+        return self.settings.contact_margin - made_up - self.noise_allowed()
+
+    def rigid_tolerance(self, segment: tuple[int, int]) -> float:
+        """Return by how much the length of a segment may differ from the figure's, metres."""
+        given = self.settings.rigid_tolerance
+        if self.tolerance is not None:
+            hips = segment == (JOINT["right_hip"], JOINT["left_hip"]) and given is None
+            return self.tolerance.rigid * (self.tolerance.hips if hips else 1.0)
+        if given is not None or self.settings.strict:
+            return MEASURED.rigid if given is None else given
+        name = segment_name(segment)
+        across, raised = girdle_gives(self.lengths)
+        bone = math.hypot(MEASURED.rigid, self.noise_allowed("" if segment in RIGID_SEGMENTS else name))
+        if "pelvis" in name and "shoulder" in name:
+            return math.hypot(bone, spine_gives(self.lengths), raised)
+        if name == "neck-pelvis":
+            return math.hypot(bone, spine_gives(self.lengths))
+        return math.hypot(bone, across) if "shoulder" in name and "elbow" not in name else bone
+
+    def angle_tolerance(self, *segments: tuple[int, int]) -> float:
+        """Return by how much directions may be off, degrees: the widest of those of some segments."""
+        given = self.settings.angle_tolerance
+        if self.tolerance is not None:
+            return self.tolerance.angle
+        if given is not None or self.settings.strict:
+            return EXACT.angle if given is None else given
+        reach = [(segment_name(one), self.lengths[segment_name(one)]) for one in segments if one in SEGMENTS]
+        reach = reach or [("", NECK_TO_HEAD_METRES)]
+        return max(
+            math.hypot(MEASURED.angle, math.degrees(self.noise_allowed(name) / length))
+            for name, length in reach
+        )
+
+    def allowed(self) -> dict[str, Any]:
+        """Return the tolerances, as reports state them."""
+        if self.robot is not None:
+            return {
+                "judged": "configurations",
+                "bodies": self.robot.bodies,
+                "contact_margin": f"{100 * self.settings.contact_margin:.3g} cm",
+            }
+        angles = [self.angle_tolerance(one) for one in SEGMENTS if one not in RIGID_SEGMENTS]
+        bones = [100 * self.rigid_tolerance(one) for one in SEGMENTS]
+        measured = self.tolerance is None and not self.settings.strict
+        return {
+            "judged": "joint positions",
+            "lengths": "measured" if measured else "figure",
+            "noise": self.noise,
+            "angle_tolerance": f"{min(angles):.2g} to {max(angles):.2g} deg",
+            "rigid_tolerance": f"{min(bones):.2g} to {max(bones):.2g} cm",
+            "contact_margin": f"{100 * self.contact_margin:.3g} cm",
+        }
+
+
+#: Figures of the last people, by their lengths: clips of one skeleton share one.
+_SCALED: dict[tuple[Any, ...], Figure | Shape] = {}
+
+MOST_FIGURES = 8
+
+
+def _scaled(base: Figure, person: Person) -> Figure | Shape:
+    key = base.hash, person.behind, tuple(person.lengths.items())
+    if key not in _SCALED:
+        if len(_SCALED) >= MOST_FIGURES:
+            _SCALED.pop(next(iter(_SCALED)))
+        _SCALED[key] = shape_of(base, person)
+    return _SCALED[key]
+
+
+def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:
+    """Let several checks share what is found in a body: it is computed once and kept as long as the body is."""
+    name = f"_once_{find.__module__}_{find.__name__}"
+
+    @wraps(find)
+    def found(body: Body) -> Found:
+        kept = body.__dict__
+        if name not in kept:
+            kept[name] = find(body)
+        value: Found = kept[name]
+        return value
+
+    return found

@@ -1,0 +1,367 @@
+"""`Check`: one kind of judgement about a body, and `Judgement`, what it found.
+
+A check is any object with the four members of `Check`: postures, configurations and motion over time are judged alike.
+
+    class FeetAboveGround:
+        '''A foot is below the ground.'''
+
+        name = "feet-above-ground"
+        unit = "m"
+        reads = ("joints", "ground")
+
+        def judge(self, body):
+            height = body.joints[:, [12, 13]] @ body.up - body.ground
+            return Judgement(("right_ankle", "left_ankle"), height, lower=0.0, tolerance=0.01)
+
+Its docstring is the message of its findings. It may also have `points`, the names of the few points that it reads:
+the interpretation tree asks it as soon as these are placed. It may have `residuals(joints)`, numbers (N, K) of postures
+(N, 14, 3) in standard deviations, zero where nothing pulls: noisy postures are drawn toward its bounds.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import PosekitError, cut, nearest, refusal, shown
+from posekit.geometry import Array, Record
+
+if TYPE_CHECKING:
+    from posekit.validators.body import Body
+
+#: Entry-point group in which other packages register their checks.
+ENTRY_POINTS: Final = "posekit.checks"
+
+#: Parts of a body that a check may declare to read; it is not asked about a body that lacks one of them.
+READABLE: Final = ("joints", "head", "feet", "q", "robot", "time", "up", "ground")
+
+#: Form of a check's name.
+CHECK_NAME: Final = re.compile(r"[a-z][a-z0-9-]*")
+
+
+class NotAskedError(PosekitError):
+    """A check does not apply to a body; the message is the reason. `Check.judge` may raise it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Judgement(Record):
+    """What a check found in T frames at K places.
+
+    Parameters
+    ----------
+    places : sequence of K str
+        What was judged: an angle, a segment, a pair of bodies.
+    value : array (T, K)
+        The judged quantity in the check's unit; NaN where it is undecided.
+    lower, upper : array broadcastable to (T, K)
+        Bounds.
+    tolerance : array broadcastable to (T, K)
+        Distance beyond a bound that is no violation.
+    scale : array broadcastable to (T, K), optional
+        What one whole share of margin is, in the check's unit. By default half the range or, where it has one end, the
+        size of that bound.
+
+    Examples
+    --------
+    >>> found = Judgement(places=("knee",), value=[[10.0], [-20.0]], lower=-5.0, upper=150.0)
+    >>> found.violated.ravel()
+    array([False,  True])
+    """
+
+    places: Sequence[str]
+    value: Array
+    lower: Array | float = -np.inf
+    upper: Array | float = np.inf
+    tolerance: Array | float = 0.0
+    scale: Array | float | None = None
+
+    def __post_init__(self) -> None:
+        value = np.asarray(self.value, dtype=np.float64)
+        value = value[:, None] if value.ndim == 1 else value
+        if value.ndim != 2 or value.shape[1] != len(self.places):
+            raise refusal(
+                "judge",
+                "value",
+                f"shape {value.shape}",
+                f"a row a frame and {len(self.places)} columns",
+                "return one column a place",
+            )
+        object.__setattr__(self, "places", tuple(self.places))
+        object.__setattr__(self, "value", value)
+
+    @property
+    def low(self) -> Array:
+        """Lower bounds (T, K) with the tolerance."""
+        return np.broadcast_to(np.asarray(self.lower, dtype=np.float64) - self.tolerance, self.value.shape)
+
+    @property
+    def high(self) -> Array:
+        """Upper bounds (T, K) with the tolerance."""
+        return np.broadcast_to(np.asarray(self.upper, dtype=np.float64) + self.tolerance, self.value.shape)
+
+    @cached_property
+    def margin(self) -> Array:
+        """Distance inside the nearer bound, tolerance included (T, K): negative outside, NaN undecided."""
+        lower = np.asarray(self.lower, dtype=np.float64) - self.tolerance
+        upper = np.asarray(self.upper, dtype=np.float64) + self.tolerance
+        with np.errstate(invalid="ignore"):
+            inside = (
+                self.value - lower
+                if np.isfinite(lower).any()
+                else np.where(np.isnan(self.value), np.nan, np.inf)
+            )
+            return np.minimum(inside, upper - self.value) if np.isfinite(upper).any() else inside
+
+    @property
+    def violated(self) -> NDArray[np.bool_]:
+        """Whether the value is outside its bounds (T, K); False where it is undecided."""
+        return np.asarray(self.margin < 0)
+
+    @property
+    def share(self) -> Array:
+        """Margins as shares of the range (T, K), comparable between checks: 1 in its middle, negative outside."""
+        if self.scale is not None:
+            return np.asarray(self.margin / self.scale)
+        lower, upper = np.broadcast_arrays(
+            *(np.asarray(one, dtype=np.float64) for one in (self.lower, self.upper))
+        )
+        with np.errstate(invalid="ignore"):
+            half = (upper - lower) / 2
+        one_end = np.where(
+            np.isfinite(lower), np.abs(lower), np.where(np.isfinite(upper), np.abs(upper), 1.0)
+        )
+        scale = np.where(np.isfinite(half) & (half > 0), half, np.where(one_end > 0, one_end, 1.0))
+        return np.asarray(self.margin / scale)
+
+
+@runtime_checkable
+class Check(Protocol):
+    """One kind of judgement; see the module's example. Its docstring is the message of its findings."""
+
+    @property
+    def name(self) -> str:
+        """Name in reports and in ``--checks``: ``joint-range``."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values: ``m``, ``deg``, ``m/s``, ``frames``, ``1``."""
+        ...
+
+    @property
+    def reads(self) -> Sequence[str]:
+        """What it needs of a body: some of `READABLE`."""
+        ...
+
+    def judge(self, body: Body) -> Judgement:
+        """Judge all frames of one body; raise `NotAskedError` where the check does not apply."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionCheck:
+    """A check made of a function by the decorator `check`.
+
+    Parameters
+    ----------
+    name, unit, reads, points
+        As `Check` has them.
+    function : callable
+        Judges a body; its keyword-only parameters are thresholds with defaults.
+    over_time : bool
+        Whether it judges motion: frames without a value are then not undecided.
+    thresholds : mapping
+        Thresholds other than the defaults.
+    """
+
+    name: str
+    unit: str
+    reads: Sequence[str]
+    function: Callable[..., Judgement]
+    points: Sequence[str] = ()
+    over_time: bool = False
+    thresholds: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "__doc__", self.function.__doc__)
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """The thresholds by name with their defaults."""
+        known = inspect.signature(self.function).parameters.values()
+        return {one.name: one.default for one in known if one.kind is one.KEYWORD_ONLY}
+
+    def with_thresholds(self, **thresholds: Any) -> FunctionCheck:
+        """Return the check with other thresholds."""
+        return replace(self, thresholds={**self.thresholds, **thresholds})
+
+    def judge(self, body: Body) -> Judgement:
+        """Judge all frames of a body."""
+        return self.function(body, **self.thresholds)
+
+
+def check(
+    name: str,
+    *,
+    unit: str,
+    reads: Sequence[str] = ("joints",),
+    points: Sequence[str] = (),
+    over_time: bool = False,
+) -> Callable[[Callable[..., Judgement]], FunctionCheck]:
+    """Make a check of a function that judges a body.
+
+    Parameters
+    ----------
+    name, unit, reads
+        As `Check` has them.
+    points : sequence of str
+        Names of the few points that it reads.
+    over_time : bool
+        Whether it judges motion.
+
+    Examples
+    --------
+    >>> import numpy as np, posekit
+    >>> from posekit.validators import Judgement
+    >>> @posekit.check("wrists-apart", unit="m", points=("right_wrist", "left_wrist"))
+    ... def wrists_apart(body):
+    ...     "The wrists are nearer than 5 cm."
+    ...     return Judgement(["wrists"], np.linalg.norm(body.joints[:, 8] - body.joints[:, 9], axis=1), lower=0.05)
+    >>> wrists_apart.name
+    'wrists-apart'
+    """
+    for one in reads:
+        if one not in READABLE:
+            expected = f"some of {', '.join(READABLE)}"
+            raise refusal(f"check {name}", "reads", shown(one), expected, nearest(one, READABLE))
+    return lambda judge: FunctionCheck(name, unit, tuple(reads), judge, tuple(points), over_time)
+
+
+def message_of(one: Check) -> str:
+    """Return the first sentence of a check's docstring."""
+    return (inspect.getdoc(one) or one.name).split("\n\n")[0].replace("\n", " ").rstrip(".")
+
+
+def lacking(one: Check, body: Body) -> str:
+    """Return why a check cannot be asked about a body; empty if it can."""
+    reasons: Mapping[str, str] = {
+        "joints": "no joint positions are known",
+        "head": "no head points are known",
+        "feet": "no toes or heels are known",
+        "q": "there are no configurations of a robot (--urdf)",
+        "robot": "there are no configurations of a robot (--urdf)",
+        "time": "the frame rate is not known (--rate)",
+        "up": "the direction up is not known (--up)",
+        "ground": "the height of the ground is not known (--up, --ground)",
+    }
+    return next((reasons[name] for name in one.reads if not body.knows(name)), "")
+
+
+def judged(one: Check, body: Body) -> Judgement:
+    """Ask a check about a body, and refuse an answer that is none.
+
+    Raises
+    ------
+    NotAskedError
+        If the check does not apply.
+    InputError
+        If it does not return a `Judgement` with a row a frame, or rejects what it does not know.
+    """
+    if reason := lacking(one, body):
+        raise NotAskedError(reason)
+    try:
+        found = one.judge(body)
+    except PosekitError:
+        raise
+    except Exception as error:  # a user's code may raise anything: the line names the check and the place
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        got = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+        raise refusal(f"check {one.name}", "judge", got, "a Judgement", "correct the check") from error
+    if not isinstance(found, Judgement) or len(found.value) != len(body):
+        got = f"{len(found.value)} rows" if isinstance(found, Judgement) else type(found).__name__
+        raise refusal(
+            f"check {one.name}", "judge", got, f"a Judgement of {len(body)} rows", "return one row a frame"
+        )
+    return found
+
+
+def find_check(given: Any, known: Mapping[str, Any]) -> Any:
+    """Return a check, or the class or function that makes one, by its name.
+
+    Parameters
+    ----------
+    given : str or Check
+        A name among `known`, the name of an entry point, ``module:Name`` (the current folder is searched too), or a
+        check itself.
+    known : mapping
+        Checks that come with posekit.
+
+    Raises
+    ------
+    InputError
+        If there is no such check or it lacks a member.
+    """
+    if not isinstance(given, str):
+        return _proven(given() if isinstance(given, type) else given)
+    name = given.replace("_", "-") if ":" not in given else given
+    if name in known:
+        return known[name]
+    entries = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    module, _, inside = given.partition(":")
+    if name not in entries and not (module and inside):
+        names = (*known, *sorted(entries))
+        raise refusal("--checks", "", repr(cut(given)), "a check", nearest(given, names))
+    try:
+        found = entries[name].load() if name in entries else _imported(module, inside)
+    except (ImportError, AttributeError) as error:
+        raise refusal(
+            "--checks", "", cut(given), "a module and a name in it", f"it cannot be imported ({error})"
+        ) from None
+    return _proven(found() if isinstance(found, type) else found)
+
+
+def _imported(module: str, inside: str) -> Any:
+    """Import ``module:Name``, looking into the current folder first."""
+    here = str(Path.cwd())
+    added = here not in sys.path
+    if added:
+        sys.path.insert(0, here)
+    try:
+        found: Any = importlib.import_module(module)
+    finally:
+        if added:
+            sys.path.remove(here)
+    for part in inside.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def _proven(found: Any) -> Check:
+    """Refuse an object that lacks a member of `Check`, or whose members are impossible."""
+    what = getattr(found, "name", None) or type(found).__name__
+    if not isinstance(found, Check):
+        missing = [name for name in ("name", "unit", "reads", "judge") if not hasattr(found, name)]
+        raise refusal(
+            "--checks", str(what), f"no {', no '.join(missing)}", "name, unit, reads and judge", "add them"
+        )
+    if not CHECK_NAME.fullmatch(found.name):
+        raise refusal(
+            "--checks", "name", repr(cut(found.name)), "lower-case words joined by -", "rename the check"
+        )
+    if wrong := [name for name in found.reads if name not in READABLE]:
+        raise refusal(
+            "--checks", f"{what}: reads", repr(wrong[0]), f"some of {', '.join(READABLE)}", "correct it"
+        )
+    return found

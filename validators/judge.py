@@ -1,0 +1,520 @@
+"""`validate_motion`, `Validator` and `assert_valid`: checks chosen, asked about a body, and gathered into a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.body import Figure, load_figure, with_head
+from posekit.errors import InputError, PosekitError, refusal, shown
+from posekit.geometry import Array
+from posekit.motion.motion import Motion
+from posekit.settings import Settings, Tolerance, ValidateSettings
+from posekit.skeleton import JOINTS, POINTS
+from posekit.validators.body import Body
+from posekit.validators.check import Check, Judgement, NotAskedError, find_check, judged, message_of
+from posekit.validators.collision import Collision
+from posekit.validators.joint_range import JointRange
+from posekit.validators.motion.profile import MOTION_CHECKS, load_profile, some_of
+from posekit.validators.motion.rate import rate_doubts
+from posekit.validators.motion.standing import balance
+from posekit.validators.motion.walking_phases import RULES_OVER_STRIDES, walking_phases
+from posekit.validators.report import NUMBERS, Report, joined
+from posekit.validators.rigid_parts import RigidParts
+from posekit.validators.robot import MimicJoints, Reach, RobotCollision, RobotRange, RobotTravel, sole_points
+from posekit.validators.walking import WalkingRules
+
+if TYPE_CHECKING:
+    from posekit.robots import Robot
+
+#: Checks of positions by name.
+POSTURE_CHECKS: Final[dict[str, Check]] = {
+    one.name: one for one in (RigidParts(), JointRange(), Collision(), WalkingRules(), balance)
+}
+
+#: Checks of a robot's configurations by name.
+ROBOT_CHECKS: Final[dict[str, Check]] = {
+    one.name: one for one in (Reach(), RobotRange(), RobotTravel(), MimicJoints(), RobotCollision(), balance)
+}
+
+USUAL_POSTURE_CHECKS: Final = ("rigid-parts", "joint-range", "collision")
+USUAL_ROBOT_CHECKS: Final = ("reach", "joint-range", "joint-travel", "mimic", "collision")
+
+#: Usual checks that apply to some robots only: it is not reported that they were not asked, unless they are named.
+OF_SOME_ROBOTS: Final = ("reach", "joint-travel", "mimic", "joint-velocity", "swap")
+
+#: All checks that come with posekit.
+KNOWN: Final[dict[str, Check]] = {**POSTURE_CHECKS, **ROBOT_CHECKS, **MOTION_CHECKS}
+
+
+class InvalidError(PosekitError, AssertionError):
+    """What was asserted to be valid is not; the message has the first reasons."""
+
+
+def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[Check]:
+    """Return the checks that settings ask for, in the order in which they are reported.
+
+    Parameters
+    ----------
+    settings : Settings
+        By ``checks``; where these are not given, the usual ones, and over time those of the profile.
+    of_robot : bool
+        Whether configurations of a robot are judged.
+    in_time : bool
+        Whether the frames follow each other in time.
+
+    Raises
+    ------
+    InputError
+        If a name is no check.
+    """
+    own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
+    profile = load_profile(getattr(settings, "profile", "posekit"))
+    if settings.checks is None:
+        usual = USUAL_ROBOT_CHECKS if of_robot else USUAL_POSTURE_CHECKS
+        return [*(own[name] for name in usual), *(profile if in_time else ())]
+    if not settings.checks:
+        raise refusal("--checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
+    found: list[Any] = [find_check(given, KNOWN) for given in settings.checks]
+    over_time = [one.name for one in found if _is_own(one, MOTION_CHECKS)]
+    made = [own.get(one.name, one) if _is_own(one, KNOWN) else one for one in found]
+    rank = {name: place for place, name in enumerate(own)}
+    made = sorted(
+        (one for one in made if one.name not in over_time), key=lambda one: rank.get(one.name, len(rank))
+    )
+    chosen = list(some_of(profile, over_time))
+    rules = ",".join(str(rule) for rule in settings.rules if rule in RULES_OVER_STRIDES)
+    walks = "walking" in [one.name for one in made] and "walking-phases" not in over_time
+    if in_time and walks and rules and settings.walkers != "paper-printed":
+        chosen.append(walking_phases.with_thresholds(rules=rules))
+    return [*made, *chosen]
+
+
+def _is_own(one: Check, known: Mapping[str, Check]) -> bool:
+    return known.get(one.name) is one
+
+
+def early_checks(settings: Settings) -> list[Check]:
+    """Return the checks of postures for a tree: in parts that read few points, each with its ``points``."""
+    found: list[Check] = []
+    for check in chosen_checks(settings, of_robot=False, in_time=False):
+        if getattr(check, "over_time", False):
+            continue
+        if isinstance(check, RigidParts | JointRange | Collision):
+            found += check.parts()
+        else:
+            found.append(check if getattr(check, "points", ()) else Pointed(check))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Pointed:
+    """A check that does not name the points that it reads, for the tree: it reads all joints."""
+
+    check: Check
+    points: Sequence[str] = JOINTS
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.check, name)
+
+
+def posture_judge(
+    figure: Figure, settings: Settings, tolerance: Tolerance | None, up: Array | None = None
+) -> Callable[[Check, Array], Judgement]:
+    """Return a function that asks a check about postures (N, 14, 3) or (N, 19, 3) of a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+        The body whose postures they are.
+    settings : Settings
+        Ranges, rules, contact margin.
+    tolerance : Tolerance or None
+        Allowed differences from the figure; None for people that were measured.
+    up : array (3,), optional
+        Unit vector against gravity in the frame of the postures.
+    """
+    asked = _validate_settings(settings)
+
+    def judge(check: Check, points: Array) -> Judgement:
+        found = judge_postures(points, [check], figure, asked, tolerance=tolerance, up=up)
+        return found.get(check.name) or Judgement((), np.empty((len(points), 0)))
+
+    return judge
+
+
+def judge_postures(
+    points: Array,
+    checks: Iterable[Check],
+    figure: Figure,
+    settings: Settings | None = None,
+    *,
+    tolerance: Tolerance | None = None,
+    up: Array | None = None,
+) -> dict[str, Judgement]:
+    """Ask checks about postures (N, 14, 3) or (N, 19, 3) of a figure.
+
+    Returns
+    -------
+    dict
+        The judgement of each check by its name; checks that cannot be asked are left out.
+    """
+    body = Body(
+        joints=points[:, : len(JOINTS)],
+        head=points[:, len(JOINTS) :],
+        base=figure,
+        up=up,
+        settings=_validate_settings(settings or ValidateSettings()),
+        tolerance=tolerance,
+        motion=False,
+    )
+    return {one.name: judgement for one, judgement, _ in _asked(checks, body) if judgement is not None}
+
+
+def _asked(checks: Iterable[Check], body: Body) -> Iterator[tuple[Check, Judgement | None, str]]:
+    """Yield each check with what it found, or with the reason why it does not apply."""
+    for check in checks:
+        try:
+            yield check, judged(check, body), ""
+        except NotAskedError as reason:
+            yield check, None, str(reason)
+
+
+def _validate_settings(settings: Settings) -> ValidateSettings:
+    if isinstance(settings, ValidateSettings):
+        return settings
+    shared = ("checks", "ranges", "rules", "walkers", "contact_margin", "rigid_tolerance", "angle_tolerance")
+    return ValidateSettings(**{name: getattr(settings, name) for name in shared})
+
+
+def validate_motion(
+    motion: Motion,
+    settings: ValidateSettings | None = None,
+    *,
+    robot: Robot | None = None,
+    figure: Figure | None = None,
+    tolerance: Tolerance | None = None,
+) -> Report:
+    """Judge the frames of a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions, or configurations.
+    settings : ValidateSettings, optional
+        What decides the verdicts.
+    robot : Robot, optional
+        The robot whose configurations `motion` holds, or that is to take its positions (inverse kinematics).
+    figure : Figure, optional
+        The figure that positions are compared with, with the lengths of the person if these are measured.
+    tolerance : Tolerance, optional
+        Tolerance of postures of that figure itself; measured people otherwise.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        If a check is unknown or the motion does not fit the robot.
+    """
+    asked = settings or ValidateSettings()
+    if not len(motion):
+        raise refusal(motion.source or "motion", "", "no frame", "at least one", "give frames")
+    checks = chosen_checks(asked, of_robot=robot is not None, in_time=motion.in_time)
+    if robot is not None and motion.q is not None and motion.q.shape[1] != robot.model.nq:
+        got = f"{motion.q.shape[1]} entries a row"
+        raise refusal(
+            motion.source or "motion", "q", got, f"{robot.model.nq} of {robot.name}", "name the robot"
+        )
+    # Points of configurations cost as much as all other checks, collision aside.
+    placed = motion.in_time or any("joints" in check.reads for check in checks)
+    reports = []
+    for name, recording in motion.recordings():
+        part, used, residual = recording, robot, None
+        if robot is not None and part.q is None:
+            used, part, residual = _fitted(robot, part, asked)
+        body = Body.of(
+            part, asked, base=figure, robot=used, tolerance=tolerance, residual=residual, placed=placed
+        )
+        if used is not None and body.q is not None and body.motion and not np.isfinite(body.feet).any():
+            body = replace(body, feet=sole_points(used, body.q))
+        reports.append(_report(body, checks, part, name))
+    return reports[0] if len(reports) == 1 else joined(reports)
+
+
+def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[Robot, Motion, Array]:
+    """Fit a robot, scaled to the person unless that is strict, to positions."""
+    joints = motion.figure_joints
+    used = robot if settings.strict else robot.scaled(joints)
+    known = np.isfinite(joints).any(axis=(1, 2))
+    q = np.full((len(joints), robot.model.nq), np.nan)
+    residual = np.full(joints.shape[:2], np.nan)
+    if known.any():
+        q[known], _ = used.configurations(joints[known])
+        residual[known] = np.linalg.norm(used.points(q[known]) - joints[known], axis=-1)
+    return used, replace(motion, q=q, q_names=used.configuration_names, robot=robot.name), residual
+
+
+def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
+    """Ask all checks about one recording."""
+    asked = list(_asked(checks, body))
+    found = {check.name: (check, one) for check, one, _ in asked if one is not None}
+    quiet = OF_SOME_ROBOTS if body.settings.checks is None else ()
+    not_asked = {one.name: reason for one, _, reason in asked if reason and one.name not in quiet}
+    count = len(body)
+    places = tuple(dict.fromkeys(place for _, one in found.values() for place in one.places))
+    place_at = {place: k for k, place in enumerate(places)}
+    margins = np.full((count, len(found)), np.nan)
+    silent = np.zeros((count, len(found)), dtype=np.bool_)
+    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in (*WHOLE, *NUMBERS)}
+    for k, (check, one) in enumerate(found.values()):
+        if one.places:
+            margins[:, k] = np.fmin.reduce(one.share, axis=1)
+        if not getattr(check, "over_time", False):
+            silent[:, k] = np.isnan(margins[:, k])
+        margins[np.isinf(margins[:, k]), k] = np.nan
+        row, place = np.nonzero(one.margin < 0)
+        at = np.array([place_at[one_place] for one_place in one.places], dtype=np.intp)
+        low, high = (np.where(np.isinf(ends), np.nan, ends)[row, place] for ends in (one.low, one.high))
+        cells = (
+            row,
+            np.full(len(row), k),
+            at[place],
+            one.value[row, place],
+            low,
+            high,
+            one.margin[row, place],
+        )
+        for column, values in zip(columns.values(), cells, strict=True):
+            column.append(values)
+    findings = {name: np.concatenate([np.empty(0), *values]) for name, values in columns.items()}
+    order = np.lexsort((findings["check"], findings["row"]))
+    findings = {
+        name: values[order].astype(np.intp if name in WHOLE else np.float64)
+        for name, values in findings.items()
+    }
+    known = body.joints if body.q is None else body.q
+    return Report(
+        clip=np.zeros(count, dtype=np.intp),
+        frame=np.asarray(motion.frame),
+        time=np.asarray(motion.time),
+        files=(motion.source,),
+        names=(name,),
+        checks=tuple(found),
+        units=tuple(check.unit for check, _ in found.values()),
+        places=places,
+        findings=findings,
+        margins=margins,
+        silent=silent,
+        incomplete=np.asarray(~np.isfinite(known.reshape(count, -1)).all(axis=1)),
+        messages={name: message_of(check) for name, (check, _) in found.items()},
+        not_asked=not_asked,
+        settings={**body.settings.to_json(), **body.allowed()},
+        notes=(*motion.notes, *_ground_note(body, found)),
+        warnings=(*motion.warnings, *rate_doubts(body)),
+    )
+
+
+#: Columns of the findings of a report that are whole numbers.
+WHOLE: Final = ("row", "check", "place")
+
+
+def _ground_note(body: Body, found: dict[str, Any]) -> list[str]:
+    """State the height of an estimated ground."""
+    if body.settings.ground is not None or not {"penetration", "floating"} & set(found):
+        return []
+    from posekit.validators.motion.ground import ground_of
+
+    ground = ground_of(body)
+    resting = int(ground.resting.sum())
+    frames = f"{resting} frames in which the body rests" if resting >= 3 else "its lowest frames"
+    return [f"Ground estimated at {ground.low:.3f} m along up, from {frames}; state it with --ground."]
+
+
+class Validator:
+    """Judges postures and motion against a body.
+
+    Parameters
+    ----------
+    urdf : str, path, Figure or Robot
+        ``figure`` (the default), the path of a figure's URDF, or a figure: positions are judged in closed form.
+        Otherwise a robot: a name of example-robot-data (``human``, ``g1``, …), the path of a URDF, or a
+        `posekit.robots.Robot`.
+    settings : ValidateSettings, optional
+        What decides the verdicts.
+    **changes
+        Single fields of the settings, as ``contact_margin=0.01``. If ``ranges`` is given, configurations of the figure
+        are judged by these ranges; otherwise by the limits of its URDF.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> figure = posekit.load_figure()
+    >>> posekit.Validator().check(figure.neutral_points[:14]).ok
+    array([ True])
+    >>> posekit.Validator("figure").check(figure.neutral).ok
+    array([ True])
+    """
+
+    def __init__(
+        self, urdf: Any = "figure", settings: ValidateSettings | None = None, **changes: Any
+    ) -> None:
+        self.settings = (settings or ValidateSettings()).changed(**changes)
+        self._by_ranges = "ranges" in changes and changes["ranges"] != "urdf"
+        self.figure: Figure | None = None
+        self.robot: Robot | None = None
+        if isinstance(urdf, Figure):
+            self.figure = urdf
+        elif not isinstance(urdf, str | Path):
+            self.robot = urdf
+        else:
+            self.figure, self.robot = _loaded(str(urdf), self.settings)
+        chosen_checks(self.settings, of_robot=self.robot is not None, in_time=True)
+
+    def __repr__(self) -> str:
+        return f"Validator({self.figure or self.robot!r})"
+
+    @property
+    def model(self) -> Any:
+        """Pinocchio's model of the figure or robot."""
+        return (self.figure or self.robot).model  # type: ignore[union-attr]
+
+    @property
+    def configuration_names(self) -> tuple[str, ...]:
+        """Name of each entry of q."""
+        body: Any = self.figure or self.robot
+        names: tuple[str, ...] = body.configuration_names
+        return names
+
+    def check(
+        self, given: Motion | ArrayLike, *, head: ArrayLike | None = None, tolerance: Tolerance | None = None
+    ) -> Report:
+        """Judge postures.
+
+        Parameters
+        ----------
+        given : array or Motion
+            Joints (14, 3) or (N, 14, 3), with head points (N, 19, 3), metres, NaN where unknown; or configurations
+            (nq,) or (N, nq). One posture is a batch of one. Postures are taken as those of one person.
+        head : array (N, 5, 3), optional
+            Nose, eyes and ears.
+        tolerance : Tolerance, optional
+            Tolerance of postures of the figure itself; measured people otherwise.
+
+        Returns
+        -------
+        Report
+
+        Raises
+        ------
+        InputError
+            If a shape is wrong or a number is infinite or absurd.
+        """
+        motion = given if isinstance(given, Motion) else self.motion(given, head)
+        robot, figure = self.robot, self.figure
+        if figure is not None and motion.joints is None and motion.q is not None:
+            if not self._by_ranges:  # by the limits of the URDF
+                robot = figure
+            else:
+                known = np.isfinite(motion.q).all(axis=1)
+                joints = np.full((len(motion), len(JOINTS), 3), np.nan)
+                joints[known] = figure.points(motion.q[known])
+                motion = replace(motion, joints=joints, joint_names=JOINTS)
+        return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
+
+    def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
+        """Lay out an array of postures as `check` takes it: frames that do not follow each other in time.
+
+        Raises
+        ------
+        InputError
+            If a shape is wrong or a number is infinite or absurd.
+        """
+        count = len(self.configuration_names)
+        expected = f"joints (N, {len(JOINTS)}, 3), or configurations (N, {count})"
+        try:
+            values = np.asarray(given).astype(np.float64, casting="same_kind")
+        except (TypeError, ValueError):
+            raise refusal("postures", "", shown(type(given).__name__), expected, "give an array") from None
+        if values.ndim == 0 or np.iscomplexobj(given):
+            raise refusal(
+                "postures", "", shown(type(given).__name__), expected, "give an array of real numbers"
+            )
+        if values.ndim == 1 or values.shape in ((len(JOINTS), 3), (len(POINTS), 3)):
+            values = values[None]
+        still: dict[str, Any] = {"frame": np.zeros(len(values), dtype=np.intp)} if len(values) > 1 else {}
+        if values.shape[1:] in ((len(JOINTS), 3), (len(POINTS), 3)):
+            if np.nanmax(np.abs(values), initial=0.0) > MOST_METRES:
+                raise refusal("postures", "", "a coordinate of kilometres", "metres", "scale them")
+            points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
+            return Motion(joints=points, joint_names=POINTS, **still)
+        if values.shape[1:] == (count,):
+            body: Any = self.figure or self.robot
+            known, values = np.isfinite(values).all(axis=1), values.copy()
+            values[known] = body.checked(values[known])
+            name = "figure" if self.figure is not None else body.name
+            return Motion(q=values, q_names=self.configuration_names, robot=name, **still)
+        raise refusal("postures", "", f"shape {values.shape}", expected, "give one posture a row")
+
+
+#: Coordinates beyond are in no unit of length that bodies are measured in, metres.
+MOST_METRES: Final = 1e6
+
+
+def _loaded(name: str, settings: ValidateSettings) -> tuple[Figure | None, Robot | None]:
+    """Load the body that judges: the figure, a figure's own URDF, or a robot."""
+    if name in ("figure", "stick_figure"):
+        return load_figure(), None
+    from posekit.robots import load_robot
+
+    if Path(name).is_file():
+        try:
+            return load_figure(name), None
+        except InputError:  # another robot, or the error that loading it as one words better
+            pass
+
+    found: Any = None
+    for bodies in ("meshes", "capsules") if settings.bodies == "auto" else (settings.bodies,):
+        found = load_robot(name, srdf=settings.srdf, bodies=bodies, package_dirs=settings.package_dirs)
+        if found.collision_pairs:
+            break
+    return None, found
+
+
+def assert_valid(given: Any, urdf: Any = "figure", **changes: Any) -> None:
+    """Raise unless every posture is valid.
+
+    Parameters
+    ----------
+    given : array, Motion or path
+        As `Validator.check` takes it, or a file.
+    urdf, **changes
+        As `Validator` takes them.
+
+    Raises
+    ------
+    InvalidError
+        An `AssertionError` with the first reasons.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> posekit.assert_valid(posekit.load_figure().neutral_points[:14])
+    """
+    if isinstance(given, str | Path):
+        import posekit
+
+        report = posekit.validate(given, urdf=urdf, **changes)
+    else:
+        report = Validator(urdf, **changes).check(given)
+    bad = int((~report.ok).sum())
+    if bad or report.refused:
+        reasons = "; ".join(str(span) for span in report.spans[:3]) or "joints are missing"
+        raise InvalidError(f"{bad} of {len(report)} postures are not valid: {reasons}")

@@ -1,0 +1,269 @@
+"""Rules by which others select motion, each as its authors compute it, for named profiles.
+
+PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and its code) judges parts of four seconds that overlap by half a
+second, by vertices of SMPL-X's feet; here a contact is a point of the foot as near the ground. ProtoMotions (Tessler et
+al. 2024, its data filters) and HoloMotion (2025, its curation) bound single frames. Skating measures are those of
+Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV), WHAM (Shin et al. 2024, CVPR) and PhysDiff (Yuan et al.
+2023, ICCV); all three call much of what real feet do skating, `sliding` is the check that does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from posekit.geometry import Array, runs
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement, NotAskedError, check
+from posekit.validators.motion.ground import ground_of, soles
+from posekit.validators.motion.standing import beyond_support
+from posekit.validators.motion.timeline import norm, timeline_of
+
+#: Parts of a clip that PHUMA judges as a whole, their overlap, and their least duration, seconds.
+CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS = 4.0, 0.5, 1.0
+
+#: Order of the low-pass filter, which runs forward and backward.
+BUTTERWORTH_ORDER: Final = 4
+
+#: Time by which the way of the root is mirrored at its ends before it is filtered, seconds.
+PADDED_SECONDS: Final = 2.0
+
+HIPS: Final = [JOINT[f"{side}_hip"] for side in SIDES]
+
+
+@check("skating", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
+def skating(
+    body: Body,
+    *,
+    height: float = 0.05,
+    way: float = 0.025,
+    rate: float = 20.0,
+    smoothed: int = 5,
+    level: bool = True,
+) -> Judgement:
+    """Feet near the ground go along it too far in a frame.
+
+    Parameters
+    ----------
+    height : float
+        Height over the ground up to which a foot touches it, in two frames, metres.
+    way : float
+        Way that it may go in a frame of the measure, metres.
+    rate : float
+        Frames per second of the measure; 0 for those of the clip.
+    smoothed : int
+        Frames whose mean way counts.
+    level : bool
+        Whether the way along the ground alone counts.
+    """
+    points, over = soles(body)
+    known = np.asarray(np.isfinite(points).any(axis=(0, 2)))
+    which = [side if known[side] else side + 4 for side in range(2)]
+    line, up = timeline_of(body), np.zeros(3) if body.up is None else body.up
+    placed = line.spread(points[:, which])
+    moved = np.diff(placed, axis=0)
+    if level:
+        moved = moved - (moved @ up)[..., None] * up
+    stated = body.settings.ground
+    over_ground = np.asarray(placed @ up - over[which]) - (ground_of(body).low if stated is None else stated)
+    ways = norm(moved) / (rate * body.dt if rate else 1.0)
+    half = smoothed // 2
+    padded = np.pad(ways, ((half, half), (0, 0)))
+    ways = np.mean([padded[k : k + len(ways)] for k in range(2 * half + 1)], axis=0)
+    value = np.where(np.maximum(over_ground[1:], over_ground[:-1]) < height, ways, 0.0)
+    found = np.concatenate([np.full((1, len(SIDES)), np.nan), value])
+    return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(found), upper=way)
+
+
+@check("contact-share", unit="1", reads=("joints", "up", "time", "ground"), over_time=True)
+def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Judgement:
+    """Feet touch the ground in too few frames, over seconds.
+
+    Parameters
+    ----------
+    least : float
+        Share of the frames.
+    window : float
+        Range of heights of soles that are the ground's, metres; the ground is where most frames have theirs.
+    """
+    level = _voted(body, window)
+    touches = np.asarray((np.abs(_soles(body) - level) <= window / 2).any(axis=1), dtype=np.float64)
+    return Judgement(("feet",), _of_parts(body, touches[:, None], worst=np.fmin), lower=least)
+
+
+@check("root-height", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
+def root_height(body: Body, *, least: float = 0.6, most: float = 1.5, window: float = 0.05) -> Judgement:
+    """Hips are too low or too high over the ground.
+
+    Parameters
+    ----------
+    least, most : float
+        Metres.
+    window : float
+        As in `ContactShare`.
+    """
+    value = body.height[:, HIPS].mean(axis=1) - _voted(body, window)
+    return Judgement(("root",), value, least, most)
+
+
+@check("support-distance", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
+def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) -> Judgement:
+    """Hips and pelvis are not over the feet, over seconds.
+
+    Parameters
+    ----------
+    root : float
+        Distance of the middle of the hips (SMPL's pelvis) from over the hull of ankles and toes, metres.
+    pelvis : float
+        The same of the pelvis joint, some 10 cm above (SMPL's first joint of the spine), metres.
+    """
+    up = np.zeros(3) if body.up is None else body.up
+    feet, _ = soles(body)
+    points = body.joints[:, HIPS].mean(axis=1), body.joints[:, JOINT["pelvis"]]
+    away = np.stack([np.maximum(beyond_support(one, feet, up), 0.0) for one in points], axis=1)
+    value = _of_parts(body, away, worst=np.fmax)
+    return Judgement(("root", "pelvis"), value, upper=np.array([root, pelvis]))
+
+
+@check("root-jerk", unit="m/s³", reads=("joints", "time"), over_time=True)
+def root_jerk(body: Body, *, most: float = 50.0, cutoff: float = 3.0) -> Judgement:
+    """Hips jerk, over seconds, by more than a humanoid can follow.
+
+    Parameters
+    ----------
+    most : float
+        Mean length of third differences of the root's position, metres a second cubed.
+    cutoff : float
+        Cutoff of the low-pass filter that the root's way passes, hertz.
+    """
+    if body.rate <= 2.0 * cutoff:
+        raise NotAskedError(f"it needs more than {2.0 * cutoff:g} frames per second")
+    line = timeline_of(body)
+    root = line.spread(body.joints[:, HIPS].mean(axis=1))
+    jerk = np.full((len(root), 1), np.nan)
+    slots, known = np.arange(len(root)), np.isfinite(root[:, 0])
+    if len(root) > 3 and known.any():
+        filled = np.stack([np.interp(slots, slots[known], column[known]) for column in root.T], axis=1)
+        smooth = low_pass(filled, body.dt, cutoff)
+        jerk[:-3, 0] = norm(np.diff(smooth, n=3, axis=0)) / body.dt**3
+    value = _of_parts(body, line.of_frames(jerk), worst=np.fmax, inside=3)
+    return Judgement(("root",), value, upper=most)
+
+
+@check("above-ground", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
+def above_ground(
+    body: Body, *, lowest: float = -0.05, highest: float = 0.2, lasting: float = 1.0
+) -> Judgement:
+    """Bodies are below the ground, or away from it for too long (ProtoMotions).
+
+    Parameters
+    ----------
+    lowest : float
+        Height of the lowest point over the ground from which it is below, metres (negative).
+    highest : float
+        Height of the lowest point over the ground that may last, metres.
+    lasting : float
+        Seconds.
+    """
+    stated = body.settings.ground
+    height = ground_of(body).height - (ground_of(body).low if stated is None else stated)
+    upper = np.full(len(body), np.inf)
+    for start, stop in runs(height > highest):
+        if (stop - start) * body.dt > lasting:
+            upper[start:stop] = highest
+    return Judgement(("lowest",), height, lowest, upper[:, None], scale=0.1)
+
+
+@check("root-speed", unit="m/s", reads=("joints", "time"), over_time=True)
+def root_speed(body: Body, *, most: float = 10.0) -> Judgement:
+    """Hips move too fast (HoloMotion).
+
+    Parameters
+    ----------
+    most : float
+        Speed of the middle of the hips, metres a second.
+    """
+    line = timeline_of(body)
+    root = line.spread(body.joints[:, HIPS].mean(axis=1))
+    speed = np.full(len(root), np.nan)
+    speed[1:] = norm(np.diff(root, axis=0)) / body.dt
+    return Judgement(("root",), line.of_frames(speed), upper=most)
+
+
+@check("body-speed", unit="m/s", reads=("joints", "time"), over_time=True)
+def body_speed(body: Body, *, most: float = 15.0) -> Judgement:
+    """Joints move too fast (ProtoMotions).
+
+    Parameters
+    ----------
+    most : float
+        Speed of any joint, metres a second.
+    """
+    line = timeline_of(body)
+    joints = line.spread(body.joints)
+    speed = np.full(joints.shape[:2], np.nan)
+    speed[1:] = norm(np.diff(joints, axis=0)) / body.dt
+    return Judgement(JOINTS, line.of_frames(speed), upper=most)
+
+
+def low_pass(way: Array, step: float, cutoff: float) -> Array:
+    """Filter the columns of (S, K) without delay: a Butterworth filter, forward and backward."""
+    from scipy.signal import butter, sosfiltfilt
+
+    pad = min(round(PADDED_SECONDS / step), len(way) - 1)
+    sections = butter(BUTTERWORTH_ORDER, cutoff, fs=1.0 / step, output="sos")
+    return np.asarray(sosfiltfilt(sections, way, axis=0, padlen=pad))
+
+
+def _parts(count: int, step: float) -> Iterator[slice]:
+    """Go through the parts of so many slots."""
+    size, overlap, least = (
+        round(seconds / step) for seconds in (CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS)
+    )
+    start = 0
+    while count - start >= max(least, 4):
+        end = count if start + size + least - overlap > count else start + size
+        yield slice(start, end)
+        start += size - overlap
+
+
+def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) -> Array:
+    """Return, for each frame, the worst mean of values (T, K) over the parts of the clip that it is in.
+
+    The last `inside` slots of a part are left out: differences that start there reach beyond it.
+    """
+    if len(body) * body.dt < LEAST_SECONDS:
+        raise NotAskedError(f"it needs {LEAST_SECONDS:g} s of motion")
+    line = timeline_of(body)
+    placed = line.spread(values)
+    found = np.full(placed.shape, np.nan)
+    for part in _parts(len(placed), body.dt):
+        values = placed[part.start : max(part.stop - inside, part.start + 1)]
+        known = np.isfinite(values)
+        count = known.sum(axis=0)
+        mean = np.where(known, values, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
+        found[part] = worst(found[part], mean)
+    return line.of_frames(found)
+
+
+def _soles(body: Body) -> Array:
+    """Return the heights of soles (T, P) along up, by toes and heels, or by ankles where there are none."""
+    feet, over = soles(body)
+    height = np.asarray(feet @ (np.zeros(3) if body.up is None else body.up)) - over
+    toes = height[:, : len(FEET_POINTS)]
+    return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
+
+
+def _voted(body: Body, window: float) -> float:
+    """Return the stated ground, or the middle of the window of heights that has most frames."""
+    if body.settings.ground is not None:
+        return body.settings.ground
+    lowest = np.sort(np.fmin.reduce(_soles(body), axis=1))
+    lowest = lowest[np.isfinite(lowest)]
+    if not len(lowest):
+        return np.nan
+    votes = np.searchsorted(lowest, lowest + window, side="right") - np.arange(len(lowest))
+    return float(np.median(lowest[votes == votes.max()]) + window / 2)

@@ -1,0 +1,593 @@
+"""`Report`: one table of findings; masks, spans, decisions about clips and summaries are computed from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array, Record, runs
+
+if TYPE_CHECKING:
+    import pandas
+
+#: Checks whose findings make other checks reject the same frames; they are named first.
+CAUSES: Final = ("timing", "frozen", "repeated", "swap", "orientation", "rate")
+
+#: Checks that reject what another defect breaks: near one, their findings follow from it.
+EFFECTS: Final = {
+    "speed": 1,
+    "acceleration": 1,
+    "jerk": 1,
+    "jitter": 1,
+    "joint-velocity": 1,
+    "rigid-parts": 2,
+}
+
+#: Checks whose findings `posekit.repair` can remove.
+MENDABLE: Final = frozenset(
+    "swap teleport frozen repeated jitter joint-range collision floating penetration rigid-parts drift "
+    "speed acceleration jerk sliding support".split()
+)
+
+#: Frames by which an effect may lie off its cause: trembling is measured over so many.
+NEAR_FRAMES: Final = 15
+
+#: Gap within one span at most, seconds; the same in frames where the rate is not known, and the least.
+MERGED_SECONDS, MERGED_FRAMES = 0.1, 3
+
+#: Excess that counts as slight, in a check's unit: the flesh of a body, the spread of people's ranges, and the sway of
+#: measured feet. Of another unit a tenth of the bound.
+SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
+
+#: Columns of the findings that are numbers.
+NUMBERS: Final = ("value", "lower", "upper", "margin")
+
+Columns = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Span:
+    """Neighbouring frames of one clip that one check rejects, or is undecided about.
+
+    Parameters
+    ----------
+    check, place, unit : str
+        The check, its worst place, and the unit of the numbers.
+    verdict : str
+        ``invalid`` or ``undecided``.
+    first, last : int
+        First and last frame, both included.
+    frames : int
+        Number of frames that are rejected.
+    worst_frame : int
+        Frame that is farthest outside.
+    start, end : float
+        Seconds of the first and the last frame; NaN where not known.
+    value, bound, margin : float
+        Value in the worst frame, the bound that it violates, and the difference, negative.
+    severity : float
+        Excess in multiples of a slight one (`SLIGHT`).
+    places : sequence of str
+        All places that are rejected, the worst first.
+    """
+
+    check: str
+    place: str
+    unit: str
+    verdict: str
+    first: int
+    last: int
+    frames: int
+    worst_frame: int
+    start: float
+    end: float
+    value: float
+    bound: float
+    margin: float
+    severity: float
+    places: Sequence[str] = ()
+
+    def __str__(self) -> str:
+        where = f"{self.check} {self.place}".rstrip()
+        at = f"frame {self.first}" if self.first == self.last else f"frames {self.first} to {self.last}"
+        if self.verdict == "undecided":
+            return f"{where}: undecided in {at}"
+        worst = f"{quantity(self.value, self.unit)} in frame {self.worst_frame}"
+        bound = "" if np.isnan(self.bound) else f", the bound is {quantity(self.bound, self.unit)}"
+        return f"{where}: {at}; {worst}{bound}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClipDecision:
+    """The decision about one clip.
+
+    Parameters
+    ----------
+    file, name : str
+        File of the clip, and its name there; empty where it has none.
+    decision : str
+        ``keep``; ``repair?`` where `posekit.repair` can remove everything that is found; else ``drop``.
+    reason : str
+        Check that decides it; empty for clips that are kept.
+    frames, invalid, undecided : int
+        Number of frames, and of those that are rejected and undecided.
+    severity : float
+        The largest excess in multiples of a slight one; 0 where nothing is rejected.
+    spans : sequence of Span
+        What is behind the decision: causes first, then the most severe.
+    good : (int, int) or None
+        First and last frame of the longest run of valid frames.
+    """
+
+    file: str
+    name: str
+    decision: str
+    reason: str
+    frames: int
+    invalid: int
+    undecided: int
+    severity: float
+    spans: Sequence[Span]
+    good: tuple[int, int] | None
+
+    @property
+    def title(self) -> str:
+        """File and name, as they are printed."""
+        return _title(self.file, self.name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Report(Record):
+    """What checks found in N frames.
+
+    Parameters
+    ----------
+    clip, frame : int array (N,)
+        Clip of each frame, and its number there, from 0.
+    time : array (N,)
+        Seconds; NaN where not known.
+    files, names : sequence of str
+        File and name of each clip.
+    checks, units : sequence of K str
+        Checks that were asked, in order, and their units.
+    places : sequence of str
+        Places that findings refer to.
+    findings : mapping of arrays
+        Columns of the violations, sorted by frame: ``row`` (frame, from 0 to N - 1), ``check`` and ``place`` (indices),
+        ``value``, ``lower`` and ``upper`` (bounds with their tolerance), ``margin`` (negative).
+    margins : array (N, K)
+        Worst margin of each check in shares of its range, negative outside; NaN where it is undecided.
+    silent : bool array (N, K)
+        Whether a check that judges postures could decide nothing.
+    incomplete : bool array (N,)
+        Whether a joint is not known.
+    messages : mapping
+        What the findings of each check mean.
+    not_asked : mapping
+        Checks that do not apply, and why.
+    settings : mapping
+        Everything that decided the verdicts.
+    notes, warnings, refused : sequence of str
+        What was found out about the motion, contradictions, and files that could not be read.
+
+    Examples
+    --------
+    >>> import numpy as np, posekit
+    >>> standing = posekit.load_figure().neutral_points[None, :14]
+    >>> report = posekit.Validator().check(standing)
+    >>> report.ok.tolist(), report.decision
+    ([True], 'keep 1 of 1 clip')
+    """
+
+    clip: NDArray[np.intp]
+    frame: NDArray[np.intp]
+    time: Array
+    files: Sequence[str]
+    names: Sequence[str]
+    checks: Sequence[str]
+    units: Sequence[str]
+    places: Sequence[str]
+    findings: Columns
+    margins: Array
+    silent: NDArray[np.bool_]
+    incomplete: NDArray[np.bool_]
+    messages: Mapping[str, str] = field(default_factory=dict)
+    not_asked: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    refused: Sequence[str] = ()
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.clip)
+
+    def _facts(self) -> list[str]:
+        return [f"{len(self)} frames", self.decision]
+
+    @cached_property
+    def invalid(self) -> NDArray[np.bool_]:
+        """Whether a check rejects each frame (N,)."""
+        found = np.zeros(len(self), dtype=np.bool_)
+        found[self.findings["row"]] = True
+        return found
+
+    @cached_property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Whether nothing rejects a frame, but a joint is not known or a check could decide nothing (N,)."""
+        return np.asarray(~self.invalid & (self.incomplete | self.silent.any(axis=1)))
+
+    @cached_property
+    def ok(self) -> NDArray[np.bool_]:
+        """Whether each frame is valid: every check is decided, and none rejects it (N,)."""
+        return np.asarray(~self.invalid & ~self.undecided)
+
+    @cached_property
+    def worst(self) -> Array:
+        """Smallest margin of each frame (N,) in shares of the range: negative where it is rejected, NaN undecided."""
+        least = np.fmin.reduce(self.margins, axis=1, initial=np.nan)
+        return np.where(self.undecided, np.nan, least)
+
+    @property
+    def verdicts(self) -> list[str]:
+        """``valid``, ``invalid`` or ``undecided``, a word a frame."""
+        words = np.where(self.invalid, "invalid", np.where(self.undecided, "undecided", "valid"))
+        return [str(word) for word in words]
+
+    def table(self) -> dict[str, NDArray[Any]]:
+        """Return the findings as columns.
+
+        Returns
+        -------
+        dict
+            ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row a violation, and a
+            row for each check that is undecided about a frame, whose numbers are NaN.
+        """
+        found = self.findings
+        rows, which = np.nonzero(self.silent & self.undecided[:, None])
+        row = np.concatenate([found["row"], rows])
+        check = np.concatenate([found["check"], which])
+        order = np.lexsort((check, row))
+        checks, units = (np.array(one, dtype=object) for one in (self.checks, self.units))
+        nothing = np.full(len(rows), np.nan)
+        places = np.array([*self.places, ""], dtype=object)
+        place = np.concatenate([found["place"], np.full(len(rows), -1)]).astype(np.intp)
+        verdict = np.array(["invalid"] * len(found["row"]) + ["undecided"] * len(rows), dtype=object)
+        titles = np.array([*map(_title, self.files, self.names)], dtype=object)
+        columns = {
+            "clip": titles[self.clip[row]] if len(row) else np.empty(0, dtype=object),
+            "frame": self.frame[row],
+            "time": self.time[row],
+            "check": checks[check] if len(row) else np.empty(0, dtype=object),
+            "place": places[place],
+            **{name: np.concatenate([found[name], nothing]) for name in ("value", "lower", "upper")},
+            "unit": units[check] if len(row) else np.empty(0, dtype=object),
+            "margin": np.concatenate([found["margin"], nothing]),
+            "verdict": verdict,
+        }
+        return {name: column[order] for name, column in columns.items()}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return `table` as a data frame."""
+        import pandas
+
+        return pandas.DataFrame(self.table())
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the report: ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md``."""
+        import posekit
+
+        posekit.save(self, path)
+
+    @cached_property
+    def clips(self) -> list[ClipDecision]:
+        """The decision about each clip."""
+        order = np.argsort(self.clip, kind="stable")
+        cuts = np.searchsorted(self.clip[order], np.arange(len(self.files) + 1))
+        return [self._decided(k, order[cuts[k] : cuts[k + 1]]) for k in range(len(self.files))]
+
+    @property
+    def spans(self) -> list[Span]:
+        """All spans, clip by clip."""
+        return [span for clip in self.clips for span in clip.spans]
+
+    def _decided(self, clip: int, rows: NDArray[np.intp]) -> ClipDecision:
+        invalid, undecided = int(self.invalid[rows].sum()), int(self.undecided[rows].sum())
+        spans = _in_order(list(self._spans(clip, rows)))
+        rejecting = [span for span in spans if span.verdict == "invalid"]
+        bad = bool(invalid or undecided or not len(rows))
+        mendable = rejecting and not undecided and all(span.check in MENDABLE for span in rejecting)
+        good = max(runs(self.ok[rows]), key=lambda run: run[1] - run[0], default=(0, 0))
+        first, last = (int(self.frame[rows[k]]) if good[1] else -1 for k in (good[0], good[1] - 1))
+        return ClipDecision(
+            file=self.files[clip],
+            name=self.names[clip],
+            decision="repair?" if mendable else "drop" if bad else "keep",
+            reason=rejecting[0].check if rejecting else "unknown joints" if bad else "",
+            frames=len(rows),
+            invalid=invalid,
+            undecided=undecided,
+            severity=max((span.severity for span in rejecting), default=0.0),
+            spans=tuple(spans),
+            good=(first, last) if good[1] else None,
+        )
+
+    def _spans(self, clip: int, rows: NDArray[np.intp]) -> Iterator[Span]:
+        """Cut the findings of a clip into runs of one check."""
+        step = np.diff(self.time[rows])
+        step, gap = step[step > 0], MERGED_FRAMES
+        if len(step):
+            gap = max(gap, round(MERGED_SECONDS / float(np.median(step))))
+        found = self.findings
+        low, high = np.searchsorted(found["row"], (rows[0], rows[-1] + 1)) if len(rows) else (0, 0)
+        mine = np.arange(low, high)
+        mine = mine[self.clip[found["row"][mine]] == clip]
+        for check in np.unique(found["check"][mine]).tolist():
+            of_check = mine[found["check"][mine] == check]
+            at = np.searchsorted(rows, found["row"][of_check])
+            for part in np.split(np.arange(len(at)), np.flatnonzero(np.diff(at) > gap) + 1):
+                yield self._span(check, rows, at[part], of_check[part])
+        for check in np.flatnonzero(self.silent[rows].any(axis=0)).tolist():
+            at = np.flatnonzero(self.silent[rows, check] & self.undecided[rows])
+            for part in np.split(at, np.flatnonzero(np.diff(at) > gap) + 1):
+                if len(part):
+                    yield self._span(check, rows, part, None)
+
+    def _span(
+        self, check: int, rows: NDArray[np.intp], at: NDArray[np.intp], cells: NDArray[np.intp] | None
+    ) -> Span:
+        unit, found = self.units[check], self.findings
+        numbers = {"value": np.nan, "bound": np.nan, "margin": np.nan, "severity": 0.0}
+        worst, places = 0, [""]
+        if cells is not None:
+            order = np.argsort(found["margin"][cells], kind="stable")
+            worst, cell = int(order[0]), int(cells[order[0]])
+            value, lower, upper, margin = (float(found[name][cell]) for name in NUMBERS)
+            bound = lower if value < lower else upper
+            slight = SLIGHT.get(unit, max(abs(bound), 1e-9) / 10)
+            numbers = {"value": value, "bound": bound, "margin": margin, "severity": -margin / slight}
+            places = [self.places[k] for k in dict.fromkeys(found["place"][cells[order]].tolist())]
+        return Span(
+            check=self.checks[check],
+            place=places[0],
+            unit=unit,
+            verdict="undecided" if cells is None else "invalid",
+            first=int(self.frame[rows[at[0]]]),
+            last=int(self.frame[rows[at[-1]]]),
+            frames=len(np.unique(at)),
+            worst_frame=int(self.frame[rows[at[worst]]]),
+            start=float(self.time[rows[at[0]]]),
+            end=float(self.time[rows[at[-1]]]),
+            places=tuple(places),
+            **numbers,
+        )
+
+    @cached_property
+    def decision(self) -> str:
+        """The decision in one line: ``keep 183 of 200 clips; 12 dropped by collision, 4 by teleport``."""
+        counts = Counter(clip.decision for clip in self.clips)
+        total = len(self.clips) + len(self.refused)
+        parts = [f"keep {counts['keep']} of {plural(total, 'clip')}"]
+        dropped = Counter(clip.reason for clip in self.clips if clip.decision == "drop")
+        mended = Counter(clip.reason for clip in self.clips if clip.decision == "repair?")
+        reasons = [f"{count} dropped by {reason}" for reason, count in dropped.most_common()]
+        reasons += [f"{count} repairable ({reason})" for reason, count in mended.most_common()]
+        if self.refused:
+            reasons.append(f"{len(self.refused)} unreadable")
+        return "; ".join([*parts, ", ".join(reasons)] if reasons else parts)
+
+    def by_check(self) -> dict[str, dict[str, Any]]:
+        """Count for each check the frames and clips that it rejects, its most frequent place and its worst finding."""
+        found, counts = self.findings, {}
+        for k, name in enumerate(self.checks):
+            mine = np.flatnonzero(found["check"] == k)
+            rows = np.unique(found["row"][mine])
+            often = Counter(found["place"][mine].tolist()).most_common(1)
+            worst = int(mine[np.argmin(found["margin"][mine])]) if len(mine) else -1
+            counts[name] = {
+                "frames": len(rows),
+                "clips": len(np.unique(self.clip[rows])),
+                "undecided": int((self.silent[:, k] & self.undecided).sum()),
+                "place": self.places[often[0][0]] if often else "",
+                "worst": self.places[found["place"][worst]] if len(mine) else "",
+                "value": float(found["value"][worst]) if len(mine) else np.nan,
+                "unit": self.units[k],
+                "frame": int(self.frame[found["row"][worst]]) if len(mine) else -1,
+            }
+        return counts
+
+    def summary(self, most: int = 5) -> str:
+        """Return the report in words: the decision, the checks in frames and clips, the worst clips, notes.
+
+        Parameters
+        ----------
+        most : int
+            Number of clips that are listed.
+        """
+        total = max(len(self), 1)
+        lines = [self.decision, ""]
+        counts = self.by_check()
+        rows = [
+            (
+                name,
+                f"{one['frames']} ({one['frames'] / total:.1%})",
+                str(one["clips"]),
+                str(one["undecided"] or ""),
+                one["place"],
+                _worst(one) if one["frames"] else "",
+            )
+            for name, one in counts.items()
+            if one["frames"] or one["undecided"]
+        ]
+        if rows:
+            lines += _aligned([("check", "frames", "clips", "undecided", "most often", "worst"), *rows])
+        quiet = [name for name, one in counts.items() if not one["frames"] and not one["undecided"]]
+        lines += [f"nothing found by {', '.join(quiet)}"] if quiet else []
+        for reason in dict.fromkeys(self.not_asked.values()):
+            names = [name for name, why in self.not_asked.items() if why == reason]
+            lines.append(f"not asked: {', '.join(names)}: {reason}")
+        if missing := int((self.incomplete & ~self.invalid).sum()):
+            lines.append(f"joints are missing in {plural(missing, 'frame')}: undecided")
+        often = max(counts, key=lambda name: counts[name]["frames"], default="")
+        if often and counts[often]["frames"]:
+            step = REMEDIES.get(often, "leave such frames out with --keep-spans, or use --repair")
+            lines.append(f"{often}: {step}")
+        bad = sorted((one for one in self.clips if one.decision != "keep"), key=lambda one: -one.severity)
+        for clip in bad[:most]:
+            shown = [str(span) for span in clip.spans[:3]]
+            lines += ["", f"{clip.decision} {clip.title}".rstrip(), *(f"  {one}" for one in shown)]
+        lines += [""] if self.notes or self.warnings or self.refused else []
+        lines += [f"warning: {one}" for one in self.warnings]
+        lines += list(self.notes[:most])
+        lines += [f"unreadable: {one}" for one in self.refused[:most]]
+        return "\n".join(lines)
+
+
+def _worst(one: Mapping[str, Any]) -> str:
+    """Return the worst finding of a check, with its place where that is not the most frequent one."""
+    place = "" if one["worst"] == one["place"] else f"{one['worst']} "
+    return f"{place}{quantity(one['value'], one['unit'])} in frame {one['frame']}"
+
+
+def _title(file: str, name: str) -> str:
+    return " ".join(part for part in (file, name) if part)
+
+
+#: Size below which a quantity is written as 0: rounding that a bound allows, in the unit of the check.
+NEGLIGIBLE: Final = 1e-6
+
+
+def quantity(value: float, unit: str) -> str:
+    """Write a value with its unit: ``2.6 cm``, ``147°``, ``0.12 m/s``, ``3 frames``."""
+    value = 0.0 if abs(value) < NEGLIGIBLE else value
+    if unit == "m":
+        return f"{100 * value:.3g} cm" if abs(value) < 1 else f"{value:.3g} m"
+    return f"{value:.3g}" + {"deg": "°", "1": ""}.get(unit, f" {unit}")
+
+
+def plural(count: int, noun: str) -> str:
+    """Return ``1 frame`` or ``2 frames``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
+    """Join the reports of several files into one; checks and places are matched by name."""
+    checks = tuple(dict.fromkeys(name for one in reports for name in one.checks))
+    places = tuple(dict.fromkeys(name for one in reports for name in one.places))
+    units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
+    place_at = {name: k for k, name in enumerate(places)}
+    parts: dict[str, list[NDArray[Any]]] = {}
+    found: dict[str, list[NDArray[Any]]] = {}
+    count = clips = 0
+    for one in reports:
+        own = np.array([checks.index(name) for name in one.checks], dtype=np.intp)
+        at = np.array([place_at[name] for name in one.places], dtype=np.intp)
+        margins, silent = (
+            np.full((len(one), len(checks)), np.nan),
+            np.zeros((len(one), len(checks)), np.bool_),
+        )
+        margins[:, own], silent[:, own] = one.margins, one.silent
+        moved = {
+            "row": one.findings["row"] + count,
+            "check": own[one.findings["check"]],
+            "place": at[one.findings["place"]],
+        }
+        arrays = {"clip": one.clip + clips, "margins": margins, "silent": silent}
+        arrays |= {name: getattr(one, name) for name in ("frame", "time", "incomplete")}
+        for table, columns in ((found, {**one.findings, **moved}), (parts, arrays)):
+            for name, column in columns.items():
+                table.setdefault(name, []).append(column)
+        count, clips = count + len(one), clips + len(one.files)
+    why = {name: reason for one in reports for name, reason in one.not_asked.items() if name not in checks}
+    return Report(
+        **{name: np.concatenate(arrays) for name, arrays in parts.items()},
+        files=tuple(name for one in reports for name in one.files),
+        names=tuple(name for one in reports for name in one.names),
+        checks=checks,
+        units=tuple(units[name] for name in checks),
+        places=places,
+        findings={name: np.concatenate(columns) for name, columns in found.items()},
+        messages={name: text for one in reports for name, text in one.messages.items()},
+        not_asked=why,
+        settings=reports[0].settings,
+        notes=_joined_notes([note for one in reports for note in one.notes]),
+        warnings=tuple(dict.fromkeys(note for one in reports for note in one.warnings)),
+        refused=tuple(refused),
+    )
+
+
+#: Start of the note about the ground of a clip.
+GROUND_NOTE: Final = "Ground estimated"
+
+
+def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return each note once, and one note about all estimated grounds."""
+    grounds = sum(note.startswith(GROUND_NOTE) for note in notes)
+    others = tuple(dict.fromkeys(note for note in notes if not note.startswith(GROUND_NOTE)))
+    one = f"{GROUND_NOTE} in {plural(grounds, 'clip')}, from frames in which the body rests; state it with --ground."
+    return (*others, one) if grounds else others
+
+
+#: Next step of the user, by the check that rejects most frames.
+REMEDIES: Final = {
+    "joint-range": "allow more with --angle-tolerance or --ranges FILE; check axes and left/right labels",
+    "rigid-parts": "check the unit (--unit); allow more with --rigid-tolerance",
+    "collision": "allow overlap with --contact-margin, e.g. -2cm, or take bodies apart with --repair",
+    "swap": "correct right and left with --repair",
+    "orientation": "state the axis that points up with --up",
+    "floating": "state the ground with --ground, or use --repair",
+    "penetration": "state the ground with --ground, or use --repair",
+    "timing": "check the order and the times of frames; state the rate with --rate",
+}
+
+
+def _in_order(spans: list[Span]) -> list[Span]:
+    """Sort spans: rejections before what is undecided, causes before effects near them, then by severity."""
+    ranks = [0 if one.check in CAUSES else 1 + EFFECTS.get(one.check, 0) for one in spans]
+    rejected = [span.verdict == "invalid" for span in spans]
+
+    def follows(k: int) -> bool:
+        return any(
+            ranks[j] < ranks[k]
+            and rejected[j]
+            and one.first - NEAR_FRAMES <= spans[k].last
+            and spans[k].first - NEAR_FRAMES <= one.last
+            for j, one in enumerate(spans)
+        )
+
+    keys = [(not rejected[k], follows(k), -spans[k].severity, spans[k].first) for k in range(len(spans))]
+    return [spans[k] for k in sorted(range(len(spans)), key=keys.__getitem__)]
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+
+
+def clip_rows(report: Report) -> list[dict[str, Any]]:
+    """Return the clips as rows of a table: file, clip, decision, reason, counts of frames, severity, spans."""
+    return [
+        {
+            "file": clip.file,
+            "clip": clip.name,
+            "decision": clip.decision,
+            "reason": clip.reason,
+            "frames": clip.frames,
+            "invalid": clip.invalid,
+            "undecided": clip.undecided,
+            "severity": round(clip.severity, 3),
+            "first_good": -1 if clip.good is None else clip.good[0],
+            "last_good": -1 if clip.good is None else clip.good[1],
+            "worst": str(clip.spans[0]) if clip.spans else "",
+        }
+        for clip in report.clips
+    ]

@@ -1,0 +1,226 @@
+"""Checks of a robot's configurations: joint limits, mimicking joints, collision, and reach of given positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from posekit.geometry import Array, cross, unit
+from posekit.settings import EXACT, MEASURED
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement, NotAskedError
+from posekit.validators.measured import MADE_UP_METRES
+from posekit.validators.ranges import load_ranges
+
+if TYPE_CHECKING:
+    from posekit.robots import Robot
+
+#: Difference of a mimicking joint that files written with few digits may have, degrees.
+MIMIC_DEGREES: Final = 0.5
+
+#: Penetration below which the verdict would be rounding, metres.
+CONTACT_METRES: Final = 1e-9
+
+#: Distance up to which bodies are measured, and which counts as one whole share of margin, metres.
+NEAR_METRES: Final = 0.02
+
+#: Frames up to which distances between meshes that do not touch are measured.
+MEASURED_FRAMES: Final = 300
+
+
+#: Distance of a foot's joint from the ankle at most, as a share of the leg, and depth of the corners of a sole, metres.
+FOOT_SHARE, SOLE_METRES = 0.1, 0.02
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RobotRange:
+    """A joint is outside the limits of its URDF, or of the table of ranges that is asked for."""
+
+    name = "joint-range"
+    unit = "deg"
+    reads = ("q", "robot")
+
+    def judge(self, body: Body) -> Judgement:
+        """Compare the angles of all joints that have limits."""
+        return _range(body, "rad", float(np.degrees(1.0)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RobotTravel:
+    """A sliding joint is outside the limits of its URDF."""
+
+    name = "joint-travel"
+    unit = "m"
+    reads = ("q", "robot")
+
+    def judge(self, body: Body) -> Judgement:
+        """Compare the positions of all sliding joints that have limits."""
+        return _range(body, "m", 1.0)
+
+
+def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
+    robot, q = _of(body)
+    lower, upper = np.array(robot.lower), np.array(robot.upper)
+    names, limits = list(robot.configuration_names), _stated_limits(body)
+    for name, ends in limits.items():
+        if name in names:
+            at = names.index(name)
+            lower[at], upper[at] = np.array(ends) / factor
+    which = [
+        k
+        for k, unit_here in enumerate(robot.units)
+        if unit_here == unit_of_q and (np.isfinite(lower[k]) or np.isfinite(upper[k]))
+    ]
+    if not which:
+        raise NotAskedError("the URDF has no such limits")
+    given = body.settings.angle_tolerance
+    tolerance = EXACT.rigid if unit_of_q == "m" else EXACT.angle if given is None else given
+    return Judgement(
+        [names[k] for k in which],
+        factor * q[:, which],
+        factor * lower[which],
+        factor * upper[which],
+        tolerance,
+    )
+
+
+def _stated_limits(body: Body) -> dict[str, list[float]]:
+    """Return limits of a table of kind ``joints`` by joint, degrees; other tables are of people."""
+    table = load_ranges(body.settings.ranges)
+    return dict(table["limits"]) if table is not None and table["kind"] == "joints" else {}
+
+
+def _of(body: Body) -> tuple[Robot, Array]:
+    if body.robot is None or body.q is None:
+        raise NotAskedError("there are no configurations of a robot (--urdf)")
+    return body.robot, body.q
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MimicJoints:
+    """A joint does not follow the joint that it mimics."""
+
+    name = "mimic"
+    unit = "deg"
+    reads = ("q", "robot")
+
+    def judge(self, body: Body) -> Judgement:
+        """Measure how far mimicking joints are from the values of their targets."""
+        robot, q = _of(body)
+        mimics = getattr(robot, "mimics", ())
+        if not mimics:
+            raise NotAskedError("no joint of the URDF mimics another one")
+        value = np.degrees(robot.mimic_errors(q))
+        return Judgement([one.joint for one in mimics], value, 0.0, 0.0, MIMIC_DEGREES, scale=MIMIC_DEGREES)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RobotCollision:
+    """Two bodies of the robot penetrate each other."""
+
+    name = "collision"
+    unit = "m"
+    reads = ("q", "robot")
+
+    def judge(self, body: Body) -> Judgement:
+        """Measure the distances of pairs that touch or are near; the place ``bodies`` is the nearest pair of all.
+
+        Distances of meshes that do not touch are measured for `MEASURED_FRAMES` frames at most: they cost ten times as
+        much as the verdict. Beyond, and farther than `NEAR_METRES`, the value is infinite.
+        """
+        robot, q = _of(body)
+        if not robot.collision_pairs:
+            raise NotAskedError("the robot has no bodies that can touch (--bodies capsules)")
+        made_up = getattr(robot, "bodies", "") == "capsules" and not body.settings.strict
+        margin = body.settings.contact_margin - (MADE_UP_METRES if made_up else 0.0)
+        known = np.flatnonzero(np.isfinite(q).all(axis=1))
+        shapes = [] if robot.geometry is None else robot.geometry.geometryObjects
+        cheap = len(known) <= MEASURED_FRAMES or all(
+            "BV" not in type(one.geometry).__name__ for one in shapes
+        )
+        found = robot.collisions(q[known], margin=max(margin, NEAR_METRES if cheap else 0.0))
+        pairs, column = np.unique(found.pair[found.distance < margin], return_inverse=True)
+        value = np.full((len(q), len(pairs) + 1), np.nan)
+        value[known] = np.inf
+        np.minimum.at(value[:, -1], known[found.frame], found.distance)
+        touching = found.distance < margin
+        value[known[found.frame[touching]], column] = found.distance[touching]
+        links = dict(zip(robot.body_names, robot.body_links, strict=True))
+        places = ["-".join(links[name] for name in robot.collision_pairs[pair]) for pair in pairs.tolist()]
+        # Pairs that touch are named themselves.
+        value[value[:, -1] < margin, -1] = np.inf
+        return Judgement([*places, "bodies"], value, margin, tolerance=CONTACT_METRES, scale=NEAR_METRES)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reach:
+    """The robot cannot reach the given positions of joints within its limits."""
+
+    name = "reach"
+    unit = "m"
+    reads = ("q", "robot")
+
+    def judge(self, body: Body) -> Judgement:
+        """Measure the distance of each joint of the fitted configuration from where it was given."""
+        if body.residual is None:
+            raise NotAskedError("configurations are given, not positions")
+        given = body.settings.rigid_tolerance
+        upper = MEASURED.rigid if given is None else given
+        return Judgement(JOINTS, body.residual, upper=upper, tolerance=body.noise)
+
+
+@lru_cache(maxsize=4)
+def _soles(robot: Robot) -> tuple[list[int], Array] | None:
+    """Return the joints and places (4, 3) of toes and heels: front and back corners of the boxes around the feet."""
+    if robot.geometry is None:
+        return None
+    import pinocchio as pin
+
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, np.array(robot.neutral))
+    at = robot.points(np.array(robot.neutral)[None])[0]
+    hips, ankles = ([at[JOINT[f"{side}_{name}"]] for side in SIDES] for name in ("hip", "ankle"))
+    down = unit(ankles[0] + ankles[1] - hips[0] - hips[1])
+    forward = unit(cross(down, hips[1] - hips[0]))
+    ends: list[tuple[int, Array]] = []
+    for ankle in ankles:
+        near = FOOT_SHARE * float(np.linalg.norm(hips[0] - ankles[0]))
+        corners = [
+            (body.parentJoint, (data.oMi[body.parentJoint] * body.placement).act(corner))
+            for body in robot.geometry.geometryObjects
+            if np.linalg.norm(data.oMi[body.parentJoint].translation - ankle) < near
+            for corner in _box(body.geometry)
+        ]
+        if not corners:
+            return None
+        deepest = max(float(place @ down) for _, place in corners) - SOLE_METRES
+        sole = sorted(
+            (one for one in corners if one[1] @ down > deepest), key=lambda one: float(one[1] @ forward)
+        )
+        ends += [sole[-1], sole[0]]
+    order = [ends[k] for k in (0, 2, 1, 3)]
+    return [joint for joint, _ in order], np.array([data.oMi[joint].actInv(place) for joint, place in order])
+
+
+def _box(shape: Any) -> Array:
+    """Return the corners (8, 3) of the box around a body, in its own frame."""
+    shape.computeLocalAABB()
+    ends = np.array([np.ravel(shape.aabb_local.min_), np.ravel(shape.aabb_local.max_)])
+    return np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
+
+
+def sole_points(robot: Robot, q: Array) -> Array:
+    """Return toes and heels (N, 4, 3) of configurations, metres: ends of the soles; NaN if the robot has no feet."""
+    points = np.full((len(q), len(FEET_POINTS), 3), np.nan)
+    soles = _soles(robot)
+    if soles is not None:
+        from posekit.robots.kinematics import Kinematics, Site
+
+        sites = [[Site(joint, tuple(place.tolist()), 1.0)] for joint, place in zip(*soles, strict=True)]
+        known = np.asarray(np.isfinite(q).all(axis=1))
+        points[known] = Kinematics(robot.model, sites).positions(q[known])
+    return points

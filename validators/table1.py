@@ -1,0 +1,194 @@
+r"""Joint ranges by the angles of Lee & Chen 1985, §3.2.A: as rotations from standing, or projected as printed.
+
+The torso's frame has x forward, y down and z left. As rotations (kind ``rotation``) nothing jumps where a limb can be:
+
+An upper arm u at :math:`\rho` from y is carried there by one shortest rotation; its part about z is flexion, its part
+about x abduction, :math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)` with :math:`\rho = \arccos u_y`. A
+thigh has the print's flexion :math:`\operatorname{atan2}(u_x, u_y)`, and abduction is the angle out of the plane of
+flexion. Elbow and knee bend about the axis z that the upper segment takes with it: with v the lower segment and
+:math:`\psi` its angle to u, flexion is :math:`\psi\,(v \times u) \cdot z' / \sin\psi`, the opposite at a knee. Pelvis
+and neck: the parts of the rotation of the plane about z, y and x.
+
+As printed (kind ``projected``) flexion and abduction are angles of projections onto the planes of the frame. A
+projection without direction is undecided, and an angle jumps where a limb passes the normal of a plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.geometry import Array, cross, dot, perpendicular, unit, vector_from_rotation
+from posekit.skeleton import JOINT, TORSO
+from posekit.validators.body import Body
+from posekit.validators.check import Judgement
+
+HIP_SIGNS: Final = (1.0, -1.0, 1.0)
+#: Signs of flexion, rotation and bending of a plane, to be the part's own.
+HEAD_SIGNS: Final = (-1.0, 1.0, -1.0)
+
+PLANE_ANGLES: Final = ("flexion", "rotation", "bending")
+
+#: Sines and cosines that are not divided by when smaller.
+LEAST_SINE: Final = 1e-12
+
+#: Angle within which -180 counts as 180, degrees.
+ROUNDING_DEGREES: Final = 1e-3
+
+
+def table1_angles(
+    body: Body, table: Mapping[str, Any], parts: Sequence[str], *, upper_only: bool = False
+) -> Judgement:
+    """Judge parts of postures by a table of kind ``rotation`` or ``projected``."""
+    R = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
+    axes = np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
+    places: list[str] = []
+    columns: dict[str, list[Array]] = {"value": [], "lower": [], "upper": [], "tolerance": []}
+    for part in parts:
+        if part in ("neck", "pelvis"):
+            names, found = table1_plane(body, axes, table, part)
+        else:
+            names, found = table1_limb(body, axes, table, part, upper_only=upper_only)
+        places += names
+        for name, one in zip(columns, found, strict=True):
+            columns[name].append(np.broadcast_to(one, found[0].shape))
+    return Judgement(places, **{name: np.concatenate(one, axis=1) for name, one in columns.items()})
+
+
+#: Value, lower, upper and tolerance (N, K).
+Found = tuple[Array, Array, Array, Array]
+
+
+def table1_plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> tuple[list[str], Found]:
+    """Judge a plane against the torso's (§3.2.A iii and iv): the hips', or the head's, whose normal is its facing."""
+    joints = body.joints
+    if part == "pelvis":
+        pelvis, right, left = (joints[:, JOINT[name]] for name in ("pelvis", "right_hip", "left_hip"))
+        below = (right + left) / 2 - pelvis
+        if body.figure.pelvis_between_hips:
+            below = -hips_frame(pelvis, right, left, joints[:, 0])[..., 2]
+        along = np.einsum("nij,nj->ni", axes, below)
+        normal, signs = unit(cross(along, np.einsum("nij,nj->ni", axes, left - right))), HIP_SIGNS
+    else:
+        R_head = body.figure.ik.head_frame(joints[:, 0], body.head)
+        normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
+        along, signs = -crown, HEAD_SIGNS
+    if table["kind"] == "rotation":
+        down = unit(along)
+        turn = np.degrees(vector_from_rotation(np.stack([normal, down, cross(normal, down)], axis=-1)))
+        value = turn[:, [2, 1, 0]] * [-1.0, -1.0, 1.0]
+    else:
+        least = table.get("shortest_projection", 0.1)
+        value = np.stack(
+            [
+                angle_in_plane(-normal[:, 1], normal[:, 0], least),
+                angle_in_plane(normal[:, 2], normal[:, 0], least),
+                angle_in_plane(along[:, 2], along[:, 1], least * np.linalg.norm(along, axis=1)),
+            ],
+            axis=-1,
+        )
+    lower, upper = np.array([table[part][angle] for angle in PLANE_ANGLES], dtype=np.float64).T
+    tolerance = np.full(value.shape, body.angle_tolerance())
+    return [f"{part}.{angle}" for angle in PLANE_ANGLES], (value * signs, lower, upper, tolerance)
+
+
+def table1_limb(
+    body: Body, axes: Array, table: Mapping[str, Any], part: str, *, upper_only: bool
+) -> tuple[list[str], Found]:
+    """Judge a limb (§3.2.A i and ii); the hip's range is the wide one only if the knee is flexed (Table 1, note a)."""
+    side, ball = part.split("_")
+    hinge, end = ("elbow", "wrist") if ball == "shoulder" else ("knee", "ankle")
+    points = [body.joints[:, JOINT[f"{side}_{name}"]] for name in (ball, hinge, end)]
+    u, v = (np.einsum("nij,nj->ni", axes, b - a) for a, b in ((points[0], points[1]), (points[1], points[2])))
+    joints = [JOINT[f"{side}_{name}"] for name in (ball, hinge, end)]
+    tolerance = body.angle_tolerance((joints[0], joints[1]), (joints[1], joints[2]))
+    value, gain = _ball(u, ball, 1.0 if side == "left" else -1.0, table, tolerance)
+    limits = [table[ball]["flexion"], table[ball]["abduction"]]
+    lower, upper = (np.tile(np.array(limits, dtype=np.float64)[:, k], (len(u), 1)) for k in range(2))
+    places = [f"{part}.flexion", f"{part}.abduction"]
+    if upper_only:
+        return places, (value, lower, upper, tolerance * gain)
+    flexion, hinge_gain = _hinge(u, v, hinge, table, tolerance)
+    ends = np.tile(np.array(table[hinge]["flexion"], dtype=np.float64), (len(u), 1))
+    if ball == "hip":
+        known = ~np.isnan(flexion)
+        if table["kind"] == "projected":
+            share = (flexion > table.get("knee_flexed", 5.0)).astype(np.float64)
+        else:
+            share = np.clip(flexion / max(table.get("knee_flexed", 5.0), ROUNDING_DEGREES), 0.0, 1.0)
+        for k, bound in enumerate((lower, upper)):
+            straight, bent = table["hip"]["flexion_with_straight_knee"][k], table["hip"]["flexion"][k]
+            bound[known, 0] = ((1 - share) * straight + share * bent)[known]
+    found = (
+        np.column_stack([value, flexion]),
+        np.column_stack([lower, ends[:, 0]]),
+        np.column_stack([upper, ends[:, 1]]),
+        tolerance * np.column_stack([gain, hinge_gain]),
+    )
+    return [*places, f"{side}_{hinge}.flexion"], found
+
+
+def _ball(
+    u: Array, joint: str, outward: float, table: Mapping[str, Any], tolerance: float
+) -> tuple[Array, Array]:
+    """Return flexion and abduction (N, 2), degrees, and the multiple of the tolerance that they have."""
+    one = np.ones((len(u), 2))
+    if table["kind"] == "projected":
+        least = table.get("shortest_projection", 0.1) * np.linalg.norm(u, axis=1)
+        across = (u[:, 0], outward * u[:, 2])
+        return np.stack([angle_in_plane(x, u[:, 1], least, tolerance) for x in across], axis=-1), one
+    x, y, z = unit(u).T * np.array([[1.0], [1.0], [outward]])
+    if joint == "shoulder":
+        sine = np.hypot(x, z)
+        rho = np.arctan2(sine, y)
+        raised = np.where(sine > 0, [x, z], [[1.0], [0.0]])  # an arm straight up is flexed by 180
+        gain = np.maximum(rho / np.maximum(sine, LEAST_SINE), 1.0)
+        return np.degrees(rho * raised / np.where(sine > 0, sine, 1.0)).T, one * gain[:, None]
+    across, middle = np.hypot(x, y), sum(table["hip"]["flexion"]) / 2
+    # Flexion is within half a turn of the middle of its range: from above it to below it is beyond both ends alike.
+    flexion = middle + np.mod(np.degrees(np.arctan2(x, y)) - middle + 180.0, 360.0) - 180.0
+    gains = np.stack([1 / np.maximum(across, LEAST_SINE), np.ones_like(across)], axis=-1)
+    return np.stack([flexion, np.degrees(np.arctan2(z, across))], axis=-1), gains
+
+
+def _hinge(u: Array, v: Array, joint: str, table: Mapping[str, Any], tolerance: float) -> tuple[Array, Array]:
+    """Return an elbow's or knee's flexion (N,), degrees, and the multiple of the tolerance that it has."""
+    forward = 1.0 if joint == "elbow" else -1.0
+    if table["kind"] == "projected":
+        w = cross(v, u)
+        size = np.linalg.norm(w, axis=1)
+        bend = np.degrees(np.arctan2(size, dot(u, v)))
+        # An arm held sideways bends its elbow about y: z is zero but for rounding, and zero is flexion.
+        flexion = np.where(forward * w[:, 2] >= -np.radians(tolerance) * size, bend, -bend)
+        return flexion, np.ones(len(flexion))
+    u, v = unit(u), unit(v)
+    x, y, z = u.T
+    if joint == "elbow":
+        # 1 + y, without cancelling near straight up: from there it grows as the square of how far the arm is away.
+        top = np.where(y < 0, (x * x + z * z) / (1 - np.minimum(y, 0.0)), 1 + y)
+        safe = np.maximum(top, LEAST_SINE**2)
+        axis = np.stack([-x * z / safe, -z, 1 - z * z / safe], axis=-1)
+        carried = np.sqrt((1 - y) / safe)
+    else:
+        axis = -unit(perpendicular(np.broadcast_to([0.0, 0.0, 1.0], u.shape), u))
+        carried = np.abs(z) / np.maximum(np.hypot(x, y), LEAST_SINE)
+    w = cross(v, u)
+    sine = np.linalg.norm(w, axis=1)
+    rate = np.where(sine > LEAST_SINE, np.arctan2(sine, dot(u, v)) / np.maximum(sine, LEAST_SINE), 1.0)
+    part = dot(w, axis)
+    beside = np.sqrt(np.maximum(sine * sine - part * part, 0.0))
+    gain = 1 + (rate - 1) * beside / np.maximum(sine, LEAST_SINE) + rate * beside * carried
+    return np.degrees(rate * part), gain
+
+
+def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING_DEGREES) -> Array:
+    """Return the angle from the y axis towards x, degrees; NaN where the projection (x, y) is too short.
+
+    It is in (-180, 180] and up to the tolerance beyond: an arm straight up is flexed by 180, on either side of it.
+    """
+    angle = np.degrees(np.arctan2(x, y))
+    angle = np.where(angle < max(tolerance, ROUNDING_DEGREES) - 180, angle + 360, angle)
+    return np.where(np.hypot(x, y) < shortest, np.nan, angle)
