@@ -1,136 +1,182 @@
-"""The probability of each survivor: how well it fits the picture, times how likely such a posture is."""
+"""The probability of each survivor: its fit to the picture times how usual such a posture is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Protocol
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from posekit.errors import InputError
-from posekit.geometry import Array
-from posekit.ranking.evidence import RankingEvidence, numbers
-from posekit.ranking.log_terms import log_terms
-from posekit.ranking.posture_prior import OF_POSTURES, TERM_NAMES, Prior
-from posekit.ranking.prior_file import load_prior
-from posekit.ranking.ranking import Ranking, softmax
-from posekit.safe_io import nearest
+from posekit.geometry import Array, Record, dot, read_only, unit
+from posekit.ranking.directions import directions, log_room
+from posekit.ranking.prior import Prior, digamma, load_prior
+from posekit.ranking.standing import standing
+from posekit.skeleton import RIGID_SEGMENTS
+
+#: Standard deviation of the tilt of a camera that is assumed to be level.
+LEVEL_WITHIN_DEGREES: Final = 20.0
+
+#: Degrees of freedom of a misfit's t distribution: torsos give now and then by more than they mostly do.
+MISFIT_DEGREES_OF_FREEDOM: Final = 4.0
+
+#: Least deviation of a distance inside torso and hips: a real torso is no more rigid (CMU motion capture).
+MIN_DEVIATION_METRES: Final = 0.006
+
+#: Tolerance of rigid distances over the deviation of the survivors, as the weights were fitted.
+PER_TOLERANCE: Final = 2.2
+
+#: Distances from ankles to centre of mass, and between ankles: a wrong `up` moves one beside the other by as much.
+CENTRE_OF_MASS_HEIGHT_METRES, STANCE_WIDTH_METRES = 0.9, 0.4
 
 
-class Term(Protocol):
-    """A term of one's own: postures (N, 14, 3) to a log-density each (N,)."""
-
-    def __call__(self, joints: Array, /) -> ArrayLike:
-        """Return the log-density of each posture, NaN where it says nothing."""
-        ...
-
-
-def rank(
-    evidence: RankingEvidence,
-    *,
-    extra: Mapping[str, ArrayLike | Term] | None = None,
-    without: Iterable[str] = (),
-    prior: Prior | None = None,
-) -> Ranking:
-    r"""Give every survivor a probability.
-
-    .. math::
-
-        p_i = \frac{e^{\sum_t w_t f_t(i)}}{\sum_j e^{\sum_t w_t f_t(j)}}
-
-    over the survivors j of the same frame, with the log terms f and weights w of the prior: ``image``, ``posture`` (the
-    directions of segments in the torso's frame), ``gravity`` (which way is up, given the posture), ``balance`` (centre
-    of mass over the feet), ``contact`` (feet on one level) and ``depth``. Each but `chi2` is counted from its average
-    over true postures, so that what is not known is neither for nor against a survivor.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Up(Record):
+    """The direction against gravity.
 
     Parameters
     ----------
-    evidence : RankingEvidence
-        The survivors of any number of frames, and what is known of them: see `RankingEvidence.of`.
-    extra : mapping, optional
-        Terms from outside: a name to log-densities (N,), or to a function of the joints that returns them. Unknown ones
-        (NaN) count as their frame's mean.
-    without : iterable of str
-        Terms to leave out, by name.
+    direction : array (3,)
+        Unit vector in the frame of the postures (x right, y down, z forward). A level camera by default.
+    deviation : float
+        Its standard deviation, degrees.
+    source : str
+        Where it comes from, as a result states it.
+    """
+
+    direction: Array
+    deviation: float = 0.0
+    source: str = "known"
+
+    def __post_init__(self) -> None:
+        self._set("direction", read_only(unit(np.asarray(self.direction, dtype=np.float64))))
+
+    @staticmethod
+    def level() -> Up:
+        """Assume that the camera is held level: up is against the image's y."""
+        source = f"assumed: a level camera, within {LEVEL_WITHIN_DEGREES:g} degrees"
+        return Up(direction=np.array([0.0, -1.0, 0.0]), deviation=LEVEL_WITHIN_DEGREES, source=source)
+
+
+def deviation_of_tolerance(rigid: float) -> float:
+    """Return the deviation (m) of survivors of a tree that allowed rigid distances to differ by `rigid` metres."""
+    return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
+
+
+def log_terms(
+    joints: Array,
+    *,
+    deviation: float = 0.0,
+    chi2: Array | None = None,
+    log_volume: Array | None = None,
+    lengths: Array | None = None,
+    length_residual: Array | None = None,
+    up: Up | None = None,
+    prior: Prior | None = None,
+) -> dict[str, Array]:
+    """Return the weighted log terms (N,) of postures, by name; their sum is the log of an unnormalised probability.
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3)
+        Camera frame, metres; NaN where a joint is not known.
+    deviation : float
+        Deviation of the joints of exact postures, metres.
+    chi2 : array (N,), optional
+        Misfit of modes under noise. Without it the four rigid distances are judged.
+    log_volume : array (N,), optional
+        Half the log determinant of the covariance of each mode: the volume of the postures that it stands for.
+    lengths : array (17,), optional
+        Segment lengths in the order of `posekit.skeleton.SEGMENTS`, metres, for exact postures.
+    length_residual : array (N,), optional
+        Shortfall of the worst segment against its image, metres.
+    up : Up, optional
+        Without it gravity, balance and contact say nothing.
     prior : Prior, optional
-        The built-in one if not given.
+        The built-in one by default.
+
+    Notes
+    -----
+    The terms are ``image``, ``posture`` (directions of segments in the torso's frame), ``gravity`` (up given the
+    posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and ``foreshortening``. Each
+    but chi2 is counted from its average over true postures, so that an unknown one is neither for nor against.
+    """
+    prior = prior or load_prior()
+    direction = None if up is None else up.direction
+    sine = 0.0 if up is None else math.sin(math.radians(up.deviation))
+    posture, gravity = prior.judge(directions(joints, direction), sine)
+    terms = {"posture": posture, "gravity": gravity, "foreshortening": log_room(joints)}
+    if direction is not None:
+        beside, apart = standing(joints, direction)
+        for name, distance, (scale, usual), arm in (
+            ("balance", beside, prior.balance, CENTRE_OF_MASS_HEIGHT_METRES),
+            ("contact", apart, prior.contact, STANCE_WIDTH_METRES),
+        ):
+            value = usual - np.log1p(distance**2 / (scale**2 + (arm * sine) ** 2))
+            terms[name] = np.nan_to_num(value)
+    if chi2 is not None:
+        terms["image"] = -0.5 * chi2
+        terms["volume"] = np.zeros(len(joints)) if log_volume is None else log_volume
+        return {name: prior.noisy[name] * values for name, values in terms.items()}
+    if lengths is not None:
+        terms["image"] = _misfit(joints, lengths, length_residual, deviation)
+    cool = 1.0 / (1.0 + deviation / prior.temperature)
+    cooled = {"posture", "gravity"}
+    return {n: prior.weights[n] * (cool if n in cooled else 1.0) * v for n, v in terms.items()}
+
+
+def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: float) -> Array:
+    """Return the log-density (N,) of the rigid distances and of the shortfall, above its average."""
+    start, end = np.array(RIGID_SEGMENTS).T
+    apart = joints[:, end] - joints[:, start]
+    off = np.sqrt(dot(apart, apart)) - lengths[-len(RIGID_SEGMENTS) :]
+    if residual is not None:
+        off = np.concatenate([off, residual[:, None]], axis=1)
+    nu = MISFIT_DEGREES_OF_FREEDOM
+    power = (nu + 1) / 2
+    squared = (off / max(deviation, MIN_DEVIATION_METRES)) ** 2
+    each = power * (digamma(power) - digamma(nu / 2)) - power * np.log1p(squared / nu)
+    return np.asarray(np.nan_to_num(each).sum(axis=1))
+
+
+def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
+    """Return probabilities (N,) in proportion to the exponential of scores, within each frame (N,) from 0.
+
+    If all scores of a frame are minus infinity its members are equally probable.
+    """
+    if not len(score):
+        return np.empty(0)
+    highest = np.full(int(frame.max()) + 1, -np.inf)
+    np.maximum.at(highest, frame, score)
+    least = np.where(np.isfinite(highest), highest, 0.0)[frame]
+    weight = np.exp(np.where(np.isfinite(highest)[frame], score - least, 0.0))
+    return np.asarray(weight / np.bincount(frame, weight, len(highest))[frame])
+
+
+def rank(
+    joints: Array, frame: NDArray[np.intp], terms: Mapping[str, Array] | None = None, **evidence: object
+) -> Array:
+    r"""Give every posture a probability within its frame.
+
+    .. math:: p_i = e^{\sum_t w_t f_t(i)} / \sum_j e^{\sum_t w_t f_t(j)}
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3)
+        Camera frame, metres.
+    frame : int array (N,)
+        Frame of each.
+    terms : mapping of str to array (N,), optional
+        Further log terms.
+    **evidence
+        Parameters of `log_terms`.
 
     Returns
     -------
-    Ranking
-
-    Raises
-    ------
-    InputError
-        Where a term has a wrong shape or is infinite, or a name is unknown.
-
-    Examples
-    --------
-    >>> import posekit
-    >>> from posekit.ranking import RankingEvidence, Up, rank
-    >>> recovery = posekit.recover(posekit.builtin_view("seq1"))
-    >>> frame = recovery.frames[0]
-    >>> evidence = RankingEvidence.of(
-    ...     frame.joints, recovery.figure.lengths, length_residual=frame.length_residual, up=Up.level()
-    ... )
-    >>> ranking = rank(evidence)
-    >>> round(float(ranking.probability.sum()), 9), len(ranking.order) == len(frame)
-    (1.0, True)
+    array (N,)
+        They sum to one over a frame.
     """
-    added = dict(extra or {})
-    left_out = _left_out(without, added)
-    prior = prior or load_prior()
-    terms = log_terms(evidence, [name for name in TERM_NAMES if name not in left_out], prior)
-    # After a refinement chi2 says how well the image fits, and terms have weights of their own.
-    refined = evidence.chi2 is not None
-    if refined and "image" in terms:
-        terms["image"] = _least_where_unknown(terms["image"], evidence.frame)
-    weights = prior.weights_of(refined)
-    coolness = 1.0 / (1.0 + (evidence.deviation / prior.image_temperature) ** 2)
-    for name in terms:
-        terms[name] *= weights[name]
-        if refined and name not in OF_POSTURES:
-            terms[name] *= coolness[evidence.frame]
-    for name, term in added.items():
-        if name not in left_out:
-            terms[name] = _added(name, term, evidence)
-    score = np.sum(list(terms.values()), axis=0) if terms else np.zeros(len(evidence.joints))
-    return Ranking(
-        probability=softmax(score, evidence.frame),
-        frame=evidence.frame,
-        terms=terms,
-        up="" if evidence.up is None else evidence.up.says,
-    )
-
-
-def _left_out(without: Iterable[str], added: Mapping[str, object]) -> set[str]:
-    names = {without} if isinstance(without, str) else set(without)
-    for name in added:
-        if name in TERM_NAMES:
-            raise InputError(f"{name!r} is a term already; expected another name for one of your own")
-    for name in sorted(names):
-        if name not in (*TERM_NAMES, *added):
-            raise InputError(f"{name!r} is no term to leave out; {nearest(name, (*TERM_NAMES, *added))}")
-    return names
-
-
-def _added(name: str, term: ArrayLike | Term, evidence: RankingEvidence) -> Array:
-    """Return a term from outside, with its frame's mean where it is not known; 0 where none of its frame is."""
-    values = numbers(name, term(evidence.joints) if callable(term) else term, (len(evidence.joints),))
-    if (values == np.inf).any():
-        raise InputError(f"{name}: an infinite log-density; expected numbers, minus infinity or NaN")
-    known = np.isfinite(values)
-    count = np.bincount(evidence.frame[known], minlength=len(evidence.deviation))
-    total = np.bincount(evidence.frame[known], weights=values[known], minlength=len(evidence.deviation))
-    return np.where(np.isnan(values), (total / np.maximum(count, 1))[evidence.frame], values)
-
-
-def _least_where_unknown(values: Array, frame: NDArray[np.intp]) -> Array:
-    """Give what is NaN the least of its frame; 0 where all of a frame are."""
-    unknown = np.isnan(values)
-    if not unknown.any():
-        return values
-    least = np.full(int(frame.max()) + 1, np.inf)
-    np.minimum.at(least, frame[~unknown], values[~unknown])
-    return np.where(unknown, np.where(np.isposinf(least), 0.0, least)[frame], values)
+    found = {**log_terms(joints, **evidence), **(terms or {})}  # type: ignore[arg-type]
+    return softmax(np.sum(list(found.values()), axis=0), frame)

@@ -1,57 +1,73 @@
-"""One view in, every physically possible posture out: root, tree, refine, certify, rank, answer."""
+"""One view in, every physically possible posture out: root, tree or solver, certify, rank, answer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from functools import cache, cached_property
+from importlib.metadata import version
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, LengthUncertainty, load_figure
-from posekit.errors import InputError
-from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
-from posekit.formats.own.camera_model import camera_fields
-from posekit.formats.own.units import PER_METRE
-from posekit.ranking import Up
-from posekit.recovery.body import FigureBody, LiftedBody, loaded
-from posekit.recovery.camera_record import CameraRecords
-from posekit.recovery.fit_camera import CameraFit, fit_camera
-from posekit.recovery.grower import Grower
-from posekit.recovery.judged import record_of
-from posekit.recovery.noise import Noise
-from posekit.recovery.observed import lost_to, trunkless, with_reasons
-from posekit.recovery.person import FEWEST_CLIP_FRAMES, body_of, refuse_settings, uncertainty_of
-from posekit.recovery.ranked import up_of
-from posekit.recovery.recovery import FrameRecovery, Recovery
-from posekit.recovery.rooting import tolerance_of
-from posekit.recovery.trees import FrameTrees, trees_of
-from posekit.settings import (
-    EXACT_TOLERANCE,
-    MEASURED_TOLERANCE,
-    PHOTOGRAPH_TOLERANCE,
-    Judged,
-    RecoverSettings,
-    Tolerance,
+from posekit.body import Figure, LengthUncertainty
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
+from posekit.errors import refusal
+from posekit.geometry import Array
+from posekit.ranking import Up, deviation_of_tolerance, log_terms, softmax
+from posekit.recovery.answer import answer_of, joint_radius
+from posekit.recovery.certify import (
+    Certificate,
+    Certifier,
+    group_of,
+    noisy_contact,
+    noisy_tolerance,
+    solver_limits,
 )
+from posekit.recovery.gather import Found, gathered
+from posekit.recovery.person import person_of, sided, uncertainty_of
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.scales import figure_linkage
+from posekit.recovery.sight import SHARP_PIXELS, Sight, sight_of
+from posekit.settings import EXACT, MEASURED, PHOTOGRAPH, RecoverSettings, Tolerance
+from posekit.skeleton import HEAD_POINTS, JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
+from posekit.solver import Limits, Modes, Problem, solve
+from posekit.tree import Trees, grow
 
-if TYPE_CHECKING:
-    from posekit.objects.nearer_ends import NearerEnds
-    from posekit.recovery.refiner import Refiner
+#: Frames that are recovered together, under noise and where points may be exact: enough to spread NumPy's overhead. The
+#: result does not depend on them.
+FRAMES_AT_ONCE, EXACT_FRAMES_AT_ONCE = 64, 512
 
-FRAMES_AT_ONCE = 2000
-"""Frames grown together: enough to spread NumPy's overhead and to keep all cores busy."""
+#: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
+MANY: Final = 3000
 
-LEAST_DOUBTS, DOUBTED_SHARE = 3, 0.15
-"""Frames, and what share of them, that come back empty with lengths at their word before none is taken so.
+#: Largest chi2 of the best mode of exact points, with `SHARP_PIXELS`: noise of a pixel leaves some 30.
+EXACT_CHI2: Final = 0.05
 
-Of real motion and lengths that are right some 3 % of frames do, with 3 % off each 46 % (docs, "How long a person's
-segments are").
-"""
+#: Factor on the deviations of image points, relative deviation added to lengths, and largest chi2 of the solve that
+#: finds why a frame is empty.
+LOOSE_TIMES, LOOSE_LENGTHS, LOOSE_CHI2 = 20.0, 0.1, 1e3
 
-OPEN_HYPOTHESES_AT_ONCE = 250
-"""Hypotheses grown together where depth or scale is open: each may have thousands of leaves."""
+#: Standard deviations from which a residual explains an empty frame, and residuals that are named.
+NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
+
+#: Rejected leaves of a frame in which nothing is grown.
+LOST: Final = {"root/not_known": 8192}
+
+#: Difference in depth below which neither end of a segment is nearer.
+LEVEL_METRES: Final = 1e-6
+
+
+class Chosen(NamedTuple):
+    """Rows of the survivors of one frame that are listed, the likeliest first, and what is left out."""
+
+    rows: NDArray[np.intp]
+    probability: Array
+    rejected: Counter[str]
+    unlisted: int
+    unlisted_probability: float
 
 
 def recover(
@@ -64,353 +80,425 @@ def recover(
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
 
+    The result of a frame depends on that frame alone, unless `RecoverSettings.clip_lengths` asks for one set of lengths
+    from all frames.
+
     Parameters
     ----------
     view : View
-        What was seen.
     settings : RecoverSettings, optional
-        What is asked; the usual if not given.
     figure : Figure, optional
-        The built-in one if not given; the view's own lengths, stature and head points are applied to it.
+        The built-in one by default; the view's own lengths, stature and head points are applied to it.
     progress : callable, optional
         Called with the number of frames done since the last call.
     **changes
-        Single settings that are other than those, by the names of the fields of `RecoverSettings`, as
-        ``ranges="table1"``.
-
-    Returns
-    -------
-    Recovery
-
-    Raises
-    ------
-    PosekitError
-        Where the view cannot be what it says: no neck in any frame, a segment too short for its image.
-
-    Examples
-    --------
-    >>> import posekit
-    >>> recovery = posekit.recover(posekit.builtin_view("seq1"), contact_margin=0.01)
-    >>> len(recovery.frames)
-    5
-    """
-    asked = loaded((settings or RecoverSettings()).changed(**changes))
-    refuse_settings(view, asked)
-    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-    tolerance = asked.tolerance_for(PHOTOGRAPH_TOLERANCE if uncalibrated else MEASURED_TOLERANCE)
-
-    # Root: whose body it is, where the camera sees it, and where the tree grows from.
-    body = body_of(view, figure or load_figure(), asked.proportions)
-    bare = trunkless(view, body)
-    lengths = uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
-    noise = _noise(view, body, asked, lengths)
-    photographs = uncalibrated and noise is not None
-    fit = _fit(view, body, asked, tolerance, lengths, refuse=not photographs)
-    fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
-
-    # Tree and refinement: as exact where that may be, then lengths at their word, then as uncertain as they are.
-    at_their_word = noise is None or _lengths_may_be_right(
-        view, asked, own_figure=photographs or figure is not None
-    )
-    asked_trunks = noise is None or photographs
-    grower = Grower(view=view, fit=fit, body=body, settings=asked, nearer=_nearer(asked, body, len(view)))
-    refiner: Refiner | None = None
-    trees: dict[int, FrameTrees] = {}
-    for part in _parts(fit):
-        inexact = part
-        if tolerance is None and len(rows := grower.closing(part)):
-            batch = grower.grow(rows, EXACT_TOLERANCE, "exact")
-            trees |= trees_of(batch, fit, rows)
-            inexact = part[~np.isin(fit.frame[part], fit.frame[rows[batch.exact]])]
-        uncertain = _distinct(fit.frame[inexact])
-        if at_their_word and not asked_trunks and len(uncertain):
-            at_their_word, asked_trunks = _lengths_fit(view, fit, body), True
-        if at_their_word:
-            for rows, allowed, judged in _by_tolerance(fit, inexact, tolerance):
-                batch = grower.grow(rows, allowed, judged)
-                trees |= trees_of(batch, fit, rows)
-                # Frames in which nothing is left may have hips that are off by as much as the rest.
-                lost = rows[~np.isin(fit.frame[rows], fit.frame[rows[batch.leaves.frame]])]
-                if allowed.hips < 1 and judged != "given" and len(lost):
-                    trees |= trees_of(grower.grow(lost, replace(allowed, hips=1.0), judged), fit, lost)
-            empty = np.array([not trees[k].survivors for k in uncertain.tolist()], dtype=np.bool_)
-            if empty.sum() < max(LEAST_DOUBTS, DOUBTED_SHARE * len(uncertain)):
-                uncertain = uncertain[empty]
-        if noise is not None and not photographs and len(uncertain):
-            refiner = refiner or _refiner(grower, noise, most=_share(uncertain, fit.frame[part]) > 0.5)
-            trees |= _refined(refiner, uncertain, trees)
-        if progress is not None:
-            progress(len(_distinct(fit.frame[part])))
-    if refiner is not None:
-        noise, grower, body = refiner.noise, refiner.grower, refiner.grower.body
-        trees |= _found_again(refiner, fit)
-    if photographs and noise is not None:
-        # Seen with noise, or nothing is left by tolerances: a body of other lengths, or not all of a trunk is seen.
-        undecided = np.array(
-            [k for k in range(len(view)) if k not in trees or trees[k].undecided], dtype=np.intp
-        )
-        if len(undecided):
-            trees |= _refiner(grower, noise).grow(undecided)
-
-    # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
-    frames = _frames(view, trees, fit, asked.group, bare)
-    _refuse_impossible(frames)
-    up = up_of(view.camera)
-    record = {**_record(asked, tolerance, body, frames, noise, up), **_told(view, refiner, trees)}
-    return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
-
-
-def _refined(
-    refiner: Refiner, frames: NDArray[np.intp], trees: Mapping[int, FrameTrees]
-) -> dict[int, FrameTrees]:
-    """Refine some frames; those of which nothing is left once more, where nobody says how well lengths are known.
-
-    Of a detector's points, outliers are taken for not seen.
-    """
-    view, asked = refiner.grower.view, refiner.grower.settings
-    if view.derived:
-        from posekit.recovery.outliers import grow_trusted
-
-        found = grow_trusted(refiner, frames)
-    else:
-        found = refiner.grow(frames)
-    said = asked.length_deviation is not None or view.length_deviation is not None
-    lost = np.array([k for k in frames.tolist() if not found[k].survivors], dtype=np.intp)
-    if len(lost) and not said:
-        found |= {k: one for k, one in refiner.less_sure().grow(lost).items() if one.survivors}
-    # Survivors without a place for what was not seen are still more than none.
-    return {k: one for k, one in found.items() if one.survivors or not _grown(trees.get(k))}
-
-
-def _frames(
-    view: View,
-    trees: Mapping[int, FrameTrees],
-    fit: CameraFit,
-    group: float | None,
-    bare: NDArray[np.bool_],
-) -> list[FrameRecovery]:
-    """Say what is left of each frame; `bare` (F,) is whether it shows too little of a trunk."""
-    frames = []
-    cameras = CameraRecords(view=view, fit=fit)
-    for k, time in enumerate(view.time.tolist()):
-        one = trees.get(k) or FrameTrees(batch=None, index=0, hypotheses=1, fit=fit)
-        frames.append(
-            FrameRecovery(
-                time=time,
-                batch=one.batch,
-                index=one.index,
-                hypotheses=one.hypotheses,
-                family=None if one.fit.families is None else one.fit.families[k],
-                placement=None if one.fit.placements is None else one.fit.placements[k],
-                reason=one.fit.reasons[k],
-                lost_to=lost_to(view, k, without_trunk=bool(bare[k])),
-                group_within=group,
-                number=k,
-                cameras=cameras,
-                unlisted=one.unlisted,
-                unlisted_probability=one.unlisted_probability,
-                made_of=one.posture_set,
-            )
-        )
-    return frames
-
-
-def _record(
-    asked: RecoverSettings,
-    tolerance: Tolerance | None,
-    body: LiftedBody,
-    frames: Sequence[FrameRecovery],
-    noise: Noise | None,
-    up: Up,
-) -> dict[str, Any]:
-    """Gather what decided the result; the noise of photographs only where one was refined with it."""
-    photographs = any(frame.family is not None for frame in frames)
-    unused = photographs and all(frame.judged != "refined" for frame in frames)
-    record = record_of(
-        asked,
-        tolerance,
-        body.figure,
-        [(frame.judged, frame.tolerance) for frame in frames],
-        None if noise is None or unused else noise.document(),
-        up,
-    )
-    return record | {"contact_margin": record["contact_margin"] + body.overlap}
-
-
-def _told(view: View, refiner: Refiner | None, trees: Mapping[int, FrameTrees]) -> dict[str, Any]:
-    """Return what results say of the camera, the one body of a clip, and the points that were not believed."""
-    found = {str(k): list(one.outliers) for k, one in sorted(trees.items()) if one.outliers}
-    said: dict[str, Any] = {"outliers": found} if found else {}
-    if isinstance(view.camera, OpenCVModel):
-        said["camera"] = camera_fields(view.camera, "m")
-    return said if refiner is None or refiner.clip is None else said | {"one_body": refiner.clip.document()}
-
-
-def _share(some: NDArray[np.intp], frames: NDArray[np.intp]) -> float:
-    """Return which share of different frames some are."""
-    return len(some) / max(len(_distinct(frames)), 1)
-
-
-def _found_again(refiner: Refiner, fit: CameraFit) -> dict[int, FrameTrees]:
-    """Grow frames whose necks could not be placed, but can by the lengths that were found, or without an outlier."""
-    found = [k for k, why in enumerate(fit.reasons) if why and not refiner.fit.reasons[k]]
-    trees = refiner.grow(np.array(found, dtype=np.intp)) if found and refiner.clip is not None else {}
-    view = refiner.grower.view
-    nowhere = [k for k, why in enumerate(refiner.fit.reasons) if why and np.isfinite(view.image[k, 0, 0])]
-    if view.derived and nowhere:
-        from posekit.recovery.outliers import grow_trusted
-
-        again = grow_trusted(refiner, np.array(nowhere, dtype=np.intp))
-        trees |= {k: one for k, one in again.items() if one.survivors}
-    return trees
-
-
-def _distinct(frames: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the numbers of frames, each once: asked for values alone, NumPy would load masked arrays first."""
-    return np.unique(frames, return_index=True)[0]
-
-
-def _fit(
-    view: View,
-    body: LiftedBody,
-    asked: RecoverSettings,
-    tolerance: Tolerance | None,
-    lengths: LengthUncertainty,
-    *,
-    refuse: bool,
-) -> CameraFit:
-    """Find the camera, and where it sees the root."""
-    if not isinstance(view.camera, ScaledOrthographicModel):
-        return fit_camera(view, body.figure, asked.rooting, tolerance, lengths)
-    from posekit.recovery.fit_scale import fit_scale
-
-    return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance, refuse=refuse)
-
-
-def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: LengthUncertainty) -> Noise | None:
-    """Say what noise frames are refined with; None where they are not.
+        Fields of `RecoverSettings` that differ from `settings`.
 
     Raises
     ------
     InputError
-        Where refinement is asked for that the view or a tolerance forbids, or a deviation that nothing would heed.
+        If a setting has no meaning for such a view, or the view contradicts itself.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> from posekit.recovery.conductor import recover
+    >>> len(recover(posekit.builtin_view("seq1"), contact_margin=0.01))
+    5
     """
-    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-    able = isinstance(view.camera, OpenCVModel) and isinstance(body, FigureBody)
-    if uncalibrated and (isinstance(body, FigureBody) or asked.nearer is None):
-        from posekit.recovery.photograph import is_photograph, photograph_noise
+    settings = (settings or RecoverSettings()).changed(**changes)
+    person = person_of(view, settings, figure)
+    lengths = uncertainty_of(view, settings, own_figure=figure is not None)
+    conductor = _Conductor(view, settings, person, lengths)
+    found: list[Found] = []
+    block = EXACT_FRAMES_AT_ONCE if conductor.sight.may_be_exact else FRAMES_AT_ONCE
+    for start in range(0, len(view), block):
+        part = np.arange(start, min(start + block, len(view)))
+        found += conductor.frames(part)
+        if progress is not None:
+            progress(len(part))
+    recovery = gathered(view, conductor.sight, person, found, conductor.document(), conductor.tolerances())
+    if settings.clip_lengths and len(recovery.survivors):
+        measured = _clip_lengths(recovery)
+        whole = replace(view, lengths=measured, stature=None, length_deviation=CLIP_DEVIATION)
+        again = settings.changed(clip_lengths=False, stature=None, length_deviation=None, follow=0)
+        recovery = recover(whole, again, figure=figure)
+        recovery = replace(recovery, settings={**recovery.settings, "clip_lengths": True})
+    if settings.follow:
+        from importlib import import_module
 
-        able = is_photograph(view, asked)
-    if asked.refine and not able:
-        raise InputError("--refine: only views of an opencv camera, or of none, are refined; leave it out")
-    if asked.refine and asked.tolerance is not None:
-        raise InputError("--refine: the noise says what is tolerated; leave out the tolerances, or --refine")
-    if asked.refine is False or not able or asked.tolerance is not None:
-        if asked.length_deviation:
-            raise InputError("--length-deviation: nothing is refined here; leave it out")
-        return None
-    if uncalibrated:
-        return photograph_noise(view, asked, lengths)
-    return Noise.of(view, asked.rooting.deviation, lengths, asked=asked.refine)
-
-
-def _lengths_may_be_right(view: View, asked: RecoverSettings, *, own_figure: bool) -> bool:
-    """Tell whether frames are first grown with lengths at their word: a person's, of points that nobody calls noisy."""
-    noisy = bool(view.derived) or view.deviation is not None or asked.rooting.deviation is not None
-    said = asked.length_deviation if asked.length_deviation is not None else view.length_deviation
-    return (own_figure or bool(view.lengths)) and not noisy and not said and not asked.refine
-
-
-def _lengths_fit(view: View, fit: CameraFit, body: LiftedBody) -> bool:
-    """Ask torsos and hips; where all frames are exact, what that needs is not even loaded."""
-    from posekit.recovery.length_evidence import lengths_fit
-
-    return lengths_fit(view, fit, body.figure)
+        # Following is a layer above this one; it is loaded only if a path is wanted.
+        recovery = import_module("posekit.following").follow(recovery, paths=settings.follow)
+    return recovery
 
 
-def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds | None:
-    """Read the flips that were given by hand for a number of frames."""
-    if asked.nearer is None:
-        return None
-    from posekit.objects.nearer_ends import NearerEnds
-
-    return NearerEnds.of(asked.nearer, body.linkage, count)
+#: Relative deviation of lengths that were estimated from the frames of a clip.
+CLIP_DEVIATION: Final = 0.02
 
 
-def _refiner(grower: Grower, noise: Noise, *, most: bool = False) -> Refiner:
-    """Make what grows frames as their noise demands; where all are exact, what that needs is not even loaded.
-
-    Where `most` frames are not, one body is found for all of them first, if they are enough.
-    """
-    if isinstance(grower.view.camera, ScaledOrthographicModel):
-        from posekit.recovery.photograph import PhotographRefiner
-
-        return PhotographRefiner.of(grower, noise)
-    from posekit.recovery.refiner import Refiner
-
-    clip = None
-    if most and len(grower.view) >= FEWEST_CLIP_FRAMES and not noise.lengths.exact:
-        from posekit.recovery.clip_body import body_of_clip, with_body
-
-        clip = body_of_clip(grower, noise)
-        if clip is not None:
-            grower, noise = with_body(grower, clip), replace(noise, lengths=clip.varying)
-    return Refiner(grower=grower, noise=noise, clip=clip)
+def _clip_lengths(recovery: Recovery) -> dict[str, float]:
+    """Return the lengths of one person over all frames: medians of the probability-weighted means of each frame."""
+    table = recovery.survivors
+    start, end = np.array(SEGMENTS).T
+    each = np.linalg.norm(table.joints[:, start] - table.joints[:, end], axis=2)
+    weight = np.asarray(table.probability)[:, None]
+    count = len(recovery)
+    sums = np.stack([np.bincount(table.frame, weight[:, 0] * one, count) for one in each.T], axis=1)
+    total = np.bincount(table.frame, weight[:, 0], count)
+    means = sums[total > 0] / total[total > 0, None]
+    return dict(zip(SEGMENT_NAMES, np.median(means, axis=0).tolist(), strict=True))
 
 
-def _by_tolerance(
-    fit: CameraFit, rows: NDArray[np.intp], given: Tolerance | None
-) -> Iterator[tuple[NDArray[np.intp], Tolerance, Judged]]:
-    """Yield hypotheses with what they are judged with, and as what: what is given, else what the view allows."""
-    if given is not None:
-        yield rows, given, "given"
-    elif fit.families is not None and len(rows):
-        yield rows, PHOTOGRAPH_TOLERANCE, "photograph"
-    elif fit.placements is None and len(rows):
-        yield rows, MEASURED_TOLERANCE, "measured"
-    elif fit.placements is not None:
-        by_frame: list[tuple[Tolerance, Judged]] = [
-            (tolerance_of(one), "noisy")
-            if one is not None and len(one.necks)
-            else (MEASURED_TOLERANCE, "measured")
-            for one in fit.placements
-        ]
-        allowed = [by_frame[k] for k in fit.frame[rows].tolist()]
-        for one in dict.fromkeys(allowed):
-            yield rows[[each == one for each in allowed]], *one
+class _Conductor:
+    """What is the same for all frames of a view: person, noise, checks, and the way up."""
 
-
-def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
-    """Yield hypotheses that are grown together: whole frames, whose root is known."""
-    usable = np.flatnonzero(np.array([not reason for reason in fit.reasons], dtype=np.bool_)[fit.frame])
-    if not len(usable):
-        return
-    frames = fit.frame[usable]
-    first = np.flatnonzero(np.diff(frames, prepend=-1)).tolist()
-    most = FRAMES_AT_ONCE if fit.families is None and fit.placements is None else OPEN_HYPOTHESES_AT_ONCE
-    start = 0
-    for k in range(1, len(first) + 1):
-        end = first[k] if k < len(first) else len(usable)
-        following = first[k + 1] if k + 1 < len(first) else len(usable)
-        if k == len(first) or following - start > most:
-            yield usable[start:end]
-            start = end
-
-
-def _grown(trees: FrameTrees | None) -> bool:
-    """Whether anything survives in a frame's trees."""
-    return trees is not None and trees.rows.stop > trees.rows.start
-
-
-def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:
-    """Refuse a view in which no frame has a posture because a segment is too short for its image."""
-    if any(len(frame) for frame in frames):
-        return
-    for k, frame in enumerate(frames):
-        short = frame.too_short()
-        if short is not None:
-            segment, missing = short
-            raise InputError(
-                f"frames[{k}]: the segment {segment} is at least {missing * 100:.3g} cm too short for its image; "
-                "correct its length or its image points, or give a larger --tangent-tolerance"
+    def __init__(
+        self, view: View, settings: RecoverSettings, person: Figure, lengths: LengthUncertainty
+    ) -> None:
+        self.view, self.settings, self.person = view, settings, person
+        self.sight: Sight = sight_of(view, person, settings, lengths)
+        self.photograph = isinstance(view.camera, ScaledOrthographicCamera)
+        self.lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
+        self.given = settings.tolerance(PHOTOGRAPH if self.photograph else MEASURED)
+        if self.given is not None and settings.refine:
+            raise refusal("", "refine", "tolerances beside it", "one of them", "leave the tolerances out")
+        self.up = _up_of(view)
+        hands = [settings.nearer] if isinstance(settings.nearer, Mapping) else list(settings.nearer or [])
+        if len(hands) not in (0, 1, len(view)):
+            raise refusal(
+                "", "nearer", f"{len(hands)} frames", f"{len(view)}, or one for all", "give one a frame"
             )
+        flips = np.zeros((1, len(SEGMENTS)), dtype=np.int8)
+        if hands:
+            from posekit.recovery.objects import read_nearer
+
+            flips = np.array([read_nearer(figure_linkage(person), hand) for hand in hands])
+        self.nearer = np.broadcast_to(flips, (len(view), len(SEGMENTS)))
+        self.lengths_known = lengths
+        self.exact = Certifier(person, settings, self.given or EXACT, self.up.direction)
+
+    @cached_property
+    def noisy(self) -> Certifier:
+        """The checks under noise: with wider tolerances, and a torso whose side uncertain lengths may leave open."""
+        known = self.lengths_known
+        contact = noisy_contact(self.settings.contact_margin, known, photograph=self.photograph)
+        loose = noisy_tolerance(self.person, known, sized=self.photograph)
+        figure, settings = sided(self.person, known), self.settings.changed(contact_margin=contact)
+        return Certifier(figure, settings, loose, self.up.direction)
+
+    @cached_property
+    def limits(self) -> Limits | None:
+        """Joint ranges that pull at the solver's postures."""
+        return solver_limits(self.person, self.exact)
+
+    @cached_property
+    def pull(self) -> Callable[[Array], Array] | None:
+        """Residuals of the checks that have some; None if none has."""
+        pulling = [check.residuals for check in self.noisy.checks if hasattr(check, "residuals")]
+        if not pulling:
+            return None
+        return lambda joints: np.concatenate([residuals(joints) for residuals in pulling], axis=1)
+
+    def frames(self, part: NDArray[np.intp]) -> list[Found]:
+        """Recover some frames: exactly where points are exact, else with the tolerance given, else under noise."""
+        sight = self.sight
+        rows = np.flatnonzero(np.isin(sight.frame, part))
+        open_ = {int(k) for k in part if not sight.reasons[k]}
+        done: dict[int, Found] = {}
+        whole = np.asarray(np.isfinite(sight.root).all(axis=1) & np.isfinite(sight.image).all(axis=(1, 2)))
+        ready = rows[whole[rows]]
+        if self.given is not None:
+            self._grown(ready, self.given, "tolerated", done)
+            for k in open_ - set(done):
+                done[k] = Found({}, None, LOST, "tolerated", "its neck is not known, or a joint is not seen")
+        elif sight.may_be_exact:
+            self._grown(ready, EXACT, "exact", done)
+            if self.settings.refine is False:
+                for k in open_ - set(done):
+                    done[k] = Found({}, None, {}, "exact", "no posture is exact")
+            left = rows[~np.isin(sight.frame[rows], list(done))]
+            if not self.photograph:
+                self._solved(left, done, sharp=True)
+        left = rows[[int(k) in open_ and int(k) not in done for k in sight.frame[rows]]]
+        self._solved(left, done, sharp=False)
+        return [
+            done[k] if k in done else Found({}, None, LOST, "", sight.reasons[k] or "no posture fits")
+            for k in part.tolist()
+        ]
+
+    def _grown(
+        self, rows: NDArray[np.intp], tolerance: Tolerance, judged: str, done: dict[int, Found]
+    ) -> None:
+        """Grow the exact tree of some rows; frames without an exact posture are left open."""
+        if not len(rows):
+            return
+        sight = self.sight.take(rows)
+        trees: Trees = grow(
+            sight.camera,
+            sight.image,
+            sight.root,
+            self.lengths,
+            self.exact.early,
+            judge=self.exact.judge,
+            head=sight.head,
+            tolerance=tolerance.tangent,
+        )
+        frame, head = sight.frame[trees.frame], sight.head[trees.frame]
+        verdict = self.exact.certify(trees.joints, head)
+        terms = log_terms(
+            trees.joints,
+            deviation=deviation_of_tolerance(tolerance.rigid),
+            lengths=self.lengths,
+            length_residual=trees.length_residual,
+            up=self.up,
+        )
+        score = np.sum(list(terms.values()), axis=0)
+        columns: dict[str, Any] = {
+            "joints": trees.joints,
+            "head": head,
+            "branch": np.array(trees.branches, dtype=np.str_),
+            "scale": self._scale(sight, trees.frame),
+        }
+        for k in np.unique(sight.frame).tolist():
+            own = np.flatnonzero(frame == k)
+            hypotheses = np.flatnonzero(sight.frame == k).tolist()
+            lost: Counter[str] = Counter()
+            for h in hypotheses:
+                lost.update(trees.rejected[h])
+            if judged == "exact" and not self._closes(trees.joints[own], lost):
+                continue
+            chosen = self._chosen(k, own, columns, score, verdict)
+            chosen.rejected.update(lost)
+            levels = trees.levels[hypotheses].sum(axis=0).tolist()
+            done[k] = self._found(k, chosen, columns, verdict, judged, None)._replace(levels=levels)
+
+    def _closes(self, joints: Array, lost: Mapping[str, int]) -> bool:
+        """Tell whether some branch closes torso and hips exactly, which only exact image points do."""
+        if "rigid-parts" in [check.name for check in self.exact.checks]:
+            return bool(len(joints)) or any(
+                not name.startswith(("rigid-parts/", "no-solution/")) for name in lost
+            )
+        start, end = np.array(RIGID_SEGMENTS).T
+        off = np.linalg.norm(joints[:, start] - joints[:, end], axis=2) - self.lengths[-len(RIGID_SEGMENTS) :]
+        return bool((np.abs(off) <= 10 * EXACT.rigid).all(axis=1).any())
+
+    def _solved(self, rows: NDArray[np.intp], done: dict[int, Found], *, sharp: bool) -> None:
+        """Solve some rows under noise; `sharp` treats points and lengths as exact, and leaves empty frames open."""
+        if not len(rows):
+            return
+        frames = np.unique(self.sight.frame[rows])
+        if len(frames) > FRAMES_AT_ONCE:
+            for at in range(0, len(frames), FRAMES_AT_ONCE):
+                part = np.isin(self.sight.frame[rows], frames[at : at + FRAMES_AT_ONCE])
+                self._solved(rows[part], done, sharp=sharp)
+            return
+        sight = self.sight.take(rows)
+        problem = self._problem(sight, sharp=sharp)
+        modes = solve(problem, most=MANY, pull=self.pull)
+        if sharp:
+            least = np.full(len(problem), np.inf)
+            np.minimum.at(least, modes.frame, modes.chi2)
+            modes = modes.take(((least < EXACT_CHI2) & (problem.freedom > 0))[modes.frame])
+        frame, joints, size = sight.frame[modes.frame], modes.joints, np.zeros(len(modes))
+        if self.photograph:
+            # The scale is as open as the size: the person keeps the stated size, and the scale takes the rest.
+            size = modes.size
+            joints = joints * np.exp(-size)[:, None, None]
+        head = np.full((len(joints), len(HEAD_POINTS), 3), np.nan)
+        verdict = self.noisy.certify(joints, head)
+        volume = modes.log_evidence + 0.5 * modes.chi2
+        score = np.sum(
+            list(log_terms(joints, chi2=modes.chi2, log_volume=volume, up=self.up).values()), axis=0
+        )
+        hidden = np.asarray(~np.isfinite(self.view.image[frame]).all(axis=2))
+        columns: dict[str, Any] = {
+            "joints": joints if self.settings.infer else np.where(hidden[..., None], np.nan, joints),
+            "head": head,
+            "chi2": modes.chi2,
+            "inferred": hidden,
+            "scale": self._scale(sight, modes.frame) * np.exp(size),
+        }
+        solved = np.unique(frame).tolist()
+        chosen = [self._chosen(k, np.flatnonzero(frame == k), columns, score, verdict) for k in solved]
+        rows = np.concatenate([one.rows for one in chosen]) if chosen else np.empty(0, dtype=np.intp)
+        covariance, start = self._covariance(modes.take(rows)), 0
+        for k, one in zip(solved, chosen, strict=True):
+            own, start = covariance[start : start + len(one.rows)], start + len(one.rows)
+            if len(one.rows) or not sharp:
+                done[k] = self._found(k, one, columns, verdict, "noisy", own)
+        empty = [] if sharp else np.setdiff1d(sight.frame, frame).tolist()
+        if empty:
+            some = np.flatnonzero(np.isin(sight.frame, empty))
+            strict = problem.take(some)
+            loose = replace(
+                strict,
+                length_deviation=strict.length_deviation + LOOSE_LENGTHS,
+                whitening=strict.whitening / LOOSE_TIMES,
+            )
+            # The nearest posture of loose points and lengths is measured with the stated deviations.
+            nearest = replace(solve(loose, max_chi2=LOOSE_CHI2, most=1), problem=strict)
+            owner = sight.frame[some][nearest.frame]
+            for k in empty:
+                why = self._why(nearest.take(np.flatnonzero(owner == k)[:1]))
+                done[k] = Found({}, None, {"noise/no_mode": 1}, "noisy", why)
+
+    def _problem(self, sight: Sight, *, sharp: bool) -> Problem:
+        """Lay the problem of some rows out for the solver."""
+        return Problem.seen(
+            sight.camera,
+            sight.image,
+            SHARP_PIXELS * sight.deviation if sharp else sight.deviation,
+            lengths=self.lengths,
+            length_deviation=0.0 if sharp else sight.lengths.deviations,
+            size_deviation=0.0 if sharp else sight.size_deviation,
+            root=None if self.photograph else np.where(sight.given[:, None], sight.root, np.nan),
+            limits=self.limits,
+            robust=bool(self.view.derived) and not self.photograph,
+        )
+
+    def _chosen(
+        self, k: int, own: NDArray[np.intp], columns: Mapping[str, Any], score: Array, verdict: Certificate
+    ) -> Chosen:
+        """Choose the survivors of a frame among its postures, and list those that hold the coverage."""
+        rejected = Counter(verdict.reason[row] for row in own.tolist() if verdict.reason[row])
+        valid = own[verdict.valid[own]]
+        rows = valid
+        if self.nearer[k].any():
+            rows = valid[self._by_hand(columns["joints"][valid], k)]
+        if len(rows) < len(valid):
+            rejected["nearer/given"] += len(valid) - len(rows)
+        probability = softmax(score[rows], np.zeros(len(rows), dtype=np.intp))
+        order = np.argsort(-probability, kind="stable")
+        most = len(rows)
+        if "chi2" in columns and most:
+            held = np.cumsum(probability[order])
+            most = min(int(np.searchsorted(held, self.settings.coverage - 1e-12)) + 1, most)
+        listed, rest = order[:most], order[most:]
+        return Chosen(rows[listed], probability[listed], rejected, len(rest), float(probability[rest].sum()))
+
+    def _found(
+        self,
+        k: int,
+        chosen: Chosen,
+        columns: Mapping[str, Any],
+        verdict: Certificate,
+        judged: str,
+        covariance: Array | None,
+    ) -> Found:
+        """Gather the survivors of a frame, with its answer."""
+        rows, probability, rejected, unlisted, rest = chosen
+        if not len(rows):
+            worst = max(rejected, key=lambda name: rejected[name], default="")
+            return Found(
+                {}, None, rejected, judged, f"no posture passes: most fail {worst.replace('/', ' at ')}"
+            )
+        table: dict[str, Any] = {name: values[rows] for name, values in columns.items()}
+        table |= {"probability": probability, "margins": {n: v[rows] for n, v in verdict.margins.items()}}
+        given = bool(self.sight.given[self.sight.frame == k].all())
+        answer = answer_of(
+            table["joints"],
+            probability,
+            covariance,
+            self.lengths if covariance is None else self._answer_lengths(table["joints"], probability),
+            relative=self.photograph or (covariance is not None and not given),
+            unlisted=rest,
+        )
+        if covariance is not None:
+            block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
+            table["radius"] = joint_radius(np.einsum("njajb->njab", block))
+        if self.settings.group is not None:
+            table["group"] = group_of(table["joints"], self.settings.group)
+        return Found(table, answer, rejected, judged, unlisted=unlisted, unlisted_probability=rest)
+
+    def _covariance(self, modes: Modes) -> Array:
+        """Return the covariances (N, 42, 42) of the joints of modes; of photographs in the stated size."""
+        if not self.photograph:
+            return modes.covariance()
+        # y = x e^-s: dy = e^-s (dx - x ds)
+        from posekit.solver import reference
+        from posekit.solver.modes import KNOWN
+
+        p = modes.problem
+        whole, x = (
+            np.linalg.inv(reference.information(p.records, p.limits, modes.frame, modes.x, KNOWN)),
+            modes.x[:, :-1],
+        )
+        cross = x[:, :, None] * whole[:, None, -1, :-1]
+        full = whole[:, :-1, :-1] - cross - cross.transpose(0, 2, 1)
+        full += x[:, :, None] * x[:, None] * whole[:, -1:, -1:]
+        return np.asarray(np.exp(-2 * modes.size)[:, None, None] * full)
+
+    def _answer_lengths(self, joints: Array, probability: Array) -> Array:
+        """Return the lengths of the answer: the person's, in the mean size of the survivors."""
+        start, end = np.array(TREE_SEGMENTS).T
+        each = np.log(np.linalg.norm(joints[:, start] - joints[:, end], axis=2) / self.lengths[: len(start)])
+        size = np.nan_to_num(each).mean(axis=1) @ (probability / probability.sum())
+        return np.asarray(self.lengths * np.exp(size))
+
+    def _by_hand(self, joints: Array, k: int) -> NDArray[np.bool_]:
+        """Tell which postures have the flips that were given by hand for a frame."""
+        start, end = np.array(SEGMENTS).T
+        ahead = (joints[:, end, 2] - joints[:, start, 2]) * self.nearer[k]
+        return np.asarray(~(ahead < -LEVEL_METRES).any(axis=1))
+
+    def _scale(self, sight: Sight, rows: NDArray[np.intp]) -> Array:
+        if not isinstance(sight.camera, ScaledOrthographicCamera):
+            return np.full(len(rows), np.nan)
+        return np.asarray(sight.camera.scale)[rows]
+
+    def _why(self, nearest: Modes) -> str:
+        """Say why a frame has no posture: the residuals of the nearest one that are over three deviations."""
+        if not len(nearest):
+            return (
+                "no posture is near the image points: the camera, the lengths or left and right may be wrong"
+            )
+        size = {name: float(value[0]) for name, value in nearest.residuals().items()}
+        named = sorted((name for name in size if size[name] > NAMED_DEVIATIONS), key=lambda name: -size[name])
+        if not named:
+            return "every posture is less likely than 1 in 10,000 by chi-square: give a larger --deviation"
+        words = ", ".join(f"{name} by {size[name]:.1f} deviations" for name in named[:MOST_NAMED])
+        return f"no posture fits: the nearest misses {words}"
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that decided the result, as JSON values."""
+        return {
+            **self.settings.to_json(),
+            "checks": [check.name for check in self.exact.checks],
+            "figure": self.person.hash,
+            "moved_lengths": dict(self.person.moved_lengths),
+            "shoulders": self.person.shoulder_side,
+            "up": self.up.source,
+            "prior": "people",
+            "derived": list(self.view.derived),
+            "versions": versions(),
+        }
+
+    def tolerances(self) -> dict[str, Any]:
+        """Return the tolerances of exact and tolerated frames, and the noise of the others."""
+        lengths = self.sight.lengths
+        found: dict[str, Any] = {"exact": vars(EXACT)}
+        if self.given is not None:
+            found["tolerated"] = vars(self.given)
+        noise: dict[str, Any] = {
+            "deviation": float(np.nanmedian(self.sight.deviation)),
+            "size": lengths.common,
+            "by_segment": dict(lengths.own),
+            "certified": vars(self.noisy.tolerance),
+            "contact_margin": self.noisy.settings.contact_margin,
+        }
+        return {**found, "noisy": noise}
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that decide a result."""
+    return {name: version(name) for name in ("posekit", "pin", "numpy")}
+
+
+def _up_of(view: View) -> Up:
+    """Return the direction against gravity: as the calibration states it, else as if the camera were level."""
+    camera = view.camera
+    if isinstance(camera, PinholeCamera) and camera.R is not None and camera.up:
+        axis = np.eye(3)["xyz".index(camera.up[1])] * (-1.0 if camera.up[0] == "-" else 1.0)
+        return Up(direction=camera.R @ axis, source=f"{camera.up}, as the calibration source")
+    return Up.level()

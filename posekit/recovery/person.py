@@ -1,38 +1,73 @@
-"""Whose body a view shows: the figure with the view's own lengths, or another with its proportions."""
+"""The person: a figure with the view's lengths, and how well these lengths are known."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import tomllib
 from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
-from posekit.body import Figure, LengthUncertainty, stature_from_lengths
+from posekit.body import Figure, LengthUncertainty, load_figure
+from posekit.body.lengths import stature_from_lengths
 from posekit.body.uncertainty import KNOWN_STATURE, STATED_LENGTHS, UNKNOWN_ADULT
-from posekit.errors import InputError
-from posekit.formats.own import ScaledOrthographicModel, View
-from posekit.recovery.body import FigureBody, LiftedBody
-from posekit.settings import RecoverSettings, Rooting
+from posekit.cameras import View
+from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
-FEWEST_CLIP_FRAMES = 10
-"""Frames from which one body is found for all of them, if its lengths are not exact."""
+#: Relative lengths of Taylor 2000, Table 1, of a stature of 70.
+TAYLOR_LENGTHS: Final = {
+    "shoulder-elbow": 15,
+    "elbow-wrist": 14,
+    "hip-knee": 19,
+    "knee-ankle": 20,
+    "right_shoulder-left_shoulder": 18,
+    "right_hip-left_hip": 14,
+}
 
-CACHED_PERSONS = 32
-"""Figures of persons that are kept: clips and shards of the same person follow each other."""
+
+def _key_points() -> dict[str, Any]:
+    """Read the body between a detector's key points: shares of stature and deviations of the 17 lengths."""
+    path = Path(__file__).resolve().parents[1] / "urdf" / "priors" / "key_points.toml"
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
+    parts = {
+        part: {name: table[part][bare] for name, bare in sideless.items()}
+        for part in ("shares", "deviations")
+    }
+    return {"stature": table["stature"], **parts}
 
 
-def person_of(view: View, figure: Figure) -> Figure:
-    """Apply a view's own stature, lengths and head points to a figure."""
+KEY_POINTS: Final = _key_points()
+
+
+def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> Figure:
+    """Return the person's figure: the given or built-in one with the view's stature, lengths and head points."""
     head = {
         name: tuple(np.asarray(at, dtype=np.float64).tolist())
         for name, at in (view.head_points or {}).items()
         if name not in view.own_head_names
     }
-    return _person(figure, view.stature, tuple(view.lengths.items()), view.shoulders, tuple(head.items()))
+    stature = settings.stature or view.stature
+    base = figure or load_figure()
+    lengths = dict(view.lengths)
+    if view.derived and figure is None and not lengths and settings.proportions == "figure":
+        # A detector's points are no joints: another body lies between them.
+        lengths = {
+            name: share * (stature or KEY_POINTS["stature"]) for name, share in KEY_POINTS["shares"].items()
+        }
+        stature = None
+    if settings.proportions == "taylor":
+        unit = (stature or stature_from_lengths(base.lengths)) / 70
+        for name in SEGMENT_NAMES:
+            sideless = name.replace("right_", "").replace("left_", "")
+            if found := TAYLOR_LENGTHS.get(name, TAYLOR_LENGTHS.get(sideless)):
+                lengths[name] = found * unit
+    return _person(base, stature, tuple(lengths.items()), view.shoulders, tuple(head.items()))
 
 
-@lru_cache(maxsize=CACHED_PERSONS)
+@lru_cache(maxsize=32)
 def _person(
     figure: Figure,
     stature: float | None,
@@ -40,58 +75,29 @@ def _person(
     shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
-    """Make the figure of a person: building one takes as long as recovering some hundred frames."""
-    if stature is not None:
-        figure = figure.from_stature(stature)
-    if lengths or head_points or shoulders:
-        behind = None if shoulders is None else shoulders == "behind"
-        figure = figure.scaled(dict(lengths), dict(head_points), behind=behind)
-    return figure
+    """Make the figure of a person: shards of one person follow each other."""
+    if stature is None and not lengths and not shoulders and not head_points:
+        return figure
+    behind = None if shoulders is None else shoulders == "behind"
+    return figure.scaled(dict(lengths), dict(head_points), stature=stature, behind=behind)
 
 
-def uncertainty_of(view: View, asked: float | None, *, own_figure: bool) -> LengthUncertainty:
-    """Say how well the lengths are known that a view is recovered with.
+@lru_cache(maxsize=32)
+def sided(figure: Figure, lengths: LengthUncertainty) -> Figure:
+    """Return the figure as far as its lengths are known: the side of the shoulders may be open."""
+    return figure.with_side_within(lengths)
 
-    What is `asked` comes before what the view says, and that before what can be told from where lengths come from: the
-    view's own, or a figure that was made for the person (`own_figure`), a stature, or nobody.
-    """
-    said = view.length_deviation if asked is None else asked
-    if said is not None:
-        return LengthUncertainty.uniform(said)
+
+def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -> LengthUncertainty:
+    """Return how well lengths are known: as stated, else as their origin tells (view, stature, or none)."""
+    stated = view.length_deviation if settings.length_deviation is None else settings.length_deviation
+    if stated is not None:
+        return LengthUncertainty.uniform(stated)
     if own_figure:
         return STATED_LENGTHS
-    other = UNKNOWN_ADULT if view.stature is None else KNOWN_STATURE
+    if view.derived and not view.lengths and settings.proportions == "figure":
+        size = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
+        return LengthUncertainty(common=size.common, own=KEY_POINTS["deviations"])
+    other = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
     own = {name: (STATED_LENGTHS if name in view.lengths else other).own[name] for name in SEGMENT_NAMES}
     return LengthUncertainty(common=STATED_LENGTHS.common if view.lengths else other.common, own=own)
-
-
-def body_of(view: View, figure: Figure, proportions: str) -> LiftedBody:
-    """Choose what the view's points are lifted into."""
-    person = person_of(view, figure)
-    stature = view.stature or stature_from_lengths(person.lengths)
-    if proportions == "taylor":
-        from posekit.recovery.taylor_figure.body import TaylorBody
-
-        return TaylorBody.of(stature, figure)
-    return FigureBody(figure=person, stature=stature, derived=view.derived)
-
-
-def refuse_settings(view: View, settings: RecoverSettings) -> None:
-    """Refuse settings that say nothing of such a view.
-
-    Raises
-    ------
-    InputError
-        Where a calibrated view is given a scale or Taylor's proportions, or an uncalibrated one a root.
-    """
-    if isinstance(view.camera, ScaledOrthographicModel):
-        if replace(settings.rooting, deviation=None) != Rooting():
-            raise InputError(
-                "--root: the view's camera is not known, and so no depth is; leave the option out"
-            )
-    elif settings.proportions == "taylor":
-        raise InputError(
-            "--proportions: taylor is for uncalibrated views (scaled-orthographic); leave the option out"
-        )
-    elif settings.scale is not None:
-        raise InputError("--scale: the view's camera is calibrated; leave the option out")

@@ -1,493 +1,433 @@
-"""What `recover` returns: every survivor of every frame, and why the rest is gone."""
+"""`Recovery`: every survivor of every frame, what was rejected and why, and the answer."""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure
-from posekit.display.pictured import Pictured
-from posekit.display.plural import plural
-from posekit.display.stick_drawing import posture_drawing
-from posekit.formats.own import Family, Inferred, Root
-from posekit.formats.own.posture_set import PostureSet
-from posekit.geometry import Array
-from posekit.objects.mirror import mirrored
-from posekit.ranking import Ranking, Up, deviation_of_tolerance
-from posekit.recovery.camera_record import CameraRecords
-from posekit.recovery.grouping import group_postures
-from posekit.recovery.ranked import ranked
-from posekit.recovery.rooting import root_of
-from posekit.recovery.trees import Batch
-from posekit.recovery.untold import untold_regions
-from posekit.settings import Judged, Tolerance
-from posekit.skeleton import JOINT, JOINTS, PARENTS
+from posekit.errors import InputError, refusal, shown
+from posekit.geometry import Array, Record
+from posekit.motion import Motion
+from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from os import PathLike
 
-    from posekit.answers import Answer
-    from posekit.cameras.neck import NeckPlacement
-    from posekit.formats.own import View
-    from posekit.hidden import CompletedSurvivors
-    from posekit.recovery.fit_camera import CameraFit
-    from posekit.recovery.grower import Grower
-    from posekit.recovery.refined import RefinedSurvivors
-    from posekit.viewer.showing import ShownPage
+    import pandas
 
-REFINED_LEVEL_METRES: Final = 0.05
-"""Metres of depth up to which neither end of a refined segment is nearer: what photographs leave open."""
+N_JOINTS, N_SEGMENTS = len(JOINTS), len(TREE_SEGMENTS)
 
 
-MAX_DRAWN: Final = 8
-"""Postures of a frame in its small drawing."""
-CAMERA_UP: Final = np.array([0.0, -1.0, 0.0])
-"""Up in a picture."""
+class Table(Record):
+    """Base of tables with one row a survivor or a frame: arrays of one length, read-only."""
+
+    def _complete(self, rows: int, shapes: Mapping[str, tuple[int, ...]], fill: Mapping[str, Any]) -> None:
+        """Make every column an array of `rows` rows; a column that is None is filled."""
+        for name, shape in shapes.items():
+            given, value = getattr(self, name), fill.get(name, np.nan)
+            dtype = np.result_type(type(value)) if not isinstance(value, str) else np.dtype(np.str_)
+            column = np.full((rows, *shape), value) if given is None else np.array(given, dtype=dtype)
+            if column.shape != (rows, *shape) and not (column.size == 0 and rows == 0):
+                raise InputError(
+                    f"result: {name}: got shape {column.shape}; expected {(rows, *shape)}; correct it"
+                )
+            self._set(name, column.reshape(rows, *shape))
 
 
-def _inferred(completion: CompletedSurvivors, row: int) -> dict[str, Inferred]:
-    """Describe the joints of one survivor that were not placed by the image."""
-    return {
-        region.joint: Inferred(
-            kind=region.kind.label,
-            lower=region.lower,
-            upper=region.upper,
-            radius=region.radius,
-            fraction=region.fraction,
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Survivors(Table):
+    """N postures that passed every check, of all frames, in order of frame and then of falling probability.
+
+    Parameters
+    ----------
+    frame : int array (N,)
+        Frame of each, from 0.
+    joints : array (N, 14, 3)
+        Metres, camera frame; NaN where a joint is not known.
+    head : array (N, 5, 3), optional
+        Head points; NaN where they were not seen.
+    q : array (N, nq)
+        Configuration of each.
+    probability : array (N,), optional
+        Within its frame they sum to one minus `Frames.unlisted_probability`.
+    chi2 : array (N,), optional
+        Misfit to the view; 0 for exact frames.
+    margins : mapping of str to array (N,)
+        Worst margin of each check, in the check's unit; NaN where it decided nothing.
+    branch : str array (N,), optional
+        Near-far code of an exact posture, 0 near and 1 far, joints in tree order from the second; empty under noise.
+    group : int array (N,), optional
+        Group of similar postures within the frame; -1 if no groups were asked for.
+    radius : array (N, 14), optional
+        Radius (m) within which each joint lies with 95 % probability if the posture is right; 0 for exact frames.
+    inferred : bool array (N, 14), optional
+        Joints that the image does not show.
+    scale : array (N,), optional
+        Scale of a scaled orthographic camera, pixels a metre; NaN elsewhere.
+    """
+
+    frame: NDArray[np.intp]
+    joints: Array
+    q: Array
+    head: Array | None = None
+    probability: Array | None = None
+    chi2: Array | None = None
+    margins: Mapping[str, Array] = field(default_factory=dict)
+    branch: NDArray[np.str_] | None = None
+    group: NDArray[np.intp] | None = None
+    radius: Array | None = None
+    inferred: NDArray[np.bool_] | None = None
+    scale: Array | None = None
+
+    def __post_init__(self) -> None:
+        rows = len(self.frame)
+        nq = np.shape(self.q)[1] if np.ndim(self.q) == 2 else 0
+        shapes: dict[str, tuple[int, ...]] = {"joints": (N_JOINTS, 3), "head": (len(HEAD_POINTS), 3)}
+        shapes |= {"q": (nq,), "radius": (N_JOINTS,), "inferred": (N_JOINTS,)}
+        shapes |= dict.fromkeys(("frame", "probability", "chi2", "branch", "group", "scale"), ())
+        fill = {"chi2": 0.0, "branch": "", "group": -1, "radius": 0.0, "inferred": False, "frame": 0}
+        self._complete(rows, shapes, fill)
+        self._set(
+            "margins", {name: np.array(values, dtype=np.float64) for name, values in self.margins.items()}
         )
-        for region in completion.regions(row)
-    }
-
-
-@dataclass(frozen=True, kw_only=True)
-class PrunedBranch:
-    """One pruned branch of the tree and the finding that killed it.
-
-    Parameters
-    ----------
-    branch : str
-        Its near-far choices up to the level where it was pruned; it stands for all leaves that begin so.
-    joint : str
-        The joint of that level.
-    reason : str
-        ``check/where``.
-    value, lower, upper : float
-        What was found, and its bounds, in `unit`.
-    """
-
-    branch: str
-    joint: str
-    reason: str
-    value: float
-    lower: float
-    upper: float
-    unit: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrameRecovery(Pictured):
-    """One frame: its survivors and its losses.
-
-    Parameters
-    ----------
-    time : float
-        Seconds.
-    batch : Batch or None
-        None where the neck could not be found: nothing was grown.
-    index : int
-        The place in its batch of the frame's first hypothesis.
-    hypotheses : int
-        How many there are: one; for an uncalibrated frame as many as scales were taken, for a placed neck as depths,
-        under noise as trunks, which may be none.
-    family : Family, optional
-        The scales that an uncalibrated frame can have.
-    placement : NeckPlacement, optional
-        How the neck of a calibrated frame was placed, where it was not given.
-    reason : str
-        Why nothing was grown.
-    lost_to : str
-        The same in two words, ``what/why``, as leaves are lost to it.
-    group_within : float or None
-        Metres within which survivors are grouped.
-    number : int
-        Which frame of the view that was recovered it is.
-    cameras : CameraRecords, optional
-        Of all frames of the view.
-    unlisted : int
-        How many postures that were not ruled out are not listed for being too unlikely (`coverage`).
-    unlisted_probability : float
-        Which share of the frame's probability they have.
-    made_of : callable, optional
-        Returns the set where not all of its postures are listed: see `posture_set`.
-    """
-
-    time: float
-    batch: Batch | None
-    index: int
-    hypotheses: int = 1
-    family: Family | None = None
-    placement: NeckPlacement | None = None
-    reason: str = ""
-    lost_to: str = "root/not_known"
-    group_within: float | None = None
-    number: int = 0
-    cameras: CameraRecords | None = None
-    unlisted: int = 0
-    unlisted_probability: float = 0.0
-    made_of: Callable[[], PostureSet] | None = None
-
-    @cached_property
-    def _rows(self) -> slice:
-        if self.batch is None:
-            return slice(0, 0)
-        offsets = self.batch.offsets
-        return slice(int(offsets[self.index]), int(offsets[self.index + self.hypotheses]))
 
     def __len__(self) -> int:
         """Count the survivors."""
-        return int(self._rows.stop - self._rows.start)
+        return len(self.frame)
 
-    @property
-    def joints(self) -> Array:
-        """Survivors (N, 14, 3), OpenCV camera frame, metres; NaN where a joint was not seen."""
-        return self.batch.points[self._rows, :14] if self.batch else np.empty((0, 14, 3))
-
-    @cached_property
-    def posture_set(self) -> PostureSet:
-        """The complete set as trunks and limbs, whatever is listed of it.
-
-        Under noise trunks and limbs are where they are before whole bodies are refined.
-        """
-        return PostureSet.of(self.joints) if self.made_of is None else self.made_of()
-
-    @property
-    def head(self) -> Array:
-        """The head's points (5, 3), camera frame, metres; NaN where it was not seen."""
-        known = self.batch is not None and self.hypotheses
-        return self.batch.leaves.given[self.index] if self.batch and known else np.full((5, 3), np.nan)
-
-    @property
-    def scales(self) -> Array | None:
-        """The scale of each survivor (N,), pixels a metre; None where the camera is calibrated."""
-        if self.family is None or self.batch is None:
-            return None if self.family is None else np.empty(0)
-        if self.refined is not None:
-            return np.full(len(self), self.family.chosen[0])
-        return np.asarray(self.family.chosen[self.batch.leaves.frame[self._rows] - self.index])
-
-    @property
-    def mirrored(self) -> int:
-        """How many survivors have their mirror image among the survivors."""
-        if self.batch is None:
-            return 0
-        if self.refined is None:
-            return int(self.batch.mirrored[self._rows].sum())
-        one_tree = np.zeros(len(self), dtype=np.intp)
-        return int(mirrored(self.joints[..., 2], PARENTS, one_tree, level=REFINED_LEVEL_METRES).sum())
-
-    @property
-    def inferred(self) -> list[dict[str, Inferred]] | None:
-        """What is known of joints that were not seen, by survivor; None where all were."""
-        if self.batch is None:
-            return None
-        rows = range(self._rows.start, self._rows.stop)
-        found: list[dict[str, Inferred]] = [{} for _ in rows]
-        if self.batch.completion is not None:
-            found = [_inferred(self.batch.completion, row) for row in rows]
-        if self.batch.untold is not None and self.refined is not None:
-            regions = untold_regions(self.refined, self.batch.untold[self._rows])
-            found = [one | region for one, region in zip(found, regions, strict=True)]
-        if self.batch.completion is not None or any(found):
-            return found
-        if not self.batch.body.inferred:
-            return None
-        columns = [JOINT[name] for name in self.batch.body.inferred]
-        return [
-            {
-                name: Inferred(kind="completed", lower=joints[column], upper=joints[column], radius=0.0)
-                for name, column in zip(self.batch.body.inferred, columns, strict=True)
-            }
-            for joints in self.joints
-        ]
-
-    @property
-    def q(self) -> Array:
-        """Survivors as configurations (N, nq) in Pinocchio's order."""
-        return self.batch.q[self._rows] if self.batch else np.empty((0, 0))
-
-    @property
-    def fk_distance(self) -> Array:
-        """How far the joints of q are from the posture's (N,), metres."""
-        return self.batch.fk_distance[self._rows] if self.batch else np.empty(0)
-
-    @property
-    def length_residual(self) -> Array:
-        """How much too short each survivor's worst segment was for its image (N,), metres."""
-        return self.batch.length_residual[self._rows] if self.batch else np.empty(0)
-
-    @property
-    def margins(self) -> dict[str, Array]:
-        """Each validator's worst margin (N,), degrees or metres; NaN where it decided nothing."""
-        if self.batch is None:
-            return {}
-        return {name: values[self._rows] for name, values in self.batch.margins.items()}
-
-    @property
-    def refined(self) -> RefinedSurvivors | None:
-        """How likely and how sure each survivor is; None where the frame was not refined."""
-        if self.batch is None or self.batch.refined is None:
-            return None
-        return self.batch.refined.part(self._rows)
-
-    @property
-    def chi2(self) -> Array | None:
-        """How badly each survivor fits what was seen (N,), where the frame was refined."""
-        return None if self.refined is None else self.refined.chi2
-
-    @property
-    def spread(self) -> float:
-        """How far off survivors are, metres: from the noise where it is known, else from what was tolerated."""
-        if self.batch is not None and self.batch.refined is not None:
-            return self.batch.spread
-        return float(deviation_of_tolerance(self.tolerance.rigid if self.tolerance else 0.0))
-
-    @property
-    def branches(self) -> list[str]:
-        """The branch code of each survivor: 0 near, 1 far, joints in tree order from the second."""
-        if self.batch is None:
-            return []
-        leaves = self.batch.leaves
-        return [f"{code:0{leaves.level}b}" for code in leaves.code[self._rows].tolist()]
-
-    @cached_property
-    def groups(self) -> NDArray[np.intp] | None:
-        """The group of each survivor, its first member the representative; None if none were asked for."""
-        return None if self.group_within is None else group_postures(self.joints, self.group_within)
-
-    @property
-    def level_names(self) -> tuple[str, ...]:
-        """The joints of the tree, a level each."""
-        return JOINTS if self.batch is None else self.batch.leaves.joints
-
-    @property
-    def levels(self) -> dict[str, NDArray[np.int64]]:
-        """Survivors by level after the ``physical`` checks and after the ``motion`` model (§4.1.B)."""
-        if self.batch is None:
-            return {name: np.zeros(14, dtype=np.int64) for name in ("physical", "motion")}
-        part = slice(self.index, self.index + self.hypotheses)
-        motion = self.batch.motion
-        physical = motion if self.batch.physical is None else self.batch.physical
-        return {"physical": physical[part].sum(axis=0), "motion": motion[part].sum(axis=0)}
-
-    @property
-    def rejected(self) -> dict[str, int]:
-        """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
-        if self.batch is None:
-            return {self.lost_to: 8192}
-        if not self.hypotheses:
-            return {"noise/no_trunk": 8192}
-        lost: Counter[str] = Counter()
-        for one in self.batch.rejected[self.index : self.index + self.hypotheses]:
-            lost.update(one)
-        return dict(lost)
-
-    @property
-    def tolerance(self) -> Tolerance | None:
-        """The tolerance that this frame was judged with."""
-        return self.batch.tolerance if self.batch else None
-
-    @property
-    def judged(self) -> Judged | None:
-        """How the frame was judged (`posekit.settings.Judged`); None where nothing was grown."""
-        return None if self.batch is None else self.batch.judged
-
-    @property
-    def camera(self) -> dict[str, Any]:
-        """What is known of the camera: f, rotation, position, residual (`posekit.recovery.camera_record`)."""
-        return {} if self.cameras is None else self.cameras[self.number]
-
-    @property
-    def root(self) -> Root | None:
-        """How the neck's depth was found; None where it was given, or the camera is not known."""
-        return None if self.placement is None else root_of(self.placement)
-
-    def _facts(self) -> list[str]:
-        found = f"nothing grown: {self.reason}" if self.reason else plural(len(self), "posture")
-        judged = [] if self.judged is None else [f"judged {self.judged}"]
-        return [f"frame {self.number}", f"{self.time:g} s", found, *judged]
-
-    @property
-    def likeliest_first(self) -> Array:
-        """The survivors (N, 14, 3), the likeliest first, where the camera is level (`posekit.ranking.Up.level`)."""
-        if self.batch is None or not len(self):
-            return self.joints
-        ranking = ranked([self], self.batch.body.figure.lengths, [self.spread], Up.level())
-        return np.asarray(self.joints[np.argsort(-ranking.probability, kind="stable")])
-
-    def _drawing(self) -> str:
-        return posture_drawing(self.likeliest_first[:MAX_DRAWN], CAMERA_UP)
-
-    def show(self, path: str | Path | None = None) -> ShownPage:
-        """Show the frame's survivors to be turned by hand: in the notebook, or in the browser.
-
-        Parameters
-        ----------
-        path : path, optional
-            Where the page is written; one of the temporary files that are kept if not given (`posekit.viewer.showing`).
-
-        Raises
-        ------
-        InputError
-            Where the frame has no posture.
-        """
-        from posekit.recovery.showing import show_frame
-
-        return show_frame(self, path)
-
-    def too_short(self) -> tuple[str, float] | None:
-        """Return the first segment that is too short for its image in every branch, and by how much (m)."""
-        if self.batch is None or not self.hypotheses:
-            return None
-        leaves = self.batch.leaves
-        found = leaves.candidates.too_short(self.index) if self.hypotheses == 1 else None
-        return (
-            None
-            if found is None
-            else (f"{leaves.joints[leaves.parents[found[0]]]}-{leaves.joints[found[0]]}", found[1])
-        )
-
-    def pruned(self) -> list[PrunedBranch]:
-        """Every pruned branch with the finding that killed it, in the order of pruning."""
-        if self.batch is None:
-            return []
-        leaves = self.batch.leaves
-        return [
-            PrunedBranch(
-                branch=f"{group.code[k]:0{group.level}b}",
-                joint=leaves.joints[group.level],
-                reason=f"{group.check}/{group.where[group.place[k]]}",
-                value=float(group.value[k]),
-                lower=float(group.lower[k]),
-                upper=float(group.upper[k]),
-                unit=group.unit,
-            )
-            for group in leaves.pruned
-            for k in np.flatnonzero(
-                (group.frame >= self.index) & (group.frame < self.index + self.hypotheses)
-            )
-        ]
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Survivors:
+        """Return some rows."""
+        columns = {one.name: getattr(self, one.name)[rows] for one in fields(self) if one.name != "margins"}
+        return Survivors(**columns, margins={name: values[rows] for name, values in self.margins.items()})
 
 
-@dataclass(frozen=True, kw_only=True)
-class Recovery(Pictured):
-    """All frames of a view.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Frames(Table):
+    """F frames: what was seen, what was rejected and why.
 
     Parameters
     ----------
-    figure : Figure
-        The person's figure.
-    fit : CameraFit
-        The camera, and where it sees the root.
-    frames : list of FrameRecovery
-        In the view's order.
-    settings : mapping
-        Everything that decided the result.
-    grower : Grower, optional
-        What grew the trees: it can tell what would have admitted a posture (`posekit.recovery.least_violation`).
-    up : Up
-        Which way is up in the camera's frame.
+    time : array (F,)
+        Seconds; NaN where it is not known.
+    pictures : sequence of F str
+        Names of the pictures; empty if there are none.
+    camera : sequence of F mappings
+        What is known of the camera: ``f``, ``rotation``, ``position``, ``residual``, ``scale``.
+    rejected : sequence of F mappings
+        Rejected branches by reason (``check/place``): with the survivors of an exact frame they sum to 8192.
+    levels : sequence of F sequences
+        Branches left after each joint of the tree; empty where no tree was grown.
+    unlisted : int array (F,), optional
+        Postures that are not listed for being too unlikely (`coverage`).
+    unlisted_probability : array (F,), optional
+        Their probability together.
+    reason : sequence of F str
+        Why a frame has no survivors; empty where it has.
+    root : sequence of F mappings or None
+        How the neck's depth was found: ``method``, ``estimate`` and ``deviation`` in metres.
+    judged : sequence of F str
+        ``exact``, ``tolerated`` or ``noisy``.
     """
 
-    figure: Figure
-    fit: CameraFit
-    frames: list[FrameRecovery]
-    settings: Mapping[str, Any]
-    grower: Grower | None = None
-    up: Up = field(default_factory=Up.level)
+    time: Array
+    pictures: Sequence[str] = ()
+    camera: Sequence[Mapping[str, Any]] = ()
+    rejected: Sequence[Mapping[str, int]] = ()
+    levels: Sequence[Sequence[int]] = ()
+    unlisted: NDArray[np.intp] | None = None
+    unlisted_probability: Array | None = None
+    reason: Sequence[str] = ()
+    root: Sequence[Mapping[str, Any] | None] = ()
+    judged: Sequence[str] = ()
 
-    @property
-    def unrecovered(self) -> dict[str, list[int]]:
-        """Frames in which nothing was grown, counted from zero, by the reason."""
-        found: dict[str, list[int]] = {}
-        for k, frame in enumerate(self.frames):
-            if frame.reason:
-                found.setdefault(re.sub(r"^frames\[\d+\]: ", "", frame.reason), []).append(k)
-        return found
+    def __post_init__(self) -> None:
+        count = len(self.time)
+        shapes: dict[str, tuple[int, ...]] = {"time": (), "unlisted": (), "unlisted_probability": ()}
+        self._complete(count, shapes, {"unlisted": 0, "unlisted_probability": 0.0})
+        empty: dict[str, Any] = {"camera": {}, "rejected": {}, "levels": (), "root": None}
+        empty |= {"reason": "", "judged": ""}
+        for name, value in empty.items():
+            self._set(name, tuple(getattr(self, name)) or (value,) * count)
+        self._set("pictures", tuple(str(name) for name in self.pictures))
 
-    @property
-    def pruned_count(self) -> int:
-        """How many branches were pruned of all trees: what `FrameRecovery.pruned` lists of each frame."""
-        batches = {id(frame.batch): frame.batch for frame in self.frames if frame.batch is not None}
-        return sum(len(group.frame) for batch in batches.values() for group in batch.leaves.pruned)
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.time)
 
-    @cached_property
-    def ranking(self) -> Ranking:
-        """The probability of every survivor of every frame (`posekit.ranking.rank`)."""
-        spread = [frame.spread for frame in self.frames]
-        return ranked(self.frames, self.figure.lengths, spread, self.up)
 
-    @cached_property
-    def probability(self) -> list[Array]:
-        """The probability of the survivors of each frame."""
-        return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Answer(Table):
+    """One answer for each of F frames.
 
-    @cached_property
-    def answers(self) -> list[Answer]:
-        """What is to be said of each frame: its likeliest posture, how sure it is, and what else it can be."""
-        from posekit.recovery.answered import answered
+    Parameters
+    ----------
+    joints : array (F, 14, 3)
+        Expected posture, laid onto the person's lengths; metres, camera frame; NaN where a frame has no survivor.
+    sure : array (F,)
+        Probability that every joint of the answer is within 5 cm of the person.
+    sure_of : sequence of F str
+        ``position``, or ``relative to the neck`` where the depth is not known; empty where there is no answer.
+    survivor : int array (F,)
+        Row of the survivor nearest to the answer, -1 where there is none.
+    representatives : sequence of F int arrays
+        Rows of few survivors that differ by 5 cm in some joint and stand for 95 % of the probability, the likeliest
+        first.
+    represented : sequence of F arrays
+        Probability of each representative and of what it stands for.
+    nearer : int array (F, 13)
+        Of each segment of the tree: 1 if its outer end is nearer to the camera by more than 5 cm, -1 if it is farther,
+        0 if neither; the most probable of the three.
+    nearer_sure : array (F, 13)
+        Probability of `nearer`; NaN where there is no answer.
+    """
 
-        return answered(self.frames, self.probability, [frame.spread for frame in self.frames])
+    joints: Array
+    sure: Array
+    sure_of: Sequence[str] = ()
+    survivor: NDArray[np.intp] | None = None
+    representatives: Sequence[NDArray[np.intp]] = ()
+    represented: Sequence[Array] = ()
+    nearer: NDArray[np.intp] | None = None
+    nearer_sure: Array | None = None
 
-    def show(self, view: View | None = None, path: str | Path | None = None) -> ShownPage:
-        """Show the page of all survivors: in the notebook, or in the browser.
+    def __post_init__(self) -> None:
+        count = len(self.joints)
+        shapes: dict[str, tuple[int, ...]] = {
+            "joints": (N_JOINTS, 3),
+            "sure": (),
+            "survivor": (),
+            "nearer": (N_SEGMENTS,),
+            "nearer_sure": (N_SEGMENTS,),
+        }
+        self._complete(count, shapes, {"survivor": -1, "nearer": 0})
+        none = np.empty(0, dtype=np.intp)
+        for name, value in (("sure_of", ""), ("representatives", none), ("represented", np.empty(0))):
+            self._set(name, tuple(getattr(self, name)) or (value,) * count)
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.joints)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Paths(Table):
+    """P paths through the F frames of a film, the likeliest first.
+
+    Parameters
+    ----------
+    survivor : int array (P, F)
+        Row of the survivor that the path goes through; -1 where a frame is bridged.
+    probability : array (P,)
+        Probability of each path among all.
+    joints : array (P, F, 14, 3)
+        Smoothed positions, metres, camera frame; NaN where the path does not reach.
+    """
+
+    survivor: NDArray[np.intp]
+    probability: Array
+    joints: Array
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("survivor", np.intp), ("probability", np.float64), ("joints", np.float64)):
+            self._set(name, np.array(getattr(self, name), dtype=dtype))
+
+    def __len__(self) -> int:
+        """Count the paths."""
+        return len(self.survivor)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Recovery(Record):
+    """Every posture behind a view that passes the checks.
+
+    Parameters
+    ----------
+    survivors : Survivors
+    frames : Frames
+    answer : Answer
+    path : Paths, optional
+        Where frames were followed.
+    settings : mapping
+        Everything that decided the result; plain numbers, strings and lists.
+    tolerances : mapping
+        Allowed deviations of exact and of tolerated frames, and the noise of others.
+    lengths : mapping of str to float
+        Segment lengths of the person, metres.
+    joint_names, configuration_names : sequence of str
+        Names of the joints of `survivors.joints` and of the entries of `survivors.q`.
+    unit : str
+        Unit of length in files; in memory all is metres.
+    camera : mapping
+        Fields of the view's camera, as files have them.
+    source : str
+        File of the view; empty if there is none.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> recovery = posekit.recover(posekit.builtin_view("seq1"))
+    >>> len(recovery), recovery[0].joints.shape[1:]
+    (5, (14, 3))
+    """
+
+    survivors: Survivors
+    frames: Frames
+    answer: Answer
+    path: Paths | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    tolerances: Mapping[str, Any] = field(default_factory=dict)
+    lengths: Mapping[str, float] = field(default_factory=dict)
+    joint_names: Sequence[str] = JOINTS
+    configuration_names: Sequence[str] = ()
+    unit: str = "m"
+    camera: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        self._set("joint_names", tuple(self.joint_names))
+        self._set("configuration_names", tuple(self.configuration_names))
+        self._set("_starts", np.searchsorted(self.survivors.frame, np.arange(len(self.frames) + 1)))
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.frames)
+
+    def __getitem__(self, k: int) -> Frame:
+        """Return one frame; negative numbers count from the end."""
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of {len(self)}")
+        return Frame(recovery=self, number=k % len(self))
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Go through the frames."""
+        return (self[k] for k in range(len(self)))
+
+    def rows(self, k: int) -> slice:
+        """Return the rows of the survivors of one frame."""
+        starts: NDArray[np.intp] = self._starts  # type: ignore[attr-defined]
+        return slice(int(starts[k]), int(starts[k + 1]))
+
+    def _facts(self) -> list[str]:
+        found, empty = len(self.survivors), int((np.asarray(self.answer.survivor) < 0).sum())
+        names = [f"{len(self)} {'frame' if len(self) == 1 else 'frames'}"]
+        names.append(f"{found} {'posture' if found == 1 else 'postures'}")
+        return names + ([f"none in {empty}"] if empty else [])
+
+    def motion(self, which: Literal["answer", "path", "all", "first"] = "answer") -> Motion:
+        """Return the result as a motion, in the camera frame.
 
         Parameters
         ----------
-        view : View, optional
-            What was recovered: the page then shows the image, too.
-        path : path, optional
-            Where the page is written; one of the temporary files that are kept if not given (`posekit.viewer.showing`).
-
-        Raises
-        ------
-        PosekitError
-            Where there is no posture, or too many for one page.
-        """
-        from posekit.recovery.showing import show_recovery
-
-        return show_recovery(self, view, path)
-
-    def save(self, path: str | Path) -> None:
-        """Write the result, as `posekit recover -o` does.
-
-        Parameters
-        ----------
-        path : path
-            ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``.
+        which : {"answer", "path", "all", "first"}
+            Certified survivor nearest to the answer; likeliest followed path; all survivors as alternative postures of
+            their frames; or likeliest survivor. A path has smoothed joints and therefore no configurations.
 
         Raises
         ------
         InputError
-            Where the name is none of these, or the file cannot be written.
+            If ``path`` is asked for and nothing was followed, or `which` is none of these.
         """
-        from posekit.recovery.result import result_of
-        from posekit.recovery.result_output import write_result
+        if which not in ("answer", "path", "all", "first"):
+            raise refusal(
+                self.source or "result", "which", shown(which), "answer, path, all or first", "choose one"
+            )
+        time = np.asarray(self.frames.time)
+        shared: dict[str, Any] = {"up": "-y", "source": self.source, "unit": self.unit}
+        if which == "path":
+            if self.path is None or not len(self.path):
+                raise refusal(
+                    self.source, "path", "no followed path", "a result of a film", "recover with follow"
+                )
+            return Motion(joints=self.path.joints[0], time=time, **shared)
+        rows = np.arange(len(self.survivors))
+        if which != "all":
+            first = [self.rows(k).start if self[k].joints.size else -1 for k in range(len(self))]
+            rows = np.asarray(self.answer.survivor if which == "answer" else first)
+        frame = np.arange(len(self)) if which != "all" else self.survivors.frame
+        known = rows >= 0
+        joints = np.full((len(rows), N_JOINTS + len(HEAD_POINTS), 3), np.nan)
+        joints[known, :N_JOINTS] = self.survivors.joints[rows[known]]
+        joints[known, N_JOINTS:] = self.survivors.head[rows[known]]  # type: ignore[index]
+        q = np.full((len(rows), self.survivors.q.shape[1]), np.nan)
+        q[known] = self.survivors.q[rows[known]]
+        return Motion(
+            joints=joints,
+            joint_names=(*self.joint_names, *HEAD_POINTS),
+            q=q,
+            q_names=self.configuration_names,
+            robot="figure",
+            time=time[frame],
+            frame=frame,
+            **shared,
+        )
 
-        write_result(path, result_of(self))
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the result: ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``."""
+        import posekit
+
+        posekit.save(self, path)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the survivors as a table: ``frame, time, probability, …, neck_x, …, q_0, …``."""
+        import pandas
+
+        table, time = self.survivors, np.asarray(self.frames.time)
+        columns: dict[str, Any] = {"frame": table.frame, "time": time[table.frame]}
+        for name in ("probability", "chi2", "branch", "group", "scale"):
+            columns[name] = getattr(table, name)
+        columns |= {f"margin_{name}": values for name, values in table.margins.items()}
+        for j, joint in enumerate(self.joint_names):
+            columns |= {f"{joint}_{axis}": table.joints[:, j, k] for k, axis in enumerate("xyz")}
+            columns[f"{joint}_radius"] = table.radius[:, j]  # type: ignore[index]
+            columns[f"{joint}_inferred"] = table.inferred[:, j]  # type: ignore[index]
+        columns |= {f"q_{k}": table.q[:, k] for k in range(table.q.shape[1])}
+        return pandas.DataFrame(columns)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Frame(Record):
+    """One frame of a recovery: columns of `Survivors` and entries of `Frames` and `Answer`, by name.
+
+    Parameters
+    ----------
+    recovery : Recovery
+    number : int
+        Frame, from 0.
+    """
+
+    recovery: Recovery
+    number: int
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        rows = self.recovery.rows(self.number)
+        return int(rows.stop) - int(rows.start)
+
+    def __dir__(self) -> list[str]:
+        """List the columns too."""
+        names = Survivors.__dataclass_fields__ | Answer.__dataclass_fields__ | Frames.__dataclass_fields__
+        return [*super().__dir__(), "answer", "picture", *names]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the frame's part of a column of the tables; ``margins`` by check."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        recovery, k = self.recovery, self.number
+        rows = recovery.rows(k)
+        if name == "margins":
+            return {check: values[rows] for check, values in recovery.survivors.margins.items()}
+        if name == "answer":
+            return recovery.answer.joints[k]
+        if name == "picture":
+            return recovery.frames.pictures[k] if recovery.frames.pictures else ""
+        for table, place in ((recovery.survivors, rows), (recovery.answer, k), (recovery.frames, k)):
+            if name in table.__dataclass_fields__:
+                return getattr(table, name)[place]
+        raise AttributeError(f"a frame has no {name!r}")
 
     def _facts(self) -> list[str]:
-        counts = [len(frame) for frame in self.frames]
-        none = f", none in {counts.count(0)}" if 0 in counts else ""
-        facts = [plural(len(counts), "frame"), f"{plural(sum(counts), 'posture')}{none}"]
-        return [*facts, f"ranges={self.settings['ranges']!r}"] if "ranges" in self.settings else facts
-
-    def _drawing(self) -> str:
-        answer = next((one for one in self.answers if len(one)), None)
-        return "" if answer is None else posture_drawing(answer.joints[:MAX_DRAWN], CAMERA_UP)
+        return [f"frame {self.number}", f"{len(self)} {'posture' if len(self) == 1 else 'postures'}"]

@@ -1,0 +1,426 @@
+"""One person through a sequence: the likeliest paths through the survivors of its frames.
+
+Every end of a path carries where the body is and how fast it moves, and goes on to every survivor of the next frame, or
+passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. Of more, those
+that end in the same survivor go on as the cheapest of them moves: Viterbi's algorithm (Forney 1973, Proc. IEEE
+61:268-278) with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over
+all paths give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import digamma, logsumexp
+
+from posekit.errors import refusal
+from posekit.following.kalman import DENSITY, Moving, smooth
+from posekit.geometry import Array
+from posekit.recovery.answer import lay
+from posekit.recovery.recovery import Paths, Recovery
+from posekit.skeleton import SEGMENT_NAMES
+
+#: Speeds that no joint exceeds, m/s. The trunk of the fastest sprinter passes 20 m at 12.1 m/s (Čoh et al. 2018,
+#: Kinesiology 50:172); the fastest balls leave hand and foot at 47 and 37 m/s, faster than wrist and ankle are.
+MAX_SPEED: Final = np.array([15.0] * 6 + [25.0, 25.0, 35.0, 35.0, 25.0, 25.0, 35.0, 35.0])
+
+#: Degrees of freedom of steps: a sudden move is dear and not impossible.
+NU: Final = 4.0
+
+#: Weight of steps to survivors under noise: the joints of a body are off together, and frames as their neighbours.
+NOISY_WEIGHT: Final = 0.25
+
+#: Cost of passing over a frame beside that of a usual step.
+SKIP: Final = 100.0
+
+#: Cost of each joint that a survivor lacks and another of its frame has: unknown joints make no steps.
+MISSING_JOINT: Final = 5.0
+
+#: Standard deviations of both ends by which `MAX_SPEED` gives way.
+WALL_DEVIATIONS: Final = 3.0
+
+#: Survivors that are looked at hold this share of the probability; paths are kept apart up to `WIDTH`; an end that
+#: costs `SLACK` more than the cheapest is dropped.
+COVERAGE, MAX_SURVIVORS, WIDTH, SLACK = 0.95, 128, 64, 60.0
+
+#: Distance of some joint in some frame that makes another path.
+APART_METRES: Final = 0.25
+
+#: Least probability of another path in the frame in which it differs most.
+LEAST_SHARE: Final = 1e-6
+
+#: Interval for which the cost of a usual step is taken, seconds.
+USUAL_INTERVAL: Final = 1 / 30
+
+#: A joint's 95 % radius over its deviation along the ray, which is most of it.
+RADIUS_DEVIATIONS: Final = 1.96
+
+#: A joint's deviation across its ray over that along it: 2 px at 4 m are 8 mm, and 4 cm of depth.
+ACROSS: Final = 0.2
+
+
+class Candidates(NamedTuple):
+    """The survivors of one frame, as a path sees them.
+
+    Attributes
+    ----------
+    time : float
+        Seconds.
+    joints : array (N, 14, 3)
+        Metres; NaN where a joint is not known.
+    covariance : array (N, 14, 3, 3)
+        Square metres.
+    cost : array (N,)
+        Minus the logarithm of each probability.
+    """
+
+    time: float
+    joints: Array
+    covariance: Array
+    cost: Array
+
+
+class Stage(NamedTuple):
+    """The S ends of paths after a frame, from the P before it.
+
+    Attributes
+    ----------
+    survivor : int array (S,)
+        Survivor of each; -1 where the frame is passed over.
+    parent : int array (S,)
+        End before, on the cheapest way.
+    cost : array (P, S)
+        Of every step, with the survivor's own; infinite where there is none.
+    forward : array (S,)
+        Logarithm of the sum of the likelihoods of all paths to each, but for a constant.
+    """
+
+    survivor: NDArray[np.intp]
+    parent: NDArray[np.intp]
+    cost: Array
+    forward: Array
+
+
+class Trellis:
+    """All paths through the frames so far.
+
+    Attributes
+    ----------
+    stages : list of Stage
+    cheapest : array (S,)
+        Cost of the cheapest path to each end.
+    """
+
+    def __init__(self) -> None:
+        self.stages: list[Stage] = []
+        self.ends = Moving.nothing(1)
+        self.cheapest, self.forward = np.zeros(1), np.zeros(1)
+        self._last = np.nan
+
+    def push(self, frame: Candidates) -> None:
+        """Go on by one frame."""
+        known = np.asarray(np.isfinite(frame.joints).all(axis=2))
+        own = frame.cost + MISSING_JOINT * (known.any(axis=0) & ~known).sum(axis=1)
+        chosen = _likeliest(np.where(known.any(axis=1), own, np.inf))
+        joints, covariance, own = frame.joints[chosen], frame.covariance[chosen], own[chosen]
+        seconds = 1.0 if np.isnan(self._last) else frame.time - self._last
+        self._last = frame.time
+        weight = NOISY_WEIGHT if covariance.any() else 1.0
+        led = self.ends.after(seconds)
+        ways = weight * step_costs(self.ends, led, joints, covariance) + own
+        skip = SKIP + (
+            weight * _usual_step(covariance[own.argmin()], known[chosen][own.argmin()]) if len(own) else 0.0
+        )
+        total = self.cheapest[:, None] + np.concatenate([ways, np.full((len(led.mean), 1), skip)], axis=1)
+        parent, target, into = _kept(total)
+        near = total <= total.min() + SLACK
+        step = np.full((len(total), len(parent)), np.inf)
+        rows, columns = np.nonzero(near)
+        np.minimum.at(step, (rows, into[rows, columns]), (total - self.cheapest[:, None])[rows, columns])
+        self.cheapest = total[parent, target]
+        forward = logsumexp(self.forward[:, None] - step, axis=0)
+        self.forward = forward - forward.max()
+        seen = np.full((len(parent), *joints.shape[1:]), np.nan)
+        spread = np.zeros((len(parent), *covariance.shape[1:]))
+        here = target < len(chosen)
+        seen[here], spread[here] = joints[target[here]], covariance[target[here]]
+        self.ends = led.take(parent).given(seen, spread)
+        self.stages.append(Stage(np.append(chosen, -1)[target], parent, step, self.forward))
+
+    def cheapest_path(self) -> NDArray[np.intp]:
+        """Return the survivors of the cheapest path (T,); -1 for frames that it passes over."""
+        end, path = int(np.argmin(self.cheapest)), []
+        for stage in reversed(self.stages):
+            path.append(int(stage.survivor[end]))
+            end = int(stage.parent[end])
+        return np.array(path[::-1], dtype=np.intp)
+
+    def marginals(self, at: int = -1, among: NDArray[np.bool_] | None = None) -> list[Array]:
+        """Return the probability of every end (S,) of each frame, given all frames.
+
+        Parameters
+        ----------
+        at : int
+            A frame.
+        among : bool array (S,), optional
+            Ends that paths may go through there; all by default.
+        """
+        forward = [stage.forward for stage in self.stages]
+        if among is not None:
+            forward = [*forward[:at], np.where(among, forward[at], -np.inf)]
+            for stage in self.stages[at + 1 :]:
+                forward.append(logsumexp(forward[-1][:, None] - stage.cost, axis=0))
+        backward, found = np.zeros(len(forward[-1])), []
+        for k in range(len(self.stages) - 1, -1, -1):
+            if among is not None and k == at:
+                backward = np.where(among, backward, -np.inf)
+            both = forward[k] + backward
+            found.append(np.exp(both - logsumexp(both)))
+            backward = logsumexp(backward - self.stages[k].cost, axis=1)
+            backward -= backward.max()
+        return found[::-1]
+
+
+def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> Array:
+    r"""Return the costs (S, N) of finding survivors where the motion of ends leads; infinite beyond `MAX_SPEED`.
+
+    A step costs minus the log-likelihood of the joints' distances x from where the filter expects them, under a Student
+    distribution (Lange, Little & Taylor 1989, J. Am. Stat. Assoc. 84:881-896),
+
+    .. math:: \sum_j \tfrac{\nu + 3}{2} \log\left(1 + \tfrac{1}{\nu} x_j^T S_j^{-1} x_j\right)
+              + \tfrac12 \log\frac{|S_j|}{\sigma_j^6}, \qquad S_j = P_j + R_j,
+
+    with the filter's covariance P, the survivor's R, and :math:`\sigma_j^2` the random acceleration's part of P: a
+    joint that is where its motion takes it, exactly known before, costs nothing.
+
+    Parameters
+    ----------
+    ends, led : Moving
+        At the last frame, and carried on to this one.
+    joints, covariance : array (N, 14, 3), (N, 14, 3, 3)
+    """
+    known = np.isfinite(joints).all(axis=2)
+    both = ends.known[:, None] & known
+    x = np.where(both[..., None], np.nan_to_num(joints) - led.mean[:, None, :, :3], 0.0)
+    S = led.spread[:, None, :, :3, :3] + covariance
+    a, d, f = S[..., 0, 0], S[..., 1, 1], S[..., 2, 2]
+    b, c, e = S[..., 0, 1], S[..., 0, 2], S[..., 1, 2]
+    A, B, C = d * f - e * e, c * e - b * f, b * e - c * d
+    size = a * A + b * B + c * C
+    X, Y, Z = x[..., 0], x[..., 1], x[..., 2]
+    own = A * X * X + (a * f - c * c) * Y * Y + (a * d - b * b) * Z * Z
+    mixed = B * X * Y + C * X * Z + (b * c - a * e) * Y * Z
+    distance = (own + 2 * mixed) / size
+    scale = DENSITY * np.where(ends.known, led.since, 1.0) ** 3 / 3
+    wide = np.log(np.maximum(size / scale[:, None] ** 3, 1.0))
+    cost = np.where(both, (NU + 3) / 2 * np.log1p(distance / NU) + 0.5 * wide, 0.0).sum(axis=2)
+    moved = np.linalg.norm(np.nan_to_num(joints) - ends.mean[:, None, :, :3], axis=3)
+    traces = [np.sqrt(np.trace(one, axis1=-2, axis2=-1)) for one in (ends.spread[..., :3, :3], covariance)]
+    reach = (MAX_SPEED * led.since)[:, None] + WALL_DEVIATIONS * (traces[0][:, None] + traces[1])
+    return np.where((both & (moved > reach * (1 + 1e-12) + 1e-12)).any(axis=2), np.inf, cost)
+
+
+def follow(recovery: Recovery, *, paths: int = 2, progress: Callable[[int], None] | None = None) -> Recovery:
+    """Follow the person through the frames of a recovery.
+
+    The first path is what is expected of each frame given all frames, smoothed and laid onto the person's lengths.
+    Each further path is expected if in one frame the body is elsewhere, by 25 cm in some joint: in that frame, with
+    that survivor, that is the likeliest. In an uncalibrated view postures move about their neck.
+
+    Parameters
+    ----------
+    recovery : Recovery
+    paths : int
+        Number of paths; fewer are found if there are not so many.
+    progress : callable, optional
+        Called with the number of frames done since the last call.
+
+    Returns
+    -------
+    Recovery
+        The same with `path`.
+
+    Raises
+    ------
+    InputError
+        If no frame has a survivor, or times do not ascend.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> from posekit.following import follow
+    >>> follow(posekit.recover(posekit.builtin_view("seq1"))).path.survivor.shape
+    (2, 5)
+    """
+    time = np.asarray(recovery.frames.time)
+    if not len(recovery.survivors):
+        raise refusal(
+            recovery.source, "follow", "no frame with a posture", "some", "recover with other settings"
+        )
+    if (np.diff(time) <= 1e-6).any():
+        raise refusal(
+            recovery.source, "time", "times that do not ascend", "one picture a time", "drop the others"
+        )
+    frames = [candidates(recovery, k) for k in range(len(recovery))]
+    trellis = Trellis()
+    for frame in frames:
+        trellis.push(frame)
+        if progress is not None:
+            progress(1)
+    ends = [stage.survivor for stage in trellis.stages]
+    marginals = trellis.marginals()
+    lengths = np.array([recovery.lengths[name] for name in SEGMENT_NAMES])
+    found, odds = [_expected(frames, ends, marginals, lengths)], [1.0]
+    while len(found) < paths:
+        other = _elsewhere(frames, ends, marginals, [one[1] for one in found])
+        if other is None:
+            break
+        found.append(_expected(frames, ends, trellis.marginals(*other[:2]), lengths))
+        odds.append(other[2])
+    order = np.argsort(-np.array(odds), kind="stable")
+    local = np.stack([found[k][0] for k in order])
+    rows = np.where(local < 0, -1, local + np.array([recovery.rows(k).start for k in range(len(frames))]))
+    share = np.array(odds)[order]
+    joints = np.stack([found[k][2] for k in order])
+    return replace(recovery, path=Paths(survivor=rows, probability=share / share.sum(), joints=joints))
+
+
+def candidates(recovery: Recovery, k: int) -> Candidates:
+    """Return the survivors of a frame as paths see them: a joint's noise is mostly along its ray."""
+    rows = recovery.rows(k)
+    table = recovery.survivors
+    joints, radius = table.joints[rows], np.asarray(table.radius)[rows]
+    orthographic = bool(np.isfinite(np.asarray(table.scale)[rows]).any())
+    if orthographic:
+        joints = joints - joints[:, :1]
+    deep = np.array([0.0, 0.0, 1.0])
+    ray = (
+        np.broadcast_to(deep, joints.shape)
+        if orthographic
+        else joints / np.linalg.norm(joints, axis=2)[..., None]
+    )
+    along = np.nan_to_num(ray[..., :, None] * ray[..., None, :])
+    deviation = radius / RADIUS_DEVIATIONS
+    covariance = deviation[..., None, None] ** 2 * (along + ACROSS**2 * (np.eye(3) - along))
+    with np.errstate(divide="ignore"):
+        cost = -np.log(np.asarray(table.probability)[rows])
+    return Candidates(float(recovery.frames.time[k]), joints, covariance, np.maximum(cost, 0.0))
+
+
+def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> tuple[int, Array, Array]:
+    """Return the survivor nearest to the expected posture, that posture, and its covariance.
+
+    The mean of all survivors, each as likely as all frames together say, is off least. Its covariance is the survivors'
+    own and their differences. Exact survivors are points of a set with nothing between them: the nearest is returned.
+    Where the frame is likelier passed over, the survivor is -1 and the posture NaN.
+    """
+    rows = np.flatnonzero(at >= 0)
+    weight, at = share[rows], at[rows]
+    if not weight.sum() > 0.5:
+        return -1, np.full(frame.joints.shape[1:], np.nan), np.zeros((*frame.joints.shape[1:], 3))
+    joints = frame.joints[at]
+    known = np.asarray(np.isfinite(joints).all(axis=2))
+    each = weight[:, None] * known
+    with np.errstate(invalid="ignore", divide="ignore"):
+        each = each / each.sum(axis=0)
+    mean = np.einsum("nj,njc->jc", each, np.nan_to_num(joints))
+    one = int(np.nansum((joints - mean) ** 2, axis=(1, 2)).argmin())
+    if not frame.covariance[at].any():
+        return int(at[one]), joints[one], np.zeros((*mean.shape, 3))
+    off = np.where(known[..., None], joints - mean, 0.0)
+    spread = np.einsum("nj,njcd->jcd", each, frame.covariance[at]) + np.einsum(
+        "nj,njc,njd->jcd", each, off, off
+    )
+    return int(at[one]), mean, np.nan_to_num(spread)
+
+
+def _likeliest(own: Array) -> NDArray[np.intp]:
+    """Choose survivors by their cost (N,): those that hold `COVERAGE`, ties included, at most `MAX_SURVIVORS`."""
+    order = np.argsort(own, kind="stable")
+    order = order[np.isfinite(own[order])]
+    if not len(order):
+        return order
+    held = np.cumsum(np.exp(own[order[0]] - own[order]))
+    last = min(int(np.searchsorted(held, COVERAGE * held[-1])), len(order) - 1)
+    enough = int(np.searchsorted(own[order], own[order[last]] + 1e-9, side="right"))
+    return np.sort(order[: min(enough, MAX_SURVIVORS)])
+
+
+def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Choose the ways (S, N + 1) that become ends: parents, targets, and the end that each way becomes."""
+    near = total <= total.min() + SLACK
+    most = max(1, WIDTH // total.shape[1]) if near.sum() > WIDTH else len(total)
+    masked = np.where(near, total, np.inf)
+    order = np.argsort(masked, axis=0, kind="stable")[:most]
+    place, target = np.nonzero(np.isfinite(np.take_along_axis(masked, order, axis=0)))
+    by_target = np.lexsort((place, target))
+    place, target = place[by_target], target[by_target]
+    parent = order[place, target]
+    first = np.minimum(np.searchsorted(target, np.arange(total.shape[1])), len(target) - 1)
+    into = np.tile(first, (len(total), 1))
+    into[parent, target] = np.arange(len(parent))
+    return parent, target, into
+
+
+def _usual_step(covariance: Array, known: NDArray[np.bool_]) -> float:
+    """Return the average cost of a step between two survivors with the noise of one (14, 3, 3)."""
+    scale = DENSITY * USUAL_INTERVAL**3 / 3
+    # The variance of a predicted place is about twice the acceleration's own where points are exact.
+    wide = np.log(np.linalg.det(2.0 * (np.eye(3) + covariance / scale[:, None, None])))
+    typical = (NU + 3) / 2 * float(digamma((NU + 3) / 2) - digamma(NU / 2))
+    return float((typical + 0.5 * wide)[known].sum())
+
+
+def _expected(
+    frames: Sequence[Candidates], ends: Sequence[NDArray[np.intp]], marginals: Sequence[Array], lengths: Array
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the survivors (T,), their joints and the smoothed joints (T, 14, 3) of one path."""
+    each = [expected_posture(*one) for one in zip(frames, ends, marginals, strict=True)]
+    survivor = np.array([one[0] for one in each], dtype=np.intp)
+    time = np.array([frame.time for frame in frames])
+    own = np.stack([f.joints[k] if k >= 0 else e[1] for f, k, e in zip(frames, survivor, each, strict=True)])
+    given, covariance = np.stack([one[1] for one in each]), np.stack([one[2] for one in each])
+    joints, _ = smooth(time, given, covariance)
+    if covariance.any():
+        joints = lay(joints, np.broadcast_to(lengths, (len(time), len(lengths))))
+    else:
+        joints = np.where(np.isnan(given), joints, given)
+    return survivor, own, joints
+
+
+def _elsewhere(
+    frames: Sequence[Candidates],
+    ends: Sequence[NDArray[np.intp]],
+    marginals: Sequence[Array],
+    found: Sequence[Array],
+) -> tuple[int, NDArray[np.bool_], float] | None:
+    """Find where the body is likeliest elsewhere than on the paths found: frame, ends there, odds against the first."""
+    best, at = LEAST_SHARE, -1
+    places: list[Array] = []
+    away: list[NDArray[np.bool_]] = []
+    for k, (frame, chosen, share) in enumerate(zip(frames, ends, marginals, strict=True)):
+        joints = np.full((len(chosen), *frame.joints.shape[1:]), np.nan)
+        joints[chosen >= 0] = frame.joints[chosen[chosen >= 0]]
+        places.append(joints)
+        away.append(
+            (chosen >= 0) & np.all([_apart(joints, path[k]) > APART_METRES for path in found], axis=0)
+        )
+        most = float(share[away[k]].max(initial=0.0))
+        best, at = (most, k) if most > best else (best, at)
+    if at < 0:
+        return None
+    share, joints = marginals[at], places[at]
+    one = int(np.argmax(np.where(away[at], share, -1.0)))
+    among = away[at] & (_apart(joints, joints[one]) <= APART_METRES)
+    near = (ends[at] < 0) | (_apart(joints, found[0][at]) <= APART_METRES)
+    odds = float(share[among].sum() / max(float(share[near].sum()), LEAST_SHARE))
+    return at, among, min(odds, 1.0)
+
+
+def _apart(joints: Array, other: Array) -> Array:
+    """Return the distance (N,) of the farthest joint of postures from another's."""
+    return np.asarray(np.fmax.reduce(np.linalg.norm(joints - other, axis=-1), axis=1, initial=0.0))

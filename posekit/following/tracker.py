@@ -1,0 +1,266 @@
+"""`Tracker`: the key points of one picture in, the posture of this picture and the path up to some pictures ago out."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.cameras import Detections, PinholeCamera, View
+from posekit.cameras.guesses import camera_from_fov
+from posekit.errors import PosekitError, refusal
+from posekit.following.paths import Candidates, Trellis, candidates, expected_posture
+from posekit.geometry import Array, Record
+from posekit.recovery.conductor import recover
+from posekit.recovery.recovery import Recovery
+from posekit.settings import RecoverSettings
+from posekit.skeleton import JOINTS, POINTS
+
+#: Diagonal angle of view of a usual webcam (Logitech C920, data sheet).
+WEBCAM_DEGREES: Final = 78.0
+
+#: Standard deviation of a live detector's points where none is stated, pixels.
+DETECTED_DEVIATION: Final = 5.0
+
+#: Pictures that a path looks ahead: a sixth of a second at 30 a second.
+DEFAULT_LAG: Final = 5
+
+
+class PathPosture(NamedTuple):
+    """One picture on the likeliest path, as known `lag` pictures later.
+
+    Attributes
+    ----------
+    frame : int
+        Picture, from 0.
+    time : float
+        Seconds.
+    joints : array (14, 3)
+        Camera frame, metres; NaN where the picture is passed over.
+    """
+
+    frame: int
+    time: float
+    joints: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class TrackedPosture(Record):
+    """What is known once a picture was seen.
+
+    Parameters
+    ----------
+    frame : int
+        Picture, from 0.
+    time : float
+        Seconds.
+    joints : array (14, 3)
+        Answer of this picture alone, camera frame, metres; NaN where it has none.
+    sure : float
+        Probability that every joint of it is within 5 cm; 0 where there is none.
+    reason : str
+        Why the picture has no posture; empty where it has.
+    path : PathPosture, optional
+        The picture `lag` before this one; None for the first ones.
+    recovery : Recovery, optional
+        Every survivor of the picture.
+    """
+
+    frame: int
+    time: float
+    joints: Array
+    sure: float = 0.0
+    reason: str = ""
+    path: PathPosture | None = None
+    recovery: Recovery | None = None
+
+    @property
+    def survivors(self) -> int:
+        """Number of survivors."""
+        return 0 if self.recovery is None else len(self.recovery.survivors)
+
+
+class Tracker:
+    """Recovers one picture a call, and follows the person.
+
+    The postures of a picture are those that `posekit.recover` finds for it alone; the path remembers.
+
+    Parameters
+    ----------
+    settings : RecoverSettings, optional
+        Settings for each picture.
+    camera : PinholeCamera, optional
+        By default a usual webcam's, from `size`.
+    size : (int, int), optional
+        Width and height of the pictures, pixels.
+    lengths : mapping of str to float, optional
+        Segment lengths of the person, metres.
+    stature : float, optional
+        Height of the person, metres, where no lengths are given.
+    deviation : float, optional
+        Standard deviation of each coordinate of the points, pixels; 5 by default.
+    layout : str or Layout, optional
+        Meaning of the points: name or file of a layout, as ``coco_17``. By default the 14 joints in tree order,
+        or these and the head's five points.
+    lag : int
+        Pictures that the path looks ahead.
+
+    Raises
+    ------
+    InputError
+        If neither a camera nor a size is given, or the layout has no order of points.
+
+    Examples
+    --------
+    >>> tracker = Tracker(size=(1280, 720), stature=1.75, deviation=2.0)
+    >>> tracker.update(np.full((14, 2), np.nan), time=0.0).survivors
+    0
+    """
+
+    def __init__(
+        self,
+        settings: RecoverSettings | None = None,
+        *,
+        camera: PinholeCamera | None = None,
+        size: tuple[int, int] | None = None,
+        lengths: Mapping[str, float] | None = None,
+        stature: float | None = None,
+        deviation: float | None = None,
+        layout: Any = "",
+        lag: int = DEFAULT_LAG,
+    ) -> None:
+        if camera is None and size is None:
+            raise refusal(
+                "Tracker", "camera", "neither a camera nor a size", "one of them", "give size=(1280, 720)"
+            )
+        if isinstance(layout, str) and layout:
+            # Layouts belong to the files, above this room; only a name given here needs them.
+            layout = import_module("posekit.formats.layout").load_layout(layout)
+        if layout and not layout.points:
+            expected = "a detector's layout, as coco_17"
+            raise refusal(
+                "Tracker", "layout", layout.name, expected, "choose a layout whose points have an order"
+            )
+        self.settings = settings or RecoverSettings()
+        self.camera = camera or camera_from_fov(size or (0, 0), WEBCAM_DEGREES, "diagonal")
+        self.layout, self.lag = layout or None, lag
+        self.names: tuple[str, ...] = tuple(layout.points) if layout else POINTS
+        self._known: dict[str, Any] = {
+            "lengths": dict(lengths or {}),
+            "stature": stature or self.settings.stature,
+            "deviation": deviation or self.settings.deviation or DETECTED_DEVIATION,
+        }
+        self._trellis = Trellis()
+        self._waiting: deque[tuple[int, Candidates]] = deque()
+        self._frame, self._last = 0, -math.inf
+
+    def update(self, points: ArrayLike, time: float, *, root: ArrayLike | None = None) -> TrackedPosture:
+        """Take the points of the next picture.
+
+        Parameters
+        ----------
+        points : array (K, 2) or (K, 3)
+            Pixels, with a confidence in the third column if there is one; NaN for points that were not seen.
+        time : float
+            Seconds, more than at the last call.
+        root : array (3,), optional
+            The neck, camera frame, metres, if it is known otherwise.
+
+        Raises
+        ------
+        InputError
+            If the number of points is wrong or the time does not ascend: the picture then does not count.
+        """
+        if not (math.isfinite(time) and time > self._last + 1e-6):
+            raise refusal(
+                "Tracker", "time", f"{time:g}", f"seconds after {self._last:g}", "give every picture its time"
+            )
+        view = self._view(np.array(points, dtype=np.float64), float(time), root)
+        recovery, reason = None, "the neck is not seen"
+        if view is not None:
+            try:
+                recovery = recover(view, self.settings)
+                reason = recovery.frames.reason[0]
+            except PosekitError as error:
+                reason = str(error)
+        frame = Candidates(time, np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS), 3, 3)), np.empty(0))
+        if recovery is not None:
+            frame = candidates(recovery, 0)._replace(time=float(time))
+        self._trellis.push(frame)
+        self._waiting.append((self._frame, frame))
+        posture = TrackedPosture(
+            frame=self._frame,
+            time=float(time),
+            joints=np.full((len(JOINTS), 3), np.nan) if recovery is None else recovery.answer.joints[0],
+            sure=0.0 if recovery is None else float(np.nan_to_num(recovery.answer.sure[0])),
+            reason=reason,
+            path=self._oldest() if len(self._waiting) > self.lag else None,
+            recovery=recovery,
+        )
+        self._frame, self._last = self._frame + 1, float(time)
+        return posture
+
+    def finish(self) -> list[PathPosture]:
+        """Return the path of the pictures that was not returned yet. More may follow."""
+        return [self._oldest() for _ in range(len(self._waiting))]
+
+    def _oldest(self) -> PathPosture:
+        """Take the oldest picture out of the window, with its place on the path."""
+        number, frame = self._waiting.popleft()
+        share = self._trellis.marginals()[0]
+        _, joints, _ = expected_posture(frame, self._trellis.stages[0].survivor, share)
+        self._trellis.stages.pop(0)
+        return PathPosture(number, frame.time, joints)
+
+    def _view(self, points: Array, time: float, root: ArrayLike | None) -> View | None:
+        """Make the view of one picture; None where it shows no neck."""
+        counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
+        if points.ndim != 2 or len(points) not in counts or points.shape[1] not in (2, 3):
+            wanted = " or ".join(str(count) for count in counts)
+            raise refusal(
+                "Tracker",
+                "points",
+                f"shape {points.shape}",
+                f"({wanted}, 2) or 3 columns",
+                "give NaN for gaps",
+            )
+        image = np.where(np.isnan(points[:, :2]).any(axis=1, keepdims=True), np.nan, points[:, :2])
+        confidence = points[:, 2:] if points.shape[1] == 3 else np.full((len(points), 1), np.nan)
+        if self.layout:
+            names, seen, _ = self.layout.seen((), image[None])
+            unsure = np.where(np.isnan(image[:, :1]), np.nan, confidence)
+            _, sure, _ = self.layout.seen((), unsure[None])
+            kept = [k for k, name in enumerate(names) if name in POINTS]
+            detections = Detections(
+                points=seen[:, kept],
+                confidence=sure[:, kept, 0],
+                names=tuple(names[k] for k in kept),
+                frame=np.zeros(1, dtype=np.intp),
+                time=np.array([time]),
+                layout=self.layout.name,
+            )
+            if not np.isfinite(detections.points).any():
+                return None
+            view = replace(detections.view(self.camera), **self._known)
+        else:
+            every = np.full((len(POINTS), 3), np.nan)
+            every[: len(image)] = np.concatenate([image, confidence], axis=1)
+            if np.isnan(every[0, 0]):
+                return None
+            view = View(
+                camera=self.camera,
+                time=np.array([time]),
+                image=every[None, : len(JOINTS), :2],
+                head_image=every[None, len(JOINTS) :, :2],
+                confidence=every[None, :, 2],
+                **self._known,
+            )
+        if np.isnan(view.image[0, 0, 0]):
+            return None
+        return view if root is None else replace(view, root=np.asarray(root, dtype=np.float64)[None])

@@ -1,0 +1,222 @@
+r"""The prior of postures: mixtures of Student's t over directions, with the weights of each kind of evidence.
+
+.. math::
+
+    \log p(x) = c + \log \sum_k s_k \left(1 + \frac{(x - m_k)^T S^{-1} (x - m_k)}{\nu}\right)^{-(\nu + d) / 2}
+
+Some of its coordinates alone have the same law, with their part of m and S (Kotz & Nadarajah 2004, Multivariate t
+distributions and their applications, §1.10): an unknown coordinate is left out by leaving it out.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.errors import refusal, shown
+from posekit.geometry import Array, Record, read_only
+from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
+
+PRIORS: Final = Path(__file__).resolve().parents[1] / "urdf" / "priors"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StudentMixture(Record):
+    """A mixture of K t distributions of d coordinates that differ in their middles only.
+
+    Parameters
+    ----------
+    means : array (K, d)
+        Middles m.
+    scale : array (d, d)
+        S, symmetric and positive definite.
+    dof : float
+        Degrees of freedom: the fewer, the heavier the tails.
+    share : array (K,)
+        Share s of each distribution; taken in proportion.
+    """
+
+    means: Array
+    scale: Array
+    dof: float
+    share: Array
+
+    def __post_init__(self) -> None:
+        for name in ("means", "scale"):
+            self._set(name, read_only(getattr(self, name)))
+        self._set("share", read_only(np.asarray(self.share) / np.sum(self.share)))
+
+    @cached_property
+    def whitening(self) -> Array:
+        """Lower triangular W with W' W = S^-1: its first k rows whiten the first k coordinates."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.scale)))
+
+    def part(self, rows: Any) -> StudentMixture:
+        """Return the distribution of some coordinates alone."""
+        return replace(self, means=self.means[:, rows], scale=self.scale[rows][:, rows])
+
+    def widened(self, variance: Array) -> StudentMixture:
+        """Return the same with more variance (d,) in each coordinate."""
+        return replace(self, scale=self.scale + np.diag(variance))
+
+    def excess(self, x: Array, count: int) -> Array:
+        """Return the log-density above its average over the distribution (N,), of the first `count` coordinates.
+
+        Parameters
+        ----------
+        x : array (N, d)
+            NaN where a coordinate is not known: the known ones are judged, against their own average.
+        count : int
+            Number of leading coordinates.
+        """
+        known = np.isfinite(x[:, :count])
+        found = np.zeros(len(x))
+        code = known @ (1 << np.arange(count))
+        for pattern in np.unique(code):
+            rows = np.flatnonzero(code == pattern)
+            columns = np.flatnonzero(known[rows[0]])
+            if len(columns):
+                part = self if len(columns) == count else self.part(columns)
+                found[rows] = part._log_sum(x[np.ix_(rows, columns)], len(columns)) - part._usual(
+                    len(columns)
+                )
+        return found
+
+    def _usual(self, count: int) -> float:
+        """Average of the log of the sum over the distribution; of each component where the others do not overlap."""
+        if count not in self._averages:
+            power = (self.dof + count) / 2
+            own = power * (digamma(power) - digamma(self.dof / 2))
+            self._averages[count] = float(self.share @ self._log_sum(self.means, count)) - own
+        return self._averages[count]
+
+    @cached_property
+    def _averages(self) -> dict[int, float]:
+        return {}
+
+    def _log_sum(self, x: Array, count: int) -> Array:
+        """Return the log of the sum over the components at points (N, d)."""
+        W = self.whitening[:count, :count]
+        points, middles = x[:, :count] @ W.T, self.means[:, :count] @ W.T
+        squared = (points**2).sum(1)[:, None] + (middles**2).sum(1) - 2.0 * points @ middles.T
+        base = 1.0 + np.maximum(squared, 0.0) / self.dof
+        power = (self.dof + count) / 2
+        # Counted from the nearest component, no power vanishes.
+        nearest = base.min(axis=1)
+        return np.asarray(np.log((nearest[:, None] / base) ** power @ self.share) - power * np.log(nearest))
+
+
+def digamma(x: float) -> float:
+    """Return the logarithmic derivative of the gamma function at x > 0 (Abramowitz & Stegun 1964, 6.3.5 and 6.3.18)."""
+    below = 0.0
+    while x < 12.0:
+        below -= 1.0 / x
+        x += 1.0
+    y = 1.0 / (x * x)
+    series = y * (1 / 12 - y * (1 / 120 - y * (1 / 252 - y * (1 / 240 - y / 132))))
+    return below + math.log(x) - 0.5 / x - series
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Prior(Record):
+    r"""A prior of postures, and the weights of the terms that `posekit.ranking.rank` adds up.
+
+    Parameters
+    ----------
+    blocks : sequence of (names, StudentMixture, bool)
+        Directions that are judged together, and whether only `up` is judged, given the others.
+    temperature : float
+        Metres: for exact postures the log-density of directions is divided by 1 + deviation / temperature. A posture
+        that is a centimetre off is no draw from a distribution that is sharp to a degree.
+    weights, noisy : mapping of str to float
+        Weight of each term for exact postures, and for modes under noise.
+    balance, contact : (float, float)
+        Scale s (m) and average u of :math:`u - \log(1 + (d / s)^2)`, the log-density of a distance that is mostly
+        small.
+    """
+
+    blocks: Sequence[tuple[tuple[str, ...], StudentMixture, bool]]
+    temperature: float
+    weights: Mapping[str, float]
+    noisy: Mapping[str, float]
+    balance: tuple[float, float]
+    contact: tuple[float, float]
+    _wide: dict[tuple[int, float], StudentMixture] = field(default_factory=dict)
+
+    def judge(self, found: Array, sine: float = 0.0) -> tuple[Array, Array]:
+        """Return the log-densities of directions (N, 10 or 11, 3), each above its average.
+
+        Parameters
+        ----------
+        found : array
+            `posekit.ranking.directions.directions`, with `up` or without.
+        sine : float
+            Sine of the deviation of `up`: its variance is added.
+
+        Returns
+        -------
+        posture, gravity : array (N,)
+            Of the posture alone, and of `up` given the posture; 0 where nothing is known.
+        """
+        posture, gravity = np.zeros(len(found)), np.zeros(len(found))
+        for index, (names, student, conditional) in enumerate(self.blocks):
+            at = [DIRECTION_NAMES.index(name) for name in names]
+            alone = 3 * sum(k != UP_INDEX for k in at)
+            if found.shape[1] <= UP_INDEX:
+                at = [k for k in at if k != UP_INDEX]
+            flat = found[:, at].reshape(len(found), 3 * len(at))
+            one = student.excess(flat, alone)
+            if not conditional:
+                posture += one
+            if flat.shape[1] > alone:
+                # log p(posture, up) - log p(posture) is the log-density of up given the posture.
+                if (index, sine) not in self._wide:
+                    extra = np.where(np.arange(flat.shape[1]) < alone, 0.0, sine**2)
+                    self._wide[index, sine] = student.widened(extra)
+                gravity += self._wide[index, sine].excess(flat, flat.shape[1]) - one
+        return posture, gravity
+
+
+@lru_cache(maxsize=4)
+def load_prior(name: str = "people") -> Prior:
+    """Load a prior by name, or from a TOML table of the same form.
+
+    Raises
+    ------
+    InputError
+        If there is no such table, or a part of it is missing.
+    """
+    path = Path(name) if name.endswith(".toml") else PRIORS / f"{name}.toml"
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        blocks = [_block(one, float(table["dof"])) for one in table["block"]]
+        return Prior(
+            blocks=blocks,
+            temperature=table["temperature"],
+            weights=table["weights"],
+            noisy=table["noisy"],
+            balance=(table["balance"]["scale"], table["balance"]["usual"]),
+            contact=(table["contact"]["scale"], table["contact"]["usual"]),
+        )
+    except (OSError, KeyError, ValueError, TypeError, np.linalg.LinAlgError) as error:
+        raise refusal(
+            name, "", shown(str(error)), "a table as urdf/priors/people.toml", "correct it"
+        ) from None
+
+
+def _block(table: Mapping[str, Any], dof: float) -> tuple[tuple[str, ...], StudentMixture, bool]:
+    """Read one block: its scale is given as the lower triangle, row by row."""
+    names = tuple(table["directions"])
+    scale = np.zeros((3 * len(names), 3 * len(names)))
+    for row, values in enumerate(table["scale"]):
+        scale[row, : row + 1] = scale[: row + 1, row] = values
+    means = np.atleast_2d(table["mean"])
+    student = StudentMixture(means=means, scale=scale, dof=dof, share=table.get("share", np.ones(len(means))))
+    return names, student, bool(table.get("conditional", False))

@@ -1,0 +1,218 @@
+"""The family of postures behind one uncalibrated image: a scale, and one sign for each segment (Taylor 2000, §2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.errors import CameraError, refusal
+from posekit.geometry import FARTHEST_COORDINATE, Array, Record, read_only
+from posekit.recovery.objects.linkage import Linkage
+
+#: Relative distance from the bound below which a scale is at it, and a segment is foreshortened to nothing.
+AT_BOUND: Final = 1e-12
+
+#: Coefficients of the incidence matrices below this are rounding: all are small fractions.
+ZERO_COEFFICIENT: Final = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class LinkageFamily(Record):
+    r"""All postures of a linkage that give one image under a scaled orthographic camera.
+
+    At a scale s each segment is foreshortened by :math:`dZ = \sqrt{l^2 - (\Delta u^2 + \Delta v^2)/s^2}` (Taylor 2000,
+    eq. 2), toward the camera or away from it: 2^S flips. The root stays real for
+    :math:`s \ge \sqrt{\Delta u^2 + \Delta v^2}/l` (his eq. 3, printed upside down).
+
+    Parameters
+    ----------
+    linkage : Linkage
+    image : array (P, 2)
+        Image points, pixels; NaN where one is not seen.
+    aspect : float
+        Width of a pixel over its height: u is rescaled by it, and s counts in v.
+
+    Raises
+    ------
+    InputError
+        If the image has another shape, or shows no segment.
+    """
+
+    linkage: Linkage
+    image: Array
+    aspect: float = 1.0
+
+    def __post_init__(self) -> None:
+        where, count = f"linkage {self.linkage.name}", len(self.linkage.points)
+        self._set("image", read_only(self.image))
+        if self.image.shape != (count, 2) or (np.abs(self.image) > FARTHEST_COORDINATE).any():
+            got, expected = f"shape {self.image.shape}", f"({count}, 2) pixels"
+            raise refusal(where, "image", got, expected, "give each point once")
+        if not self.aspect > 0:
+            raise refusal(where, "aspect", f"{self.aspect:g}", "a positive number", error=CameraError)
+        if not self.seen.any():
+            raise refusal(where, "image", "no segment with both ends", "at least one", "add image points")
+
+    @cached_property
+    def place(self) -> Array:
+        """Image of the nodes (N, 2), square pixels."""
+        return self.linkage.place_nodes(self.image * np.array([self.aspect, 1.0]))
+
+    @cached_property
+    def extent(self) -> Array:
+        """Length of each segment's image (S,), pixels; NaN where an end is not seen."""
+        ends = np.array(self.linkage.segments)
+        return np.asarray(np.linalg.norm(self.place[ends[:, 1]] - self.place[ends[:, 0]], axis=1))
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which segments are seen at both ends (S,)."""
+        return np.isfinite(self.extent)
+
+    @property
+    def bounds(self) -> Array:
+        """Least scale that each segment allows (S,), pixels a unit of length."""
+        return np.asarray(self.extent / self.linkage.lengths)
+
+    @property
+    def minimum_scale(self) -> float:
+        """Least scale that all segments allow; the paper's default (§3.1)."""
+        return float(np.nanmax(self.bounds))
+
+    @property
+    def bounding_segment(self) -> str:
+        """Name of the segment that sets the bound."""
+        return self.linkage.segment_names[int(np.nanargmax(self.bounds))]
+
+    def foreshortening(self, s: ArrayLike) -> Array:
+        """Return dZ >= 0 of each segment (..., S) at scales (...), units of length (Taylor 2000, eq. 2).
+
+        Raises
+        ------
+        CameraError
+            If a scale is below the bound: names the segment and the scale that it needs.
+        """
+        scale = np.asarray(s, dtype=np.float64)
+        bound = self.minimum_scale
+        if not (scale >= bound * (1 - AT_BOUND)).all():
+            low = float(scale[~(scale >= bound * (1 - AT_BOUND))].flat[0])
+            needs = f"at least {bound:.9g}, which {self.bounding_segment} needs"
+            raise refusal("", "scale", f"{low:.9g}", needs, "give a larger scale", error=CameraError)
+        apart = self.extent / scale[..., None]
+        lengths = self.linkage.lengths
+        # As (l - e) (l + e): near the bound the difference of squares would lose half the digits.
+        return np.sqrt(np.maximum((lengths - apart) * (lengths + apart), 0.0))
+
+    def vanished(self, s: ArrayLike) -> NDArray[np.bool_]:
+        """Return which segments (..., S) are foreshortened to nothing: both of their flips are one."""
+        scale = np.asarray(s, dtype=np.float64)
+        return np.asarray(self.bounds >= scale[..., None] * (1 - AT_BOUND))
+
+    def points(self, s: ArrayLike, flips: ArrayLike) -> Array:
+        """Place the points (..., P, 3), units of length: x, y from the image, depth relative to the first point's.
+
+        Parameters
+        ----------
+        s : float or array (...)
+            Scales, pixels a unit of length.
+        flips : array (..., S)
+            1 where the first end of a segment is nearer, -1 where its second is, 0 where it has no depth.
+
+        Notes
+        -----
+        A loop that does not close is averaged: its segments then have lengths a little off.
+        """
+        signed = np.where(self.seen, np.asarray(flips, dtype=np.float64) * self.foreshortening(s), 0.0)
+        depth = np.where(self.incidence.placed, signed @ self.incidence.depth.T, np.nan)
+        place = self.place / np.asarray(s, dtype=np.float64)[..., None, None]
+        nodes = np.concatenate([np.broadcast_to(place, (*depth.shape, 2)), depth[..., None]], axis=-1)
+        return np.asarray(nodes[..., : len(self.linkage.points), :])
+
+    def flips_of(self, points: ArrayLike) -> NDArray[np.int8]:
+        """Return the flips (..., S) of postures given by their points (..., P, 3); 0 where both ends are level."""
+        nodes = self.linkage.place_nodes(np.asarray(points, dtype=np.float64))
+        ends = np.array(self.linkage.segments)
+        return np.sign(nodes[..., ends[:, 1], 2] - nodes[..., ends[:, 0], 2]).astype(np.int8)
+
+    @cached_property
+    def incidence(self) -> Incidence:
+        """The matrices of the segments that are seen."""
+        return Incidence.of(self.linkage, self.seen)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Incidence(Record):
+    r"""The linear algebra of a linkage, or of the part of it that is seen.
+
+    The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
+    where a row of A has -1 and 1 at a segment's ends (halves for a midpoint). Then :math:`Z = B (\sigma dZ)`, and loops
+    close where :math:`C (\sigma dZ) = 0`.
+
+    Parameters
+    ----------
+    depth : array (N, S)
+        B by node, relative to the first node of its piece.
+    loops : array (L, S)
+        C: one row a loop, its largest coefficient 1.
+    part : int array (N,)
+        Piece of each node; nodes of different pieces have no relative depth.
+    placed : bool array (N,)
+        Nodes of the piece with the most segments.
+    """
+
+    depth: Array
+    loops: Array
+    part: NDArray[np.intp]
+    placed: NDArray[np.bool_]
+
+    @staticmethod
+    def of(linkage: Linkage, seen: NDArray[np.bool_]) -> Incidence:
+        """Build the matrices of a linkage of whose segments (S,) some are seen."""
+        from scipy.sparse.csgraph import connected_components
+
+        weights = linkage.place_nodes(np.eye(len(linkage.points)))
+        ends, kept = np.array(linkage.segments), np.flatnonzero(seen)
+        A = weights[ends[:, 1]] - weights[ends[:, 0]]
+        graph = np.zeros((len(linkage.nodes),) * 2)
+        graph[tuple(ends[kept].T)] = 1
+        # A midpoint is where its ends are as soon as one of them is placed and the segment is seen.
+        for end, middle, whole in linkage.halves:
+            graph[end, middle] = seen[whole]
+        _, part = connected_components(graph, directed=False)
+        largest = int(np.bincount(part[ends[kept, 0]], minlength=part.max() + 1).argmax())
+        B = np.zeros((len(linkage.points), len(linkage.segments)))
+        B[:, kept] = np.linalg.pinv(A[kept])
+        depth = weights @ B
+        for piece in range(part.max() + 1):
+            nodes = np.flatnonzero(part == piece)
+            depth[nodes] -= depth[nodes[0]]
+        depth[np.abs(depth) < ZERO_COEFFICIENT] = 0.0
+        return Incidence(depth=depth, loops=_loops(A, kept), part=part, placed=part == largest)
+
+    def spread(self, nodes: Sequence[int]) -> Array:
+        """Return the rows of B for some nodes of one piece, less their mean."""
+        rows = self.depth[list(nodes)]
+        centred = rows - rows.mean(axis=0)
+        centred[np.abs(centred) < ZERO_COEFFICIENT] = 0.0
+        return np.asarray(centred)
+
+
+def _loops(A: Array, kept: NDArray[np.intp]) -> Array:
+    """Write each segment that depends on those before it by them: the left null space of A, loop by loop."""
+    basis: list[int] = []
+    chords: list[int] = []
+    for number in kept.tolist():
+        independent = np.linalg.matrix_rank(A[[*basis, number]], tol=ZERO_COEFFICIENT) > len(basis)
+        (basis if independent else chords).append(number)
+    loops = np.zeros((len(chords), len(A)))
+    if chords:
+        loops[:, basis] = -np.linalg.lstsq(A[basis].T, A[chords].T, rcond=None)[0].T
+        loops[np.arange(len(chords)), chords] = 1.0
+        loops = np.round(loops * 4096) / 4096  # coefficients are sums of halves
+        loops /= np.abs(loops).max(axis=1, keepdims=True)
+    return loops

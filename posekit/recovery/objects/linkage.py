@@ -1,0 +1,406 @@
+"""`Linkage`: an articulated object as data, from names, a TOML file, or a robot."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError, nearest, refusal, shown
+from posekit.geometry import Array, Record, read_only
+
+LINKAGES: Final = Path(__file__).resolve().parents[2] / "urdf" / "linkages"
+
+#: Largest number of segments of one object.
+MAX_SEGMENTS: Final = 2000
+
+#: Relative amount by which rounded lengths may miss the triangle inequality and still make a flat loop.
+LOOP_ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Linkage(Record):
+    """An articulated object: points joined by rigid segments whose lengths are known up to one factor.
+
+    A *node* is a point or, after the points, a midpoint. `Linkage.from_names` makes one from names.
+
+    Parameters
+    ----------
+    name : str
+        Name for messages and files.
+    points : sequence of P str
+        Points that an image shows.
+    segments : sequence of S (int, int)
+        Nodes at the two ends of each rigid segment.
+    lengths : array (S,)
+        Their lengths, in any unit: one factor is absorbed by the scale s (Taylor 2000, §2).
+    midpoints : sequence of (str, (int, int))
+        Names of further nodes P, P + 1, …, each in the middle of the segment between two points.
+    coplanar : sequence of sequence of int
+        Sets of four or more nodes that lie in a plane.
+    perpendicular : sequence of (int, int)
+        Pairs of segments at right angles.
+    collinear : sequence of (int, int, int)
+        Triples of nodes on one line.
+    unit : float, optional
+        Metres in one unit of length; None where lengths are relative.
+    height : float, optional
+        Height of the whole object in the unit of its lengths.
+    urdf : str
+        Name or path of the robot with this linkage, for its joint limits; empty if there is none.
+    source : str
+        Origin of the lengths.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, a name is unknown or repeated, the object falls into parts, or a loop cannot close.
+    """
+
+    name: str
+    points: Sequence[str]
+    segments: Sequence[tuple[int, int]]
+    lengths: Array
+    midpoints: Sequence[tuple[str, tuple[int, int]]] = ()
+    coplanar: Sequence[Sequence[int]] = ()
+    perpendicular: Sequence[tuple[int, int]] = ()
+    collinear: Sequence[tuple[int, int, int]] = ()
+    unit: float | None = None
+    height: float | None = None
+    urdf: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        self._set("lengths", read_only(self.lengths))
+        self._set("points", tuple(self.points))
+        self._set("segments", tuple((int(a), int(b)) for a, b in self.segments))
+        self._check_names()
+        self._check_shape()
+        for kind, groups, least in (("coplanar", self.coplanar, 4), ("collinear", self.collinear, 3)):
+            for group in groups:
+                if len(set(group)) < least:
+                    names = ", ".join(self.nodes[node] for node in group)
+                    expected = f"at least {least} different points"
+                    raise self._wrong(kind, names, expected, "drop or complete it")
+
+    def _wrong(self, field: str, got: str, expected: str, remedy: str = "correct it") -> InputError:
+        return refusal(f"linkage {self.name}", field, got, expected, remedy)
+
+    def _check_names(self) -> None:
+        """Refuse impossible names, segments and lengths."""
+        nodes, count = self.nodes, len(self.nodes)
+        if len(set(nodes)) < count or not all(node and node.isprintable() for node in nodes):
+            raise self._wrong("points", shown(list(nodes)), "different names of letters, digits and _")
+        if not 0 < len(self.segments) <= MAX_SEGMENTS or self.lengths.shape != (len(self.segments),):
+            got = f"{len(self.segments)} segments and {self.lengths.size} lengths"
+            raise self._wrong("segments", got, f"1 to {MAX_SEGMENTS}, each with one length")
+        seen: set[frozenset[int]] = set()
+        for (a, b), length in zip(self.segments, self.lengths.tolist(), strict=True):
+            if not (0 <= a < count and 0 <= b < count) or a == b or frozenset((a, b)) in seen:
+                raise self._wrong("segments", f"({a}, {b})", "two different nodes, each pair once")
+            if not (math.isfinite(length) and 1e-12 <= length <= 1e12):
+                raise self._wrong(f"{nodes[a]}-{nodes[b]}", f"{length:g}", "a finite positive length")
+            seen.add(frozenset((a, b)))
+        for name, ends in self.midpoints:
+            if frozenset(ends) not in seen:
+                expected = "the ends of a segment"
+                raise self._wrong(f"midpoints.{name}", "no segment", expected, "add the segment")
+        for field in ("unit", "height"):
+            value = getattr(self, field)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise self._wrong(field, f"{value:g}", "a finite positive number", "leave it out")
+
+    def _check_shape(self) -> None:
+        """Refuse an object that falls into parts, or a loop that cannot close."""
+        from scipy.sparse.csgraph import shortest_path
+
+        edges = [(*pair, float(size)) for pair, size in zip(self.segments, self.lengths, strict=True)]
+        edges += [(end, middle, float(self.lengths[whole]) / 2) for end, middle, whole in self.halves]
+        graph = np.full((len(self.nodes), len(self.nodes)), np.inf)
+        for a, b, length in edges:
+            graph[a, b] = graph[b, a] = min(length, graph[a, b])
+        apart = shortest_path(graph, directed=False)
+        if np.isinf(apart).any():
+            alone = self.nodes[int(np.isinf(apart[0]).argmax())]
+            raise self._wrong("segments", f"no way from {self.nodes[0]} to {alone}", "one connected object")
+        for a, b, length in edges:
+            if length > apart[a, b] * (1 + LOOP_ROUNDING):
+                expected = f"a loop that closes: the others of its loop are {apart[a, b]:g} together"
+                raise self._wrong(f"{self.nodes[a]}-{self.nodes[b]}", f"{length:g}", expected)
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Names of the points, then of the midpoints."""
+        return (*self.points, *(name for name, _ in self.midpoints))
+
+    @property
+    def segment_names(self) -> tuple[str, ...]:
+        """Names of the segments, ``a-b``."""
+        return tuple(f"{self.nodes[a]}-{self.nodes[b]}" for a, b in self.segments)
+
+    @property
+    def halves(self) -> tuple[tuple[int, int, int], ...]:
+        """Both halves of each segment with a midpoint: end, midpoint, segment."""
+        index = {frozenset(ends): number for number, ends in enumerate(self.segments)}
+        return tuple(
+            (end, len(self.points) + number, index[frozenset(ends)])
+            for number, (_, ends) in enumerate(self.midpoints)
+            for end in ends
+        )
+
+    def segment(self, name: str) -> int:
+        """Return the index of a segment; ``b-a`` is ``a-b``.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        names = self.segment_names
+        turned = [f"{self.nodes[b]}-{self.nodes[a]}" for a, b in self.segments]
+        if name in names:
+            return names.index(name)
+        if name in turned:
+            return turned.index(name)
+        raise self._wrong("segment", shown(name), "one of its segments", nearest(name, names))
+
+    def place_nodes(self, points: Array) -> Array:
+        """Add the midpoints to points or to their images: (..., P, D) to (..., N, D)."""
+        middles = [points[..., list(ends), :].mean(axis=-2) for _, ends in self.midpoints]
+        return np.concatenate([points, np.stack(middles, axis=-2)], axis=-2) if middles else points
+
+    @staticmethod
+    def from_names(
+        *,
+        name: str,
+        segments: Mapping[str, float] | Mapping[tuple[str, str], float],
+        points: Sequence[str] | None = None,
+        midpoints: Mapping[str, Sequence[str]] | None = None,
+        coplanar: Iterable[Sequence[str]] = (),
+        perpendicular: Iterable[Sequence[str]] = (),
+        collinear: Iterable[Sequence[str]] = (),
+        **about: Any,
+    ) -> Linkage:
+        """Make a linkage from names.
+
+        Parameters
+        ----------
+        name : str
+            Name for messages.
+        segments : mapping
+            Segment, as ``"a-b"`` or ``("a", "b")``, to its length.
+        points : sequence of str, optional
+            Their order; by default as the segments name them, which then are pairs.
+        midpoints : mapping, optional
+            Name of a midpoint to the ends of its segment.
+        coplanar, perpendicular, collinear
+            Groups of node names; pairs of segment names.
+        **about
+            ``unit``, ``height``, ``urdf``, ``source``.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown; and as `Linkage` does.
+
+        Examples
+        --------
+        >>> rod = Linkage.from_names(name="rod", segments={("a", "b"): 5.0, ("b", "c"): 3.0})
+        >>> rod.segment("c-b")
+        1
+        """
+        middles = dict(midpoints or {})
+        if points is None:
+            named = dict.fromkeys(end for key in segments for end in key)
+            points = [point for point in named if point not in middles]
+        nodes = [*points, *middles]
+
+        def find(node: str) -> int:
+            if node not in nodes:
+                near = nearest(node, nodes)
+                raise refusal(f"linkage {name}", "point", shown(node), "one of its points", near)
+            return nodes.index(node)
+
+        def split(key: str | tuple[str, str]) -> tuple[int, int]:
+            if isinstance(key, tuple):
+                return find(key[0]), find(key[1])
+            parts = key.split("-")
+            ways = [("-".join(parts[:k]), "-".join(parts[k:])) for k in range(1, len(parts))]
+            known = [way for way in ways if way[0] in nodes and way[1] in nodes]
+            if len(known) != 1:
+                expected = "two of its points, as a-b"
+                raise refusal(f"linkage {name}", "segments", shown(key), expected, "correct a name")
+            return find(known[0][0]), find(known[0][1])
+
+        pairs = [split(key) for key in segments]
+        made = Linkage(
+            name=name,
+            points=points,
+            segments=pairs,
+            lengths=np.array(list(segments.values()), dtype=np.float64),
+            midpoints=[(middle, (find(a), find(b))) for middle, (a, b) in middles.items()],
+            coplanar=[tuple(find(node) for node in group) for group in coplanar],
+            collinear=[(find(a), find(b), find(c)) for a, b, c in collinear],
+            **about,
+        )
+        return replace(made, perpendicular=[(made.segment(a), made.segment(b)) for a, b in perpendicular])
+
+
+def linkage_names() -> tuple[str, ...]:
+    """Return the names of the built-in linkages."""
+    return tuple(sorted(path.stem for path in LINKAGES.glob("*.toml")))
+
+
+def load_linkage(name: str | Path) -> Linkage:
+    """Load a linkage by name, from a TOML file, or from a robot.
+
+    Parameters
+    ----------
+    name : str or path
+        ``taylor_human``, ``four_bar``, ``planar_chain``; a ``.toml`` file; or a robot or URDF that
+        `posekit.robots.load_robot` knows.
+
+    Raises
+    ------
+    InputError
+        If there is none of these, or it describes no object.
+
+    Examples
+    --------
+    >>> human = load_linkage("taylor_human")
+    >>> len(human.points), len(human.segments)
+    (12, 11)
+    """
+    path = LINKAGES / f"{name}.toml" if str(name) in linkage_names() else Path(name)
+    if path.suffix.lower() != ".toml":
+        from posekit.robots import load_robot
+
+        return linkage_of_robot(load_robot(str(name), bodies="none"))
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise refusal(name, "", shown(str(error)), "a TOML file of posekit.linkage/1", "correct it") from None
+    held = ("segments", "points", "midpoints", "unit", "height", "urdf", "source")
+    about = {key: table[key] for key in held if key in table}
+    groups = table.get("constraints", {})
+    about |= {kind: groups[kind] for kind in ("coplanar", "perpendicular", "collinear") if kind in groups}
+    try:
+        return Linkage.from_names(name=table.get("name", path.stem), **about)
+    except (KeyError, TypeError, ValueError) as error:
+        expected = "the entries of posekit.linkage/1"
+        raise refusal(name, "", shown(str(error)), expected, "complete it") from None
+
+
+#: Distance from all joints below which the base or the end of a limb is no point of its own.
+MIN_POINT_DISTANCE_METRES: Final = 5e-3
+
+
+def linkage_of_robot(robot: Any) -> Linkage:
+    """Make the linkage of a robot: origins of its turning joints, its base and the ends of its limbs.
+
+    Points that keep their distance in every configuration are joined, so that a body of three or more points is a
+    rigid triangle. They are found by their distances in random configurations.
+
+    Parameters
+    ----------
+    robot : Robot
+        `posekit.robots.Robot`.
+
+    Raises
+    ------
+    InputError
+        If fewer than two points remain, or no rigid segments join them all.
+    """
+    model = robot.model
+    names, places = _robot_frames(robot)
+    ends = [name for name in names if name not in model.names]
+    # Joints first; a base or an end counts where it is away from them all, and points that coincide are one.
+    kept: list[int] = []
+    order = sorted(range(len(names)), key=lambda k: names[k] in ends)
+    for k in order:
+        apart = MIN_POINT_DISTANCE_METRES if names[k] in ends else 1e-9
+        gaps = np.linalg.norm(places[:, kept] - places[:, [k]], axis=2)
+        if (gaps.max(axis=0, initial=0.0) > apart).all():
+            kept.append(k)
+    kept.sort(key=lambda k: (k != 0, k))
+    points = places[:, kept]
+    segments: dict[tuple[str, str], float] = {}
+    for a, b in combinations(range(len(kept)), 2):
+        length = np.linalg.norm(points[:, a] - points[:, b], axis=1)
+        if np.ptp(length) < 1e-9:
+            segments[names[kept[a]], names[kept[b]]] = float(length.mean())
+    return Linkage.from_names(
+        name=robot.name,
+        points=[names[k] for k in kept],
+        segments=segments,
+        unit=1.0,
+        urdf=robot.source or robot.name,
+        source=robot.name,
+    )
+
+
+def _robot_frames(robot: Any) -> tuple[list[str], Array]:
+    """Return names and places (C, K, 3) of base link, turning joints and last links in random configurations."""
+    import pinocchio as pin
+
+    model = robot.model
+    rng = np.random.default_rng(0)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -1.0)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, 1.0)
+    # Beyond a sliding joint no distance to the rest is fixed.
+    turning = {0}
+    for k in range(1, model.njoints):
+        name = model.joints[k].shortname().removeprefix("JointModel")
+        if model.parents[k] in turning and not name.startswith(("P", "T")):
+            turning.add(k)
+    joints = [k for k in sorted(turning) if k and model.nvs[k] == 1]
+    used = {frame.parentFrame for frame in model.frames}
+    bodies = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
+    last = [k for k in bodies if k not in used and model.frames[k].parentJoint in turning - {0}]
+    base = bodies[:1]
+    names = [model.frames[k].name for k in base]
+    names += [model.names[k] for k in joints] + [model.frames[k].name for k in last]
+    data, places = model.createData(), []
+    for _ in range(6):
+        q = pin.randomConfiguration(model, lower, upper) if robot.free_flyer else rng.uniform(lower, upper)
+        pin.framesForwardKinematics(model, data, q)
+        at = [data.oMf[k].translation for k in base]
+        at += [data.oMi[k].translation for k in joints] + [data.oMf[k].translation for k in last]
+        places.append(np.array(at))
+    return names, np.array(places)
+
+
+def read_nearer(linkage: Linkage, choices: Mapping[str, str]) -> NDArray[np.int8]:
+    """Turn flips given by hand, a segment's name to its nearer end, into flips (S,); 0 where none is given.
+
+    Raises
+    ------
+    InputError
+        If a segment or its end is not known.
+    """
+    flips = np.zeros(len(linkage.segments), dtype=np.int8)
+    for name, end in choices.items():
+        number = linkage.segment(name)
+        a, b = (linkage.nodes[node] for node in linkage.segments[number])
+        if end not in (a, b):
+            raise refusal(
+                f"linkage {linkage.name}", f"nearer.{name}", shown(end), f"{a} or {b}", "correct it"
+            )
+        flips[number] = 1 if end == a else -1
+    return flips
+
+
+def name_nearer(linkage: Linkage, flips: Array | NDArray[np.int8]) -> dict[str, str]:
+    """Turn flips (S,) into choices by name, a segment to its nearer end: the inverse of `read_nearer`."""
+    return {
+        name: linkage.nodes[ends[0] if flip > 0 else ends[1]]
+        for name, ends, flip in zip(linkage.segment_names, linkage.segments, flips.tolist(), strict=True)
+        if flip != 0
+    }

@@ -1,0 +1,270 @@
+"""One uncalibrated view of any articulated object in, every posture behind it out (Taylor 2000)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.errors import InputError, PosekitError, refusal, shown
+from posekit.geometry import Array, Record
+from posekit.recovery.objects.configurations import configurations_of
+from posekit.recovery.objects.family import LinkageFamily
+from posekit.recovery.objects.growth import CLOSED_RESIDUAL, EXACT, MEASURED, Growth
+from posekit.recovery.objects.linkage import Linkage, name_nearer, read_nearer
+from posekit.recovery.objects.scale import CONSTRAINT_KINDS, search
+
+#: Largest number of scales of a frame, the best first.
+MAX_SCALES: Final = 128
+
+
+def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
+    """Read a way to fix the scale: kind, number, weights of constraints.
+
+    Parameters
+    ----------
+    text : str
+        ``min``, ``likely``, a number in pixels a unit of length, ``stature:PX``, or constraints with optional weights
+        as ``closure:1,coplanar:0.5``.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> parse_scale("closure,coplanar:0.5")
+    ('constraints', 0.0, {'closure': 1.0, 'coplanar': 0.5})
+    """
+    text = str(text).strip()
+    expected = f"min, likely, a positive number, stature:PX, or some of {', '.join(CONSTRAINT_KINDS)}"
+    if text in ("min", "likely"):
+        return text, 0.0, {}
+    parts = [part.strip().partition(":") for part in text.split(",")]
+    names = [name for name, _, _ in parts]
+    constraints = set(names) <= set(CONSTRAINT_KINDS)
+    try:
+        given = [value or "1" for _, _, value in parts] if constraints else [text.removeprefix("stature:")]
+        numbers = [float(one) for one in given]
+    except ValueError:
+        numbers = [math.nan]
+    if not all(math.isfinite(value) and value > 0 for value in numbers):
+        raise refusal("", "scale", shown(text), expected, "correct it")
+    if constraints:
+        return "constraints", 0.0, dict(zip(names, numbers, strict=True))
+    return ("stature" if text.startswith("stature:") else "value"), numbers[0], {}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ObjectRecovery(Record):
+    """Every posture of an object behind a view.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    frame : int array (N,)
+        Frame of each posture.
+    points : array (N, P, 3)
+        Camera frame, in the linkage's unit; NaN where a point is not seen.
+    flips : int array (N, S)
+        1 where the first end of a segment is nearer, -1 where its second is, 0 where neither is or it is not seen.
+    scale : array (N,)
+        Pixels a unit of length.
+    q : array (N, nq), optional
+        Configurations of the robot; NaN where none was sought.
+    distance : array (N,), optional
+        Largest distance of a point of the configuration from the posture's.
+    certified : bool array (N,), optional
+        Whether a configuration within limits reaches the posture. Otherwise it is undecided.
+    frames : sequence of mapping
+        ``time``, ``judged``, ``reason``, ``rejected`` and ``family`` (``how``, ``bound``, ``segment``, ``chosen``,
+        ``minima``, ``curve``) of each frame.
+    configuration_names : sequence of str
+    settings : mapping
+    """
+
+    linkage: Linkage
+    frame: NDArray[np.intp]
+    points: Array
+    flips: NDArray[np.int8]
+    scale: Array
+    q: Array | None = None
+    distance: Array | None = None
+    certified: NDArray[np.bool_] | None = None
+    frames: Sequence[Mapping[str, Any]] = ()
+    configuration_names: Sequence[str] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.frames)
+
+    def document(self) -> dict[str, Any]:
+        """Return the result as JSON values, ``posekit.object/1``: metres where the linkage has a unit."""
+        linkage, factor = self.linkage, self.linkage.unit or 1.0
+        frames = []
+        for k, about in enumerate(self.frames):
+            postures: list[dict[str, Any]] = []
+            for row in np.flatnonzero(self.frame == k).tolist():
+                points = [[round(x, 12) for x in point] for point in (self.points[row] * factor).tolist()]
+                one: dict[str, Any] = {
+                    "points": [None if np.isnan(point[0]) else point for point in points],
+                    "flips": name_nearer(linkage, self.flips[row]),
+                    "scale": float(self.scale[row] / factor),
+                }
+                if self.q is not None and self.distance is not None and self.certified is not None:
+                    one["certified"] = bool(self.certified[row])
+                    one["q"] = None if np.isnan(self.q[row]).any() else self.q[row].tolist()
+                    one["fk_distance"] = None if np.isnan(self.distance[row]) else float(self.distance[row])
+                postures.append(one)
+            frames.append({**about, "postures": postures})
+        return {
+            "schema": "posekit.object/1",
+            "unit": None if linkage.unit is None else "m",
+            "linkage": linkage.name,
+            "points": list(linkage.points),
+            "segments": list(linkage.segment_names),
+            "lengths": (linkage.lengths * factor).tolist(),
+            "configuration_names": list(self.configuration_names),
+            "settings": dict(self.settings),
+            "frames": frames,
+        }
+
+
+def recover_object(
+    linkage: Linkage,
+    image: ArrayLike,
+    *,
+    scale: str | float | None = None,
+    aspect: float = 1.0,
+    time: ArrayLike | None = None,
+    nearer: Mapping[str, str] | Sequence[Mapping[str, str]] = (),
+    tolerance: tuple[float, float] | None = None,
+    robot: Any = None,
+) -> ObjectRecovery:
+    """Recover every posture of an object behind a view.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    image : array (F, P, 2)
+        Pixels, y down; NaN where a point is not seen.
+    scale : str or float, optional
+        ``min`` (default), pixels a unit of length, ``stature:PX``, or constraints (`parse_scale`).
+    aspect : float
+        Width of a pixel over its height.
+    time : array (F,), optional
+        Seconds.
+    nearer : mapping or sequence of F mappings
+        Flips given by hand: segment to its nearer end.
+    tolerance : (float, float), optional
+        Allowed error of closing lengths and shortfall of segments, in the linkage's unit. By default a frame is exact
+        where a loop closes exactly that need not have, else measured (1 and 2 % of the longest segment).
+    robot : Robot, optional
+        `posekit.robots.Robot` with the linkage's points as frames: configurations within its limits are sought.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or no frame can be as the view states: the first frame's reason.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rod = Linkage.from_names(name="rod", segments={("a", "b"): 5.0, ("b", "c"): 3.0})
+    >>> found = recover_object(rod, [[[0.0, 0.0], [30.0, 0.0], [30.0, 30.0]]], scale=10.0)
+    >>> found.points[..., 2].round(9) + 0.0
+    array([[ 0., -4., -4.],
+           [ 0.,  4.,  4.]])
+    """
+    images = np.asarray(image, dtype=np.float64)
+    hands = [nearer] * len(images) if isinstance(nearer, Mapping) else list(nearer or [{}] * len(images))
+    if len(hands) != len(images):
+        expected = f"{len(images)} or one mapping"
+        raise refusal("", "nearer", f"{len(hands)} frames", expected, "give one a frame")
+    for hand in hands:
+        read_nearer(linkage, hand)
+    times = np.arange(len(images)) if time is None else np.asarray(time, dtype=np.float64)
+    longest = float(linkage.lengths.max())
+    given = None if tolerance is None else (*tolerance, tolerance[1] / 2)
+    tables: list[tuple[Array, Array, Array]] = []
+    frames: list[dict[str, Any]] = []
+    for picture, hand, at in zip(images, hands, times.tolist(), strict=True):
+        about: dict[str, Any] = {"time": at, "judged": None, "reason": "", "rejected": {}}
+        grown = (np.empty((0, len(linkage.points), 3)), np.empty((0, len(linkage.lengths))), np.empty(0))
+        try:
+            family = LinkageFamily(linkage=linkage, image=picture, aspect=aspect)
+            about["family"], chosen = _scales(family, scale, hand, given)
+            grown = Growth(family, hand).best(chosen, given, about)
+        except PosekitError as error:
+            about["reason"] = str(error)
+        tables.append(grown)
+        frames.append(about)
+    if frames and all(about["reason"] for about in frames):
+        raise InputError(f"frames[0]: {frames[0]['reason']}")
+    points, scales = (np.concatenate([one[k] for one in tables]) for k in (0, 2))
+    flips: NDArray[np.int8] = np.concatenate([one[1] for one in tables]).astype(np.int8)
+    frame = np.repeat(np.arange(len(tables)), [len(part[0]) for part in tables])
+    found: dict[str, Any] = {}
+    if robot is not None:
+        allowed = [2 * EXACT[0] if frames[k]["judged"] == "exact" else MEASURED[1] for k in frame.tolist()]
+        within = np.array(allowed) * longest * (linkage.unit or 1.0)
+        found = configurations_of(robot, linkage, points, frame, within)
+        order = np.lexsort((~found["certified"], frame))
+        frame, points, flips, scales = frame[order], points[order], flips[order], scales[order]
+        found = {name: values[order] for name, values in found.items()}
+        found["configuration_names"] = tuple(robot.configuration_names)
+    settings = {"scale": None if scale is None else str(scale), "nearer": [dict(hand) for hand in hands]}
+    return ObjectRecovery(
+        linkage=linkage,
+        frame=frame,
+        points=points,
+        flips=flips,
+        scale=scales,
+        frames=frames,
+        settings=settings,
+        **found,
+    )
+
+
+def _scales(
+    family: LinkageFamily,
+    scale: str | float | None,
+    nearer: Mapping[str, str],
+    given: tuple[float, float, float] | None,
+) -> tuple[dict[str, Any], Array]:
+    """Find the scales (K,) of one frame, and describe them for the result."""
+    linkage = family.linkage
+    longest = float(linkage.lengths.max())
+    bound = family.minimum_scale
+    how, value, weights = parse_scale("min" if scale is None else str(scale))
+    factor = linkage.unit or 1.0
+    about: dict[str, Any] = {"how": how, "bound": bound / factor, "segment": family.bounding_segment}
+    chosen = np.array([bound])
+    if how == "constraints":
+        found = search(family, weights, nearer=nearer)
+        about["how"] = "+".join(weights)
+        pairs = zip((found.s / factor).tolist(), found.residual.tolist(), strict=True)
+        about["minima"] = [{"s": s, "residual": residual} for s, residual in pairs]
+        about["curve"] = {"s": (found.curve_s / factor).tolist(), "residual": found.curve_residual.tolist()}
+        closed = found.residual <= CLOSED_RESIDUAL
+        every = found.s[closed] if closed.any() else found.s
+        _, first = np.unique(np.round(np.log(every), 9), return_index=True)
+        chosen = every[np.sort(first)][:MAX_SCALES] if len(every) else chosen
+    elif how in ("value", "stature"):
+        if how == "stature" and linkage.height is None:
+            remedy = "add height to it, or give the scale"
+            raise refusal("", "scale", "stature", "a linkage with a height", remedy)
+        s = value * factor if how == "value" else value / float(linkage.height or 1.0)
+        lost = (bound / s - 1) * longest
+        if lost > (given[1] if given is not None else EXACT[1] * longest):
+            needs = f"at least {bound / factor:.6g}, which {family.bounding_segment} needs"
+            raise refusal("", "scale", f"{value:.6g}", needs, "give more, or --scale min")
+        chosen = np.array([max(s, bound)])
+    about["chosen"] = (chosen / factor).tolist()
+    return about, chosen

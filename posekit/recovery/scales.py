@@ -1,0 +1,145 @@
+"""The scale of an uncalibrated picture: as stated, by constraints, or the likely one (Taylor 2000, §2 and §3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.errors import refusal
+from posekit.geometry import Array
+from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS
+
+if TYPE_CHECKING:
+    from posekit.recovery.objects import Linkage
+
+#: Root mean square distance of annotators' points over the root of the person's area in the picture: the constants of
+#: COCO's object keypoint similarity (cocodataset.org/#keypoints-eval). Neck and pelvis are as shoulders and hips.
+ANNOTATION_SIGMAS: Final = {
+    "neck": 0.079,
+    "shoulder": 0.079,
+    "elbow": 0.072,
+    "wrist": 0.062,
+    "pelvis": 0.107,
+    "hip": 0.107,
+    "knee": 0.087,
+    "ankle": 0.089,
+}
+
+#: Root of a person's area in a picture: a convex body shows a quarter of its surface on average (Cauchy), an adult's
+#: surface is 1.8 square metres (Du Bois & Du Bois 1916).
+ROOT_AREA_METRES: Final = 0.67
+
+#: Standard deviation of each coordinate of a photograph's key points from the joints (14,), metres.
+PHOTOGRAPH_OFFSETS: Final = np.array([ANNOTATION_SIGMAS[name.rpartition("_")[2]] for name in JOINTS]) * (
+    ROOT_AREA_METRES / math.sqrt(2)
+)
+
+#: Depth by which a joint is off the body's middle, and distance of a camera, where none is known.
+RELIEF_METRES, USUAL_DISTANCE_METRES = 0.25, 4.5
+
+#: Relative deviation of a scale by how it was found: who stands for their stature does not stand quite straight.
+SCALE_DEVIATIONS: Final = {"likely": 0.08, "min": 0.08, "stature": 0.03}
+
+#: Shortfall of a segment at a scale that is stated for exact points, in metres, that no noise explains.
+LONGEST_TOO_SHORT: Final = 0.3
+
+
+def scales_of(
+    points: Array, linkage: Linkage, how: str, weights: Mapping[str, float], stated: float, strict: bool
+) -> tuple[list[float], dict[str, Any]]:
+    """Return the scales of one picture, and what is known of its camera."""
+    from posekit.recovery.objects import LinkageFamily, search
+
+    family = LinkageFamily(linkage=linkage, image=points)
+    bound = family.minimum_scale
+    chosen = [bound if how == "min" else stated]
+    if how == "constraints":
+        found = search(family, weights)
+        least = float(found.residual[:1].max(initial=0.0))
+        chosen = np.unique(found.s[found.residual <= max(least, 1e-16)]).tolist() or [bound]
+    if not all(np.isfinite(chosen)) or min(chosen) <= 0:
+        raise refusal("", "scale", "no scale", "two ends of some segment in the image", "add image points")
+    lost = (bound / min(chosen) - 1) * float(linkage.lengths.max())
+    if strict and lost > LONGEST_TOO_SHORT:
+        needs = f"at least {bound:.6g} px/m, which {family.bounding_segment} needs"
+        raise refusal("", "scale", f"{min(chosen):.6g}", needs, "give a larger scale, or min")
+    about = {
+        "scale": chosen,
+        "how": "+".join(weights) or how,
+        "bound": bound,
+        "segment": family.bounding_segment,
+    }
+    return chosen, about
+
+
+def figure_linkage(person: Figure) -> Linkage:
+    """Return the figure as a linkage of 14 points and 17 segments: torso and hips are closed loops."""
+    from posekit.recovery.objects import Linkage
+
+    lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
+    return Linkage(name="figure", points=JOINTS, segments=SEGMENTS, lengths=lengths, unit=1.0)
+
+
+#: Depth by which the middle of each dimension is off the body's, standard deviation, metres: a little less than among
+#: random legal postures.
+DEPTH_RELIEF: Final = np.array([0.15, 0.15, 0.22, 0.22, 0.15, 0.15, 0.25, 0.25, 0.12, 0.10, 0.05])
+
+#: Relative changes of widths and trunk with posture: the girdle moves, the back bends.
+LOOSENESS: Final = np.array([0.0] * 8 + [0.03, 0.02, 0.05])
+
+#: Joints at the ends of limbs, shoulder width, hip width, and of the line between their middles.
+DIMENSIONS: Final = [
+    ((JOINT[f"{side}_{a}"],), (JOINT[f"{side}_{b}"],))
+    for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+    for side in ("right", "left")
+] + [((1,), (2,)), ((4,), (5,)), ((1, 2), (4, 5))]
+
+COSINES: Final = (np.arange(24) + 0.5) / 24
+#: Cosines of directions that are spread evenly, and logarithms of a scale about its first guess.
+LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
+
+
+def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
+    r"""Find the scale at which a body's segments look as long as they are seen, and the deviation of its logarithm.
+
+    Taylor's bound (2000, eq. 3) is the least scale at which no segment is too short: one segment would set the scale of
+    all. Here each has its say. A segment of length l whose direction is spread evenly is seen as
+    :math:`e = s\,l\,\sqrt{1 - c^2}` with c uniform, blurred by what lengths and points are off.
+
+    Parameters
+    ----------
+    points : array (F, 14, 2)
+        Square pixels, or normalised image points: the scale then is one over the depth. NaN where not seen.
+    person : Figure
+
+    Returns
+    -------
+    scale, deviation : array (F,)
+        NaN where no segment is seen.
+    """
+    body = person.neutral_points
+    ends = [[list(one) for one in pair] for pair in DIMENSIONS]
+    length = np.array([np.linalg.norm(body[b].mean(axis=0) - body[a].mean(axis=0)) for a, b in ends])
+    seen = np.stack(
+        [np.linalg.norm(points[:, b].mean(1) - points[:, a].mean(1), axis=1) for a, b in ends], axis=1
+    )
+    offset = np.array([np.sqrt((PHOTOGRAPH_OFFSETS[[*a, *b]] ** 2).sum()) / len(a) for a, b in ends])
+    near = DEPTH_RELIEF / USUAL_DISTANCE_METRES
+    off = np.sqrt(LOOSENESS**2 + 0.05**2 + (offset / length) ** 2 + near**2)
+    ratio = np.log(np.maximum(seen, 1e-9) / length)
+    known = np.isfinite(ratio)
+    ordered = np.sort(np.where(known, ratio, -np.inf), axis=1)
+    first = np.where(np.isfinite(ordered[:, -2]), ordered[:, -2], ordered[:, -1]) + math.log(0.9)
+    grid = np.where(np.isfinite(first), first, np.nan)[:, None] + LOG_SCALES
+    away = ratio[:, :, None] - grid[:, None]
+    bend = 0.5 * np.log(1 - COSINES**2)
+    each = np.exp(-0.5 * ((away[..., None] - bend) / off[:, None, None]) ** 2).mean(axis=3)
+    score = np.where(known[:, :, None], np.log(each + 1e-30), 0.0).sum(axis=1)
+    weight = np.exp(score - score.max(axis=1, keepdims=True))
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean = (weight * grid).sum(axis=1)
+    return np.exp(mean), np.sqrt((weight * (grid - mean[:, None]) ** 2).sum(axis=1))

@@ -1,0 +1,351 @@
+"""What is known before a posture is sought: the person, the noise, and where each frame's camera sees the root."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure, LengthUncertainty
+from posekit.body.lengths import stature_from_lengths
+from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCamera, View
+from posekit.cameras.head import HeadPoints, HeadPose, calibrate, solve_pose
+from posekit.cameras.lee_chen import camera_position, rotation_to_paper
+from posekit.errors import PosekitError, refusal
+from posekit.geometry import Array, Record
+from posekit.recovery.scales import (
+    PHOTOGRAPH_OFFSETS,
+    RELIEF_METRES,
+    SCALE_DEVIATIONS,
+    USUAL_DISTANCE_METRES,
+    figure_linkage,
+    likely_scale,
+    scales_of,
+)
+from posekit.settings import RecoverSettings
+from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
+
+#: Standard deviation of image points of which none is stated, pixels: of a detector's, and of others.
+KEY_POINT_PIXELS, UNSTATED_PIXELS = 3.0, 1.0
+
+#: The same for image points that may be exact but whose tree cannot be grown: a joint or the neck is unknown.
+SHARP_PIXELS: Final = 0.3
+
+#: Standard deviation of a detector's key points from the figure's joints at full confidence, metres, and the power of
+#: the confidence with which it falls (fitted on Pose2Sim's recordings).
+JOINT_OFFSET, OFFSET_POWER = 0.012, 0.7
+
+#: Confidence of a detector's point without one, and least confidences for its offset in metres and its pixels.
+UNSTATED_CONFIDENCE, LEAST_OFFSET_CONFIDENCE, LEAST_CONFIDENCE = 0.5, 0.05, 0.25
+
+#: Largest accepted distance of a given root from the neck's ray, metres.
+ROOT_REFUSED: Final = 0.2
+
+#: Points of the head that determine its camera (Lee & Chen 1985, §2.1).
+ENOUGH_HEAD_POINTS: Final = 1 + len(HEAD_POINTS)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Sight(Record):
+    """What a view shows, by row: a row is a frame, or one of the scales that a frame may have.
+
+    Parameters
+    ----------
+    camera : PinholeCamera, LeeChenCamera or ScaledOrthographicCamera
+        Of all rows.
+    frame : int array (H,)
+        Frame of each row.
+    image : array (H, 14, 2)
+        Image points.
+    deviation : array (H, 14)
+        Standard deviation of each coordinate, in the image's unit.
+    root : array (H, 3)
+        The neck, metres; NaN if unknown.
+    given : bool array (H,)
+        Whether the root was given, and not found from the head.
+    head : array (H, 5, 3)
+        Head points, metres; NaN if unknown.
+    size_deviation : array (H,)
+        Relative deviation of the size that all lengths share.
+    lengths : LengthUncertainty
+        Uncertainty of the lengths.
+    may_be_exact : bool
+        Whether no deviation is stated, and no detector placed the points.
+    reasons, cameras, roots
+        Of each frame: why nothing can be sought, what is known of the camera, how the neck was found.
+    """
+
+    camera: PinholeCamera | LeeChenCamera | ScaledOrthographicCamera
+    frame: NDArray[np.intp]
+    image: Array
+    deviation: Array
+    root: Array
+    given: NDArray[np.bool_]
+    head: Array
+    size_deviation: Array
+    lengths: LengthUncertainty
+    may_be_exact: bool
+    reasons: list[str]
+    cameras: list[dict[str, Any]]
+    roots: list[dict[str, Any] | None]
+
+    def take(self, rows: NDArray[np.intp]) -> Sight:
+        """Return some rows."""
+        names = ("frame", "image", "deviation", "root", "given", "head", "size_deviation")
+        return replace(
+            self, camera=self.camera.take(rows), **{name: getattr(self, name)[rows] for name in names}
+        )
+
+
+def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
+    """Gather what a view shows of a person.
+
+    Raises
+    ------
+    InputError
+        If a setting has no meaning for such a view, or no frame can be as the view states.
+    """
+    orthographic = isinstance(view.camera, ScaledOrthographicCamera)
+    stated = (settings.deviation, view.deviation, settings.length_deviation, view.length_deviation)
+    may_be_exact = not (view.derived or settings.refine or any(stated))
+    pixels = settings.deviation or view.deviation or (KEY_POINT_PIXELS if view.derived else UNSTATED_PIXELS)
+    reasons = _unseen(view)
+    if orthographic:
+        if settings.root != "auto":
+            raise refusal("", "root", settings.root, "no root: the view has no depth", "leave it out")
+        return _photograph(view, person, settings, lengths, pixels, may_be_exact, reasons)
+    for name in ("scale", "proportions"):
+        if getattr(settings, name) not in (None, "figure"):
+            raise refusal("", name, str(getattr(settings, name)), "an uncalibrated view", "leave it out")
+    return _calibrated(view, person, settings, lengths, pixels, may_be_exact, reasons)
+
+
+def _unseen(view: View) -> list[str]:
+    """Say of each frame why nothing can be sought in it; empty if it can."""
+    seen = np.isfinite(view.image[:, :, 0])
+    reasons = [""] * len(view)
+    for k in range(len(view)):
+        if not seen[k].any():
+            reasons[k] = "the person is not seen: none of the joints is"
+        elif not seen[k, 1:4].any():
+            reasons[k] = (
+                "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover"
+            )
+        elif not isinstance(view.camera, ScaledOrthographicCamera) and not seen[k, 0]:
+            reasons[k] = "the neck, from which the posture grows, is not seen"
+            lacking = [name for name in ("right_shoulder", "left_shoulder") if not seen[k, JOINT[name]]]
+            if "neck" in view.derived and lacking:
+                verb = "is" if len(lacking) == 1 else "are"
+                reasons[k] = f"{' and '.join(lacking)} {verb} not seen, and the neck is between the shoulders"
+    return reasons
+
+
+def _calibrated(
+    view: View,
+    person: Figure,
+    settings: RecoverSettings,
+    lengths: LengthUncertainty,
+    pixels: float,
+    may_be_exact: bool,
+    reasons: list[str],
+) -> Sight:
+    """Gather what a calibrated camera sees: the root as given, or from six head points."""
+    count = len(view)
+    camera, pose = _head_pose(view, person, settings)
+    root, head = view.root.copy(), np.full((count, len(HEAD_POINTS), 3), np.nan)
+    given = np.asarray(np.isfinite(root).all(axis=1))
+    if settings.root in ("head", "torso"):
+        root[:], given[:] = np.nan, False
+    _check_root(root, view, camera)
+    roots: list[dict[str, Any] | None] = [None] * count
+    if pose is not None:
+        neck = pose.point("neck")
+        unknown = ~given & (settings.root != "torso")
+        root[unknown] = neck[unknown]
+        head = person.head_points[1:] @ np.swapaxes(pose.R_cam_head, -1, -2) + root[:, None]
+        for k in np.flatnonzero(unknown & pose.found).tolist():
+            roots[k] = {"method": "head", "estimate": float(neck[k, 2]), "deviation": None}
+    if isinstance(view.camera, LeeChenCamera) and view.camera.f is None:
+        for k in range(count):
+            if not reasons[k] and (pose is None or not pose.found[k]):
+                why = (
+                    pose.reasons[k]
+                    if pose is not None
+                    else "its head is not seen, and so its camera is not known"
+                )
+                reasons[k] = why or "its camera is not known"
+    if settings.root == "given" and not given.any():
+        raise refusal(
+            view.source, "root", "no root in the view", "one a frame", "add it, or leave --root out"
+        )
+    # Offsets in metres are converted by the size of the person in the image.
+    depth, unplaced = root[:, 2].copy(), np.flatnonzero(~np.isfinite(root[:, 2]))
+    if len(unplaced):
+        depth[unplaced] = 1 / likely_scale(camera.normalize(view.image)[unplaced], person)[0]
+    middle = np.nan_to_num(camera.normalize(view.image[:, 0]))
+    per_metre = np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle)))) / np.where(depth > 0, depth, 3.0)
+    lee_chen = isinstance(view.camera, LeeChenCamera)
+    # On a metric image plane a pixel is as large as that of a camera with a focal length of 1,000 pixels.
+    pixel = 1e-3 * np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle)))) if lee_chen else np.ones(count)
+    own = JOINT_OFFSET if view.derived else 0.0
+    confidence = view.confidence[:, : len(JOINTS)]
+    sure = np.clip(np.nan_to_num(confidence, nan=UNSTATED_CONFIDENCE), LEAST_OFFSET_CONFIDENCE, 1.0)
+    weight = np.clip(np.nan_to_num(confidence, nan=1.0), LEAST_CONFIDENCE, 1.0)
+    offset = own * sure**-OFFSET_POWER * per_metre[:, None]
+    return Sight(
+        camera=camera,
+        frame=np.arange(count),
+        image=view.image,
+        deviation=np.hypot(pixels * pixel[:, None] / np.sqrt(weight), offset),
+        root=root,
+        given=given,
+        head=head,
+        size_deviation=np.full(count, lengths.common),
+        lengths=lengths,
+        may_be_exact=may_be_exact,
+        reasons=reasons,
+        cameras=[_camera_record(view, pose, k) for k in range(count)],
+        roots=roots,
+    )
+
+
+def _head_pose(
+    view: View, person: Figure, settings: RecoverSettings
+) -> tuple[PinholeCamera | LeeChenCamera, HeadPose | None]:
+    """Return the camera of all frames, and the pose of the head where six points of it are seen."""
+    model = view.camera
+    assert not isinstance(model, ScaledOrthographicCamera)
+    image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
+    enough = np.isfinite(image).all(axis=2).sum(axis=1) >= ENOUGH_HEAD_POINTS
+    unknown = isinstance(model, LeeChenCamera) and model.f is None
+    # A neck that was put between the shoulders is no point of the head.
+    if "neck" in view.derived or settings.root == "torso" or not enough.any():
+        if unknown:
+            raise refusal(view.source, "camera.f", "null", "six head points in head_image", "give them, or f")
+        return model, None
+    stated: Mapping[str, Any] = view.head_points or {}
+    origin = np.asarray(stated.get("neck", np.zeros(3)))
+    every = {
+        name: origin + at for name, at in zip(("neck", *HEAD_POINTS), person.head_points, strict=True)
+    } | dict(stated)
+    used = [
+        k
+        for k, name in enumerate(every)
+        if name in stated or len(stated) < ENOUGH_HEAD_POINTS or np.isfinite(image[:, k, 0]).any()
+    ]
+    points = HeadPoints.from_mapping({name: every[name] for k, name in enumerate(every) if k in used})
+    image = np.where(enough[:, None, None], image, np.nan)[:, used]
+    if isinstance(model, LeeChenCamera):
+        pose = calibrate(points, image, f=model.f)
+        return (LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)) if unknown else model), pose
+    return model, solve_pose(points, image, model)
+
+
+def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) -> None:
+    """Refuse given roots behind the camera or far from the neck's ray."""
+    known = np.isfinite(root).all(axis=1)
+    _, ray = camera.rays(view.image[:, 0])
+    beside = np.linalg.norm(root - (root * ray).sum(axis=1, keepdims=True) * ray, axis=1)
+    for k in np.flatnonzero(known).tolist():
+        if root[k, 2] <= 0:
+            raise refusal(
+                view.source, f"frames[{k}].root", f"z = {root[k, 2]:g} m", "z > 0, z forward", "correct it"
+            )
+        if beside[k] > ROOT_REFUSED:
+            got = f"a point {beside[k]:.3g} m beside the ray on which the neck is seen"
+            raise refusal(
+                view.source, f"frames[{k}].root", got, "the neck, camera frame", "correct it, or leave it out"
+            )
+
+
+def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
+    """Describe the camera of a frame: of Lee & Chen's the paper's [R] and position (Table 2), else of the world."""
+    model = view.camera
+    record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
+    if pose is not None and pose.found[k]:
+        R, t = pose.R_cam_head[k], pose.t_cam_head[k]
+        record |= {"residual": float(pose.rms[k]), "rotation": R.tolist(), "position": (-R.T @ t).tolist()}
+        if isinstance(model, LeeChenCamera):
+            f = float(pose.f[k])
+            record |= {
+                "f": f,
+                "rotation": rotation_to_paper(R).tolist(),
+                "position": camera_position(R, t, f).tolist(),
+            }
+    if isinstance(model, LeeChenCamera) and model.f is not None:
+        record["f"] = float(np.broadcast_to(model.f, len(view))[k])
+    if isinstance(model, PinholeCamera) and model.R is not None and model.t is not None:
+        record |= {"rotation": model.R.tolist(), "position": (-model.R.T @ model.t).tolist()}
+    return record
+
+
+def _photograph(
+    view: View,
+    person: Figure,
+    settings: RecoverSettings,
+    lengths: LengthUncertainty,
+    pixels: float,
+    may_be_exact: bool,
+    reasons: list[str],
+) -> Sight:
+    """Gather what an uncalibrated picture shows: at one scale a frame, or at several that close the rigid parts."""
+    model = view.camera
+    assert isinstance(model, ScaledOrthographicCamera)
+    from posekit.recovery.objects import parse_scale
+
+    square = view.image * np.array([model.aspect, 1.0])
+    text = settings.scale
+    if text is None and model.scale is None:
+        text = "likely"
+    how, value, weights = parse_scale(text) if text is not None else ("value", 0.0, {})
+    likely, spread = likely_scale(square, person)
+    deviation = np.where(how == "likely", spread, SCALE_DEVIATIONS.get(how, lengths.common))
+    stature = settings.stature or view.stature or stature_from_lengths(person.lengths)
+    own = np.nan if model.scale is None else np.asarray(model.scale)
+    stated = {"likely": likely, "value": value or own, "stature": value / stature}.get(how, np.nan)
+    of_frame = np.broadcast_to(stated, len(view))
+    strict = may_be_exact and how in ("value", "stature")
+    rows: list[int] = []
+    scales: list[float] = []
+    cameras: list[dict[str, Any]] = [{} for _ in reasons]
+    for k in [k for k, reason in enumerate(reasons) if not reason]:
+        try:
+            chosen, about = scales_of(
+                square[k], figure_linkage(person), how, weights, float(of_frame[k]), strict
+            )
+        except PosekitError as error:
+            reasons[k] = str(error)
+            continue
+        cameras[k] = about
+        rows += [k] * len(chosen)
+        scales += chosen
+    if not rows:
+        first = next(reason for reason in reasons if reason)
+        raise refusal(view.source, "frames[0]", first, "a frame with a posture", "correct the image points")
+    frame, scale = np.array(rows, dtype=np.intp), np.array(scales)
+    confidence = np.clip(np.nan_to_num(view.confidence[frame, : len(JOINTS)], nan=1.0), LEAST_CONFIDENCE, 1.0)
+    image = view.image[frame]
+    metres = (square[frame] - np.nanmean(square[frame, :6], axis=1, keepdims=True)) / scale[:, None, None]
+    aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
+    # What is nearer looks larger, which no scaled orthographic camera shows: more so far from the middle.
+    off = np.hypot(PHOTOGRAPH_OFFSETS, RELIEF_METRES / USUAL_DISTANCE_METRES * aside)
+    root = np.zeros((len(frame), 3))
+    root[:, :2] = square[frame, 0] / scale[:, None]
+    return Sight(
+        camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect),
+        frame=frame,
+        image=image,
+        deviation=np.hypot(pixels, scale[:, None] * off) / np.sqrt(confidence),
+        root=root,
+        given=np.zeros(len(frame), dtype=np.bool_),
+        head=np.full((len(frame), len(HEAD_POINTS), 3), np.nan),
+        size_deviation=np.hypot(np.broadcast_to(deviation, len(view))[frame], lengths.common),
+        lengths=lengths,
+        may_be_exact=may_be_exact and how != "likely",
+        reasons=reasons,
+        cameras=cameras,
+        roots=[None] * len(view),
+    )

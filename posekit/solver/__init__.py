@@ -1,0 +1,10 @@
+"""Every posture behind a noisy view: the modes of the posterior of 14 joint positions.
+
+`solve` is the method; `Problem` is what is known before, `Modes` what is found, `Limits` the joint ranges.
+"""
+
+from posekit.solver.engine import backend as backend
+from posekit.solver.limits import Limits as Limits
+from posekit.solver.modes import Modes as Modes
+from posekit.solver.problem import Problem as Problem
+from posekit.solver.solve import solve as solve

@@ -1,0 +1,65 @@
+"""The compiled solver where it was built, its NumPy reference elsewhere: one interface."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from posekit.geometry import Array, Flags, Ints
+from posekit.solver import reference
+from posekit.solver.problem import Problem
+
+try:
+    _compiled: Any = import_module("posekit.solver._compiled")
+except ImportError:
+    _compiled = None
+
+
+def backend() -> str:
+    """Return which solver runs: ``compiled`` or ``reference``."""
+    return "reference" if _compiled is None else "compiled"
+
+
+@cache
+def _warn_once() -> None:
+    warnings.warn(
+        "posekit was installed without its compiled solver: noisy frames take about twenty times as long; install a "
+        "C++ compiler (apt-get install g++) and reinstall posekit",
+        UserWarning,
+        stacklevel=4,
+    )
+
+
+def run(name: str, problem: Problem, *arguments: Any) -> Any:
+    """Call a function of `posekit.solver.reference`, or its compiled twin, about the frames of a problem."""
+    if _compiled is None:
+        _warn_once()
+        return getattr(reference, name)(problem.records, problem.limits, *arguments)
+    numbers = None if problem.limits is None else problem.limits.numbers
+    return getattr(_compiled, name)(problem.records, numbers, *arguments)
+
+
+def descend(
+    problem: Problem,
+    which: Ints,
+    start: Array,
+    parts: int,
+    *,
+    most: int = 40,
+    precision: float = 1e-2,
+    hopeless: Array | None = None,
+) -> tuple[Array, Array, Ints]:
+    """Minimise chi2 from N starts; see `posekit.solver.reference.descend`."""
+    limit = np.full(len(which), np.inf) if hopeless is None else hopeless
+    x, chi2, steps = run("descend", problem, which, start, parts, most, precision, limit)
+    return x, chi2, steps
+
+
+def distinct(group: Ints, points: Array, within: float) -> Flags:
+    """Return which rows are new among better ones of their group; see `posekit.solver.reference.distinct`."""
+    found: Flags = (reference if _compiled is None else _compiled).distinct(group, points, within)
+    return found

@@ -1,0 +1,437 @@
+r"""Joint ranges and their couplings in numbers: one implementation for the solver and for the check.
+
+A limb is judged by the four angles of its closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball
+joint in the parent's frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. The same two
+directions can be written in up to four ways; the limb is legal if every angle of one writing is between its bounds.
+A bound is a constant, or a piecewise linear function of another angle (a coupling), and may shrink where other
+angles of the joint are near their ends (a sinus). An arm whose elevation is bounded is judged by elevation, plane
+and turn instead of flexion and abduction, because an arm stretched out sideways stands at a pole of these two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan2, degrees, hypot
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import refusal
+from posekit.geometry import Array, Flags, Ints, cross, dot, perpendicular, unit
+from posekit.skeleton import DOFS, LIMB_JOINTS
+
+#: Ball joints of the four limbs.
+LIMBS: Final = ("right_shoulder", "left_shoulder", "right_hip", "left_hip")
+
+#: Joints of the limbs: shoulders and hips, elbows and knees, wrists and ankles.
+STARTS, MIDDLES, ENDS = (tuple(limb[k] for limb in LIMB_JOINTS) for k in range(3))
+
+#: Sign of the URDF's axes of flexion, abduction, rotation and hinge, by limb.
+SIGNS: Final = np.array([[-1, -1, 1, -1], [-1, 1, -1, -1], [-1, -1, 1, 1], [-1, 1, -1, 1]], dtype=np.float64)
+
+PELVIS_SIGNS: Final = np.array([-1.0, 1.0, -1.0])
+KINDS: Final = (
+    ("shoulder.flexion", "shoulder.abduction", "shoulder.rotation", "elbow.flexion"),
+    ("hip.flexion", "hip.abduction", "hip.rotation", "knee.flexion"),
+)
+#: Readings that couplings use besides the four angles, numbered from 4.
+READINGS: Final = ("elevation", "plane", "turn", "valgus")
+
+ELEVATION, PLANE, TURN, VALGUS = range(4, 8)
+
+#: Whether a lower segment that stands off away from the body reads as an internal rotation: arms, legs.
+VALGUS_SIGNS: Final = np.array([-1.0, 1.0])
+
+#: Plane of elevation (radians) at which the turn of an arm is cut: behind the back, on the other arm's side.
+SEAM: Final = np.radians(-115.0)
+
+#: Fraction of a range that a sinus leaves at the very end of another angle (dimensionless).
+LEAST_LEFT: Final = 0.1
+
+MAX_COUPLINGS: Final = 12
+MAX_KNOTS: Final = 8
+
+#: The numbers as the compiled solver reads them, radians. `role` of a coupling: kind of limb (0 arm, 1 leg), bounded
+#: angle, side (0 lower, 1 upper), angle that it depends on, number of knots; `knots`: that angle, mean end, limit.
+LIMITS: Final = np.dtype(
+    [
+        ("mean", "f8", (2, 4, 2)),
+        ("limit", "f8", (4, 4, 2)),
+        ("pelvis", "f8", (3, 2)),
+        ("sinus", "f8", (2,)),
+        ("hip_turn", "f8", (2,)),
+        ("by_elevation", "f8"),
+        ("between_hips", "f8"),
+        ("couplings", "f8"),
+        ("role", "f8", (MAX_COUPLINGS, 5)),
+        ("knots", "f8", (MAX_COUPLINGS, 3, MAX_KNOTS)),
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limits:
+    """Joint ranges of pelvis and limbs as numbers.
+
+    Parameters
+    ----------
+    numbers : record of `LIMITS`
+        Radians.
+    """
+
+    numbers: NDArray[np.void]
+
+    @staticmethod
+    def of(
+        ranges: Mapping[str, Any] | None,
+        figure_limits: Array,
+        *,
+        above_hips: float = 0.1,
+        pelvis_between_hips: bool = False,
+    ) -> Limits:
+        """Make the numbers of a table of joint ranges.
+
+        Parameters
+        ----------
+        ranges : mapping or None
+            A parsed table ``posekit.ranges/1`` of kind ``anatomical``, or of kind ``configuration`` with ``joints`` of
+            ``dof = [lower, upper]`` degrees; None for the figure's own limits.
+        figure_limits : array (22, 2)
+            Limits of the figure's degrees of freedom in the order of `posekit.skeleton.DOFS`, degrees.
+        above_hips : float
+            Distance of the pelvis joint from the line between the hips, metres.
+        pelvis_between_hips : bool
+            Whether the pelvis joint is on the line between the hips; the hips' frame then hangs on the spine, and the
+            pelvis may be flexed within its range.
+
+        Returns
+        -------
+        Limits
+        """
+        n = np.zeros((), dtype=LIMITS)
+        table = np.array(figure_limits, dtype=np.float64)
+        spreads, zeros = 0.0, {}
+        own = dict(ranges.get("joints", ranges)) if ranges else {}
+        anatomical = bool(ranges) and ranges.get("kind") == "anatomical"  # type: ignore[union-attr]
+        means = table.copy()
+        for k, dof in enumerate(DOFS):
+            joint, angle = dof.split(".")
+            sideless = joint.removeprefix("right_").removeprefix("left_")
+            if anatomical:
+                one = own.get(sideless, {}).get(angle)
+                if one is None:
+                    continue
+                spreads = float(ranges["spreads"])  # type: ignore[index]
+                zero = one.get("zero", {"mean": 0.0, "spread": 0.0})
+                lean = degrees(atan2(zero.get("pelvis", 0.0), max(above_hips, zero.get("pelvis", 0.0), 1e-9)))
+                spread = hypot(zero["spread"], lean) if zero.get("pelvis") else zero["spread"]
+                zeros[f"{sideless}.{angle}"] = (zero["mean"], spread)
+                for side, (name, sign) in enumerate((("lower", -1), ("upper", 1))):
+                    means[k, side] = one[name]["mean"] + zero["mean"]
+                    table[k, side] = means[k, side] + sign * spreads * hypot(one[name]["spread"], spread)
+            elif dof in own or f"{sideless}.{angle}" in own:
+                table[k] = means[k] = own.get(dof, own.get(f"{sideless}.{angle}"))
+        first = [DOFS.index(f"{limb}.flexion") for limb in LIMBS]
+        n["limit"] = np.radians([table[k : k + 4] for k in first])
+        n["mean"] = np.radians([means[k : k + 4] for k in first[::2]])
+        pelvis = DOFS.index("pelvis.flexion")
+        n["pelvis"] = np.radians(table[pelvis : pelvis + 3])
+        if pelvis_between_hips:
+            n["between_hips"] = 1.0
+            n["hip_turn"] = np.radians(figure_limits[pelvis])
+        if anatomical:
+            _couple(n, ranges, spreads, zeros)  # type: ignore[arg-type]
+        return Limits(numbers=n)
+
+    def findings(
+        self, joints: Array, tolerance: float = 0.0
+    ) -> tuple[tuple[str, ...], Array, Array, Array, Array]:
+        """Read postures: the judged angles with their bounds, each limb in the writing that is least outside.
+
+        Parameters
+        ----------
+        joints : array (N, 14, 3)
+            Joint positions, metres; NaN where a joint is not known.
+        tolerance : float
+            Degrees by which directions may be off; it widens the sinus of the hips, and decides between writings.
+
+        Returns
+        -------
+        names : tuple of str (K,)
+            Angles, ``right_hip.flexion``.
+        value, lower, upper : array (N, K)
+            Degrees; NaN where a joint is not known.
+        bend : array (N, K)
+            Sine of the hinge's bend for rotations, by which their tolerance is divided; 1 for other angles.
+        """
+        torso, hips = torso_frame(joints), hips_frame(joints, bool(self.numbers["between_hips"]))
+        slack = np.radians(tolerance)
+        ball = pelvis_angles(torso, hips) * PELVIS_SIGNS
+        names = ["pelvis.flexion", "pelvis.bending", "pelvis.rotation"]
+        bounds = np.broadcast_to(self.numbers["pelvis"], (*ball.shape, 2))
+        value, lower, upper = [ball], [bounds[..., 0]], [bounds[..., 1]]
+        bend = [np.ones_like(ball)]
+        for limb, name in enumerate(LIMBS):
+            angles = limb_angles(torso if limb < 2 else hips, *limb_directions(joints, limb))
+            v, lo, hi, sine = self.read(limb, angles, slack)
+            away = np.maximum(lo - v, v - hi)
+            away[..., 2] -= slack / np.maximum(sine[:, None], 1e-3)
+            away[..., [0, 1, 3]] -= slack
+            worst = np.fmax.reduce(away, axis=2)
+            best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)[:, None, None]
+            side = name.split("_")[0]
+            places = [f"{side}_{angle}" for angle in KINDS[limb // 2]]
+            keep = [0, 1, 2, 3]
+            if limb < 2 and self.numbers["by_elevation"]:
+                keep, places[0] = [0, 2, 3], f"{side}_shoulder.elevation"
+            for one, out in ((v, value), (lo, lower), (hi, upper)):
+                out.append(np.take_along_axis(one, best, axis=1)[:, 0, keep])
+            one_bend = np.ones((len(v), 4))
+            one_bend[:, 2] = sine
+            bend.append(one_bend[:, keep])
+            names += [places[k] for k in keep]
+        value, lower, upper = (np.degrees(np.concatenate(each, axis=1)) for each in (value, lower, upper))
+        return tuple(names), value, lower, upper, np.concatenate(bend, axis=1)
+
+    def read(
+        self, limb: int, rotations: Array, tolerance: float = 0.0, writing: Ints | None = None
+    ) -> tuple[Array, Array, Array, Array]:
+        """Write limbs in their W ways: angles and bounds.
+
+        Parameters
+        ----------
+        limb : int
+            Of `LIMBS`.
+        rotations : array (N, 4)
+            Angles of the closed form (`limb_angles`), radians.
+        tolerance : float
+            Radians that widen the sinus.
+        writing : int array (N,), optional
+            The one writing that is wanted; all, if not given.
+
+        Returns
+        -------
+        value, lower, upper : array (N, W, 4)
+            Flexion or elevation, abduction, rotation, hinge, radians; unbounded where an angle is not judged.
+        bend : array (N,)
+            Sine of the hinge's bend.
+        """
+        n, kind = self.numbers, limb // 2
+        arm = kind == 0 and bool(n["by_elevation"])
+        a, b, c, e = np.moveaxis(rotations * SIGNS[limb], 1, 0)
+        way = np.arange(2 if arm else 4)[None] if writing is None else writing[:, None]
+        over, hinge = way // 2, np.where(way % 2, -1.0, 1.0)  # Euler branch, sign of the hinge
+        alpha = a[:, None] + np.pi * over
+        beta = np.where(over, np.pi - b[:, None], b[:, None])
+        gamma = c[:, None] + np.pi * (over ^ (way % 2))
+        angles = np.stack(np.broadcast_arrays(alpha, beta, gamma, e[:, None] * hinge), axis=-1)
+        middle = n["mean"][kind].mean(axis=-1)
+        angles -= 2 * np.pi * np.round((angles - middle) / (2 * np.pi))
+        if kind and n["between_hips"]:
+            angles[..., 0] -= np.clip(angles[..., 0] - middle[0], *n["hip_turn"])
+        readings = [*np.moveaxis(angles, -1, 0)]
+        offset = np.zeros(len(a))
+        if kind == 0:
+            elevation, plane, offset = arm_readings(a, b)
+            readings += [elevation[:, None], plane[:, None]]
+        lower, upper, turns, outward = self._bounds(limb, angles, readings, tolerance)
+        if turns:
+            centre = sum(turns.values()) / len(turns)
+            raw = angles[..., 2] + offset[:, None] + np.pi * over
+            turn = raw - 2 * np.pi * np.round((raw - centre) / (2 * np.pi))
+            shift = turn - angles[..., 2]
+            angles[..., 2] = turn
+            for side, bound in enumerate((lower, upper)):
+                bound[..., 2] = turns[side] if side in turns else bound[..., 2] + shift
+        lower[..., 2] -= outward[0]
+        upper[..., 2] += outward[1]
+        if arm:
+            angles[..., 0] = readings[4]
+        return angles, lower, upper, np.abs(np.sin(rotations[:, 3]))
+
+    def _bounds(
+        self, limb: int, angles: Array, readings: list[Array], tolerance: float
+    ) -> tuple[Array, Array, dict[int, Array], list[Array]]:
+        """Return bounds (N, W, 4) with couplings, those of an arm's turn by side, and what valgus adds by side."""
+        n, kind, shape = self.numbers, limb // 2, angles.shape[:2]
+        bounds = [np.broadcast_to(n["limit"][limb, :, k], angles.shape).copy() for k in range(2)]
+        means = [np.broadcast_to(n["mean"][kind, :, k], angles.shape).copy() for k in range(2)]
+        if kind == 0 and n["by_elevation"]:
+            bounds[0][..., :2], bounds[1][..., :2] = -np.inf, np.inf
+        turns: dict[int, Array] = {}
+        outward = [np.zeros(shape), np.zeros(shape)]
+        couplings = zip(n["role"][: int(n["couplings"])].astype(int).tolist(), n["knots"], strict=False)
+        for (which, target, side, of, count), (at, mean, limit) in couplings:
+            if which != kind:
+                continue
+            end = np.broadcast_to(np.interp(readings[of], at[:count], limit[:count]), shape)
+            # A bound by an angle that is not known (NaN) is none.
+            pick = np.fmax if side == 0 else np.fmin
+            if target == TURN:
+                turns[side] = end
+            elif target == VALGUS:
+                sign = 2 * side - 1
+                square = float(np.interp(np.pi / 2, at[:count], limit[:count]))
+                turn, positive = _valgus(angles[..., 3], sign * end, sign * square)
+                upward = positive == (sign * VALGUS_SIGNS[kind] > 0)
+                outward[0] += np.where(upward, 0.0, turn)
+                outward[1] += np.where(upward, turn, 0.0)
+            else:
+                column = 0 if target == ELEVATION else target
+                bounds[side][..., column] = pick(bounds[side][..., column], end)
+                if target != ELEVATION:
+                    middle = np.interp(readings[of], at[:count], mean[:count])
+                    means[side][..., column] = pick(means[side][..., column], middle)
+        if n["sinus"][kind]:
+            fixed = n["limit"][limb], n["mean"][kind]
+            _round_off(angles, bounds, means, *fixed, n["sinus"][kind], tolerance)
+        return bounds[0], bounds[1], turns, outward
+
+    def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
+        r"""Return by how much limbs are beyond their limits (N, 4), radians, and the writing that is judged (N,).
+
+        The writing is the least violated one if not given. A rotation that is beyond by v counts
+        :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`: a straight limb has none. The same holds for the first angle at
+        its pole.
+        """
+        value, lower, upper, _ = self.read(limb, rotations, writing=writing)
+        above, below = value - upper, lower - value
+        over = np.where((above > 0) & (above >= below), above, np.where(below > 0, -below, 0.0))
+        over[..., 2] *= np.sin(rotations[:, 3])[:, None] / np.sqrt(1 + over[..., 2] ** 2)
+        if limb >= 2 or not self.numbers["by_elevation"]:
+            over[..., 0] *= np.cos(rotations[:, 1])[:, None] / np.sqrt(1 + over[..., 0] ** 2)
+        if writing is not None:
+            return over[:, 0], writing
+        best = np.einsum("nwk,nwk->nw", over, over).argmin(axis=1)
+        return over[np.arange(len(best)), best], best
+
+
+def _couple(n: NDArray[Any], ranges: Mapping[str, Any], spreads: float, zeros: dict[str, Any]) -> None:
+    """Write couplings and sinuses into the numbers."""
+    nothing = (0.0, 0.0)
+    couplings = ranges.get("coupling", ())
+    longest = max((len(one["points"]) for one in couplings), default=0)
+    if len(couplings) > MAX_COUPLINGS or longest > MAX_KNOTS:
+        got = f"{len(couplings)} couplings of up to {longest} points"
+        raise refusal("ranges", "coupling", got, f"at most {MAX_COUPLINGS} of {MAX_KNOTS}", "leave some out")
+    for k, one in enumerate(couplings):
+        kind = 0 if one["angle"].split(".")[0] in ("shoulder", "elbow") else 1
+        side = int(one["end"] == "upper")
+        (shift, spread), (origin, _) = zeros.get(one["angle"], nothing), zeros.get(one["of"], nothing)
+        target, of = (_place(kind, one[name]) for name in ("angle", "of"))
+        knots = np.array(one["points"], dtype=np.float64).T
+        count = knots.shape[1]
+        out = (2 * side - 1) * spreads * hypot(one["spread"], spread)
+        n["role"][k] = kind, target, side, of, count
+        n["knots"][k, :, :count] = np.radians([knots[0] + origin, knots[1] + shift, knots[1] + shift + out])
+        n["couplings"] = k + 1
+        if target == 4 and side == 1:
+            n["by_elevation"] = 1.0
+    for one in ranges.get("sinus", ()):
+        n["sinus"][int(one["joint"] == "hip")] = one["power"]
+
+
+def _place(kind: int, angle: str) -> int:
+    """Return the number of an angle of a limb: the four of its closed form, then `READINGS`."""
+    return KINDS[kind].index(angle) if angle in KINDS[kind] else 4 + READINGS.index(angle.split(".")[1])
+
+
+def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
+    r"""Return by how much rotations read off the hinge's plane, radians, and whether the hinge is bent its own way.
+
+    The rotation is read from the lower segment. Where that stands off the plane by v, the reading is off by
+    :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`. Ranges of rotation are measured at a
+    right angle: what it is there (`square`) is in them.
+    """
+    off, sine = np.maximum(end, 0.0), np.sin(hinge)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.arcsin(np.minimum(np.sin(off) / np.abs(sine), 1.0)) - max(square, 0.0)
+    return np.where(off > 0, np.maximum(turn, 0.0), 0.0), ~(sine < 0)
+
+
+def _round_off(
+    angles: Array,
+    bounds: list[Array],
+    means: list[Array],
+    limit: Array,
+    mean: Array,
+    power: float,
+    slack: float,
+) -> None:
+    """Draw bounds of abduction, then rotation, toward their middles as far as the angles before are from theirs."""
+    used = np.zeros(angles.shape[:2])
+    for place in range(3):
+        low, high = (m[..., place] if place == 2 else mean[place, k] for k, m in enumerate(means))
+        middle = (low + high) / 2
+        if place:
+            left = np.maximum(1.0 - used, LEAST_LEFT**power) ** (1 / power)
+            for bound in bounds:
+                bound[..., place] = middle + (bound[..., place] - middle) * left
+        if place < 2:
+            off = angles[..., place] - middle
+            half = np.where(off < 0, middle - limit[place, 0], limit[place, 1] - middle)
+            used = used + (np.abs(off) / (half + slack)) ** power
+
+
+def arm_readings(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
+    r"""Return elevation, plane and turn of an arm without rotation (N,), radians.
+
+    The turn is the twist of the swing-twist decomposition less what an arm gathers when it is carried around the
+    vertical: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)
+    - (1 - \cos e)(90^\circ - p)`.
+    """
+    forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
+    down = np.cos(flexion) * np.cos(abduction)
+    elevation, plane = np.arctan2(np.hypot(forward, outward), down), np.arctan2(outward, forward)
+    a, b = flexion / 2, abduction / 2
+    twist = -2 * np.arctan2(np.sin(a) * np.sin(b), np.cos(a) * np.cos(b))
+    from_side = np.pi / 2 - np.where(plane < SEAM, plane + 2 * np.pi, plane)
+    return elevation, plane, twist - (1 - np.cos(elevation)) * from_side
+
+
+def torso_frame(joints: Array) -> Array:
+    """Return forward, left and up of torsos (N, 14, 3) as rows (N, 3, 3): down is neck to pelvis."""
+    down = unit(joints[:, 3] - joints[:, 0])
+    left = unit(perpendicular(joints[:, 2] - joints[:, 1], down))
+    return np.stack([cross(down, left), left, -down], axis=1)
+
+
+def hips_frame(joints: Array, between_hips: bool) -> Array:
+    """Return forward, left and up of hips as rows (N, 3, 3): left is the hips' line."""
+    left = unit(joints[:, 5] - joints[:, 4])
+    a, b = (0, 3) if between_hips else (3, 4)
+    down = unit(perpendicular(joints[:, b] - joints[:, a], left))
+    return np.stack([cross(down, left), left, -down], axis=1)
+
+
+def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:
+    """Return the unit directions of the upper and lower segment of one limb (N, 3)."""
+    start, middle, end = joints[:, STARTS[limb]], joints[:, MIDDLES[limb]], joints[:, ENDS[limb]]
+    return unit(middle - start), unit(end - middle)
+
+
+def limb_angles(parent: Array, upper: Array, lower: Array) -> Array:
+    """Return alpha, beta, gamma, epsilon (N, 4) of limbs on their parents; cos beta and epsilon are not negative."""
+    x, y, z = np.einsum("nki,ni->kn", parent, upper)
+    h = np.sqrt(x * x + z * z)
+    safe = np.where(h > 0, h, 1.0)
+    sine, cosine = -x / safe, np.where(h > 0, -z / safe, 1.0)
+    a = sine[:, None] * parent[:, 2] - cosine[:, None] * parent[:, 0]
+    b = (sine * y)[:, None] * parent[:, 0] + h[:, None] * parent[:, 1] + (cosine * y)[:, None] * parent[:, 2]
+    p, q = np.einsum("ni,ni->n", a, lower), -np.einsum("ni,ni->n", b, lower)
+    bend = np.sqrt(p * p + q * q)
+    along = np.einsum("ni,ni->n", upper, lower)
+    return np.stack([np.arctan2(*pair) for pair in ((sine, cosine), (y, h), (q, p), (bend, along))], axis=1)
+
+
+def pelvis_angles(torso: Array, hips: Array) -> Array:
+    """Return the three angles (N, 3) of the hips' frame in the torso's, rotations in the closed form's order."""
+    x, y, z = -np.einsum("nki,ni->kn", torso, hips[:, 2])
+    h = np.sqrt(x * x + z * z)
+    safe = np.where(h > 0, h, 1.0)
+    sine, cosine = -x / safe, np.where(h > 0, -z / safe, 1.0)
+    axis = cosine[:, None] * torso[:, 0] - sine[:, None] * torso[:, 2]
+    turn = np.arctan2(dot(cross(hips[:, 2], axis), hips[:, 0]), dot(axis, hips[:, 0]))
+    return np.stack([np.arctan2(sine, cosine), np.arctan2(y, h), turn], axis=1)

@@ -1,0 +1,737 @@
+// Modes of a body behind image points: Levenberg-Marquardt in joint positions, limbs eliminated onto the trunk.
+// The same residuals and the same steps as posekit/solver/reference.py. Unknowns x of a posture: 14 joints, then the
+// logarithm of the size that all lengths share. Parts: bit 0 the trunk (six joints and the size), bits 1 to 4 limbs.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace py = pybind11;
+
+namespace {
+
+constexpr int J = 14, D = 17, TRUNK = 6, T = 19, N = 43, SIZE = 18;
+constexpr int A[D] = {0, 0, 0, 3, 3, 1, 2, 6, 7, 4, 5, 10, 11, 1, 1, 2, 4};
+constexpr int B[D] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 2, 3, 3, 5};
+constexpr int START[4] = {1, 2, 4, 5}, MID[4] = {6, 7, 10, 11}, END[4] = {8, 9, 12, 13};
+constexpr int LIMB_OF[J] = {-1, -1, -1, -1, -1, -1, 0, 1, 0, 1, 2, 3, 2, 3};
+constexpr int ROW_OF[J] = {0, 3, 6, 9, 12, 15, 0, 0, 3, 3, 0, 0, 3, 3};
+constexpr double SIGN[4][4] = {{-1, -1, 1, -1}, {-1, 1, -1, -1}, {-1, -1, 1, 1}, {-1, 1, -1, 1}};
+constexpr double PELVIS_SIGN[3] = {-1, 1, -1};
+constexpr double VALGUS_SIGN[2] = {-1, 1};
+constexpr double SEAM = -115.0 * M_PI / 180.0, LEAST_LEFT = 0.1, ANGLE_STEP = 1e-4, LEAST_SINE = 0.02;
+constexpr double FLOOR = 1e-6;  // added to every diagonal element, in 1/m^2: an unseen joint has none of its own
+constexpr int COUPLINGS = 12, KNOTS = 8;
+constexpr std::ptrdiff_t ROWS_AT_ONCE = 16, ROWS_A_THREAD = 500;
+
+// As the dtypes PROBLEM and LIMITS of problem.py and limits.py; all fields are doubles.
+struct Problem {
+  double ray[J][2], image[J][2][2], root[3], root_weight[3][3], log_length[D], length_weight[D];
+  double size_weight, limit_weight, perspective, robust;
+};
+struct Limits {
+  double mean[2][4][2], limit[4][4][2], pelvis[3][2], sinus[2], hip_turn[2];
+  double by_elevation, between_hips, couplings, role[COUPLINGS][5], knots[COUPLINGS][3][KNOTS];
+};
+
+struct Normal {
+  double H[T][T], g[T], L[4][6][6], C[4][6][T], l[4][6];
+};
+
+struct Vec {
+  double x, y, z;
+};
+inline Vec vec(const double* p) { return {p[0], p[1], p[2]}; }
+inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
+inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
+inline double turned(double a, double middle) { return a - 2 * M_PI * std::nearbyint((a - middle) / (2 * M_PI)); }
+
+// A part's frame and how it turns with its points: rotation vector = G first' + H other'.
+struct Frame {
+  Vec forward, left, up, first, normal;
+  double length, lean, across;
+  bool by_down;  // the first axis is down (torso), or left (hips)
+  // Transposed product of a covector with the two maps.
+  void pull(Vec w, Vec& on_first, Vec& on_other) const {
+    double along = dot(w, first);
+    on_first = (1 / length) * (cross(w, first) - (along * lean / across) * normal);
+    on_other = (along / across) * normal;
+  }
+};
+
+Frame frame(Vec first_way, Vec other, bool by_down) {
+  Frame f;
+  f.by_down = by_down;
+  f.length = norm(first_way);
+  f.first = (1 / f.length) * first_way;
+  f.lean = dot(f.first, other);
+  Vec off = other - f.lean * f.first;
+  f.across = norm(off);
+  Vec second = (1 / f.across) * off;
+  f.normal = cross(f.first, second);
+  Vec down = by_down ? f.first : second;
+  f.left = by_down ? second : f.first;
+  f.forward = cross(down, f.left);
+  f.up = -1.0 * down;
+  return f;
+}
+Frame torso_of(const double x[J][3]) { return frame(vec(x[3]) - vec(x[0]), vec(x[2]) - vec(x[1]), true); }
+Frame hips_of(const double x[J][3], bool between) {
+  return frame(vec(x[5]) - vec(x[4]), between ? vec(x[3]) - vec(x[0]) : vec(x[4]) - vec(x[3]), false);
+}
+
+double interpolated(double x, const double* at, const double* y, int n) {
+  if (x <= at[0]) return y[0];
+  for (int k = 1; k < n; ++k)
+    if (x < at[k]) return y[k - 1] + (y[k] - y[k - 1]) / (at[k] - at[k - 1]) * (x - at[k - 1]);
+  return y[n - 1];
+}
+
+// Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
+double limb_residual(const Limits& L, int limb, const double g[4], int way, double out[4]) {
+  const int kind = limb / 2, over = way / 2, flipped = way & 1;
+  const bool arm = kind == 0 && L.by_elevation > 0;
+  double a = g[0] * SIGN[limb][0], b = g[1] * SIGN[limb][1], c = g[2] * SIGN[limb][2], e = g[3] * SIGN[limb][3];
+  double r[7] = {a + M_PI * over, over ? M_PI - b : b, c + M_PI * (over ^ flipped), flipped ? -e : e, 0, 0, 0};
+  double bound[2][4], mean[2][4], middle[4], turn[2], outward[2] = {0, 0};
+  bool turns[2] = {false, false};
+  for (int i = 0; i < 4; ++i) {
+    middle[i] = (L.mean[kind][i][0] + L.mean[kind][i][1]) / 2;
+    r[i] = turned(r[i], middle[i]);
+    for (int s = 0; s < 2; ++s) bound[s][i] = L.limit[limb][i][s], mean[s][i] = L.mean[kind][i][s];
+  }
+  if (kind == 1 && L.between_hips > 0) r[0] -= std::min(std::max(r[0] - middle[0], L.hip_turn[0]), L.hip_turn[1]);
+  double offset = 0;
+  if (kind == 0) {
+    double sa = std::sin(a), ca = std::cos(a), sb = std::sin(b), cb = std::cos(b);
+    double forward = sa * cb, down = ca * cb;
+    r[4] = std::atan2(std::sqrt(forward * forward + sb * sb), down);
+    r[5] = std::atan2(sb, forward);
+    double twist = -2 * std::atan2(std::sin(a / 2) * std::sin(b / 2), std::cos(a / 2) * std::cos(b / 2));
+    offset = twist - (1 - std::cos(r[4])) * (M_PI / 2 - (r[5] < SEAM ? r[5] + 2 * M_PI : r[5]));
+  }
+  if (arm)
+    for (int i = 0; i < 2; ++i) bound[0][i] = -INFINITY, bound[1][i] = INFINITY;
+  const double sine = std::sin(r[3]);
+  for (int k = 0; k < (int)L.couplings; ++k) {
+    if ((int)L.role[k][0] != kind) continue;
+    int target = L.role[k][1], side = L.role[k][2], of = L.role[k][3], n = L.role[k][4];
+    double at = r[of], limit = interpolated(at, L.knots[k][0], L.knots[k][2], n);
+    auto tighten = [&](double& own, double other) { own = side ? std::min(own, other) : std::max(own, other); };
+    if (target == 4) tighten(bound[side][0], limit);
+    else if (target == 6) turn[side] = limit, turns[side] = true;
+    else if (target == 7) {
+      double sign = 2 * side - 1, off = std::max(sign * limit, 0.0);
+      double squarely = std::max(sign * interpolated(M_PI / 2, L.knots[k][0], L.knots[k][2], n), 0.0);
+      if (off > 0) {
+        double ratio = std::sin(off) / std::fabs(sine), add = std::asin(ratio < 1 ? ratio : 1.0) - squarely;
+        outward[sign * VALGUS_SIGN[kind] * (sine < 0 ? -1 : 1) > 0] += std::max(add, 0.0);
+      }
+    } else {
+      tighten(bound[side][target], limit);
+      tighten(mean[side][target], interpolated(at, L.knots[k][0], L.knots[k][1], n));
+    }
+  }
+  if (L.sinus[kind] > 0) {
+    double used = 0, power = L.sinus[kind];
+    for (int i = 0; i < 3; ++i) {
+      double centre = i == 2 ? (mean[0][2] + mean[1][2]) / 2 : middle[i];
+      if (i) {
+        double left = std::pow(std::max(1 - used, std::pow(LEAST_LEFT, power)), 1 / power);
+        for (int s = 0; s < 2; ++s) bound[s][i] = centre + (bound[s][i] - centre) * left;
+      }
+      double off = r[i] - centre, half = off < 0 ? centre - L.limit[limb][i][0] : L.limit[limb][i][1] - centre;
+      if (i < 2) used += std::pow(std::fabs(off) / half, power);
+    }
+  }
+  if (turns[0] || turns[1]) {
+    double centre = turns[0] && turns[1] ? (turn[0] + turn[1]) / 2 : turns[0] ? turn[0] : turn[1];
+    double raw = turned(r[2] + offset + M_PI * over, centre), shift = raw - r[2];
+    r[2] = raw;
+    for (int s = 0; s < 2; ++s) bound[s][2] = turns[s] ? turn[s] : bound[s][2] + shift;
+  }
+  bound[0][2] -= outward[0];
+  bound[1][2] += outward[1];
+  if (arm) r[0] = r[4];
+  double total = 0;
+  for (int i = 0; i < 4; ++i) {
+    double above = r[i] - bound[1][i], below = bound[0][i] - r[i];
+    double o = above > 0 && above >= below ? above : below > 0 ? -below : 0.0;
+    if (o != 0 && (i == 2 || (i == 0 && !arm))) o *= (i == 2 ? std::sin(g[3]) : std::cos(g[1])) / std::sqrt(1 + o * o);
+    out[i] = o;
+    total += o * o;
+  }
+  return total;
+}
+
+// The least violated writing; residuals are in `out`.
+int least_writing(const Limits& L, int limb, const double g[4], double out[4], double& best) {
+  const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
+  int which = 0;
+  best = INFINITY;
+  for (int way = 0; way < ways && best > 0; ++way) {
+    double r[4], total = limb_residual(L, limb, g, way, r);
+    if (total < best) best = total, which = way, std::memcpy(out, r, sizeof r);
+  }
+  return which;
+}
+
+struct Limb {
+  double g[4], upper, lower, sa, ca, sb, cb;
+  Vec u, l, a, b;
+};
+Limb limb_of(const double x[J][3], int m, const Frame& R) {
+  Limb s;
+  Vec u = vec(x[MID[m]]) - vec(x[START[m]]), l = vec(x[END[m]]) - vec(x[MID[m]]);
+  s.upper = norm(u), s.lower = norm(l);
+  s.u = (1 / s.upper) * u, s.l = (1 / s.lower) * l;
+  double px = dot(R.forward, s.u), py = dot(R.left, s.u), pz = dot(R.up, s.u), h = std::sqrt(px * px + pz * pz);
+  s.sa = h > 0 ? -px / h : 0.0, s.ca = h > 0 ? -pz / h : 1.0, s.sb = py, s.cb = h;
+  s.a = s.sa * R.up - s.ca * R.forward;
+  s.b = (s.sa * py) * R.forward + h * R.left + (s.ca * py) * R.up;
+  double p = dot(s.a, s.l), q = -dot(s.b, s.l);
+  s.g[0] = std::atan2(s.sa, s.ca), s.g[1] = std::atan2(py, h), s.g[2] = std::atan2(q, p);
+  s.g[3] = std::atan2(std::sqrt(p * p + q * q), dot(s.u, s.l));
+  return s;
+}
+
+// Adds one residual with its derivative along the trunk (18) and one limb (6).
+void add_row(Normal& n, int m, const double t[18], const double* d, double r, bool trunk) {
+  if (trunk)
+    for (int i = 0; i < 18; ++i)
+      if (t[i] != 0) {
+        n.g[i] += t[i] * r;
+        for (int k = 0; k < 18; ++k) n.H[i][k] += t[i] * t[k];
+      }
+  if (!d) return;
+  for (int i = 0; i < 6; ++i) {
+    n.l[m][i] += d[i] * r;
+    for (int k = 0; k < 6; ++k) n.L[m][i][k] += d[i] * d[k];
+    if (trunk)
+      for (int k = 0; k < 18; ++k) n.C[m][i][k] += d[i] * t[k];
+  }
+}
+void put(double t[18], int joint, Vec v, double sign) {
+  t[3 * joint] += sign * v.x, t[3 * joint + 1] += sign * v.y, t[3 * joint + 2] += sign * v.z;
+}
+// Derivative of a part's turn, weighted with w, along the trunk.
+void put_turn(double t[18], const Frame& R, bool between, Vec w) {
+  Vec first, other;
+  R.pull(w, first, other);
+  if (R.by_down) put(t, 3, first, 1), put(t, 0, first, -1), put(t, 2, other, 1), put(t, 1, other, -1);
+  else {
+    put(t, 5, first, 1), put(t, 4, first, -1);
+    if (between) put(t, 3, other, 1), put(t, 0, other, -1);
+    else put(t, 4, other, 1), put(t, 3, other, -1);
+  }
+}
+
+double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsigned parts, Normal* n) {
+  const double scale = p.limit_weight;
+  const bool trunk = parts & 1, between = L.between_hips > 0;
+  const Frame torso = torso_of(x), hips = hips_of(x, between);
+  double chi2 = 0;
+  if (trunk) {
+    double px = -dot(torso.forward, hips.up), py = -dot(torso.left, hips.up), pz = -dot(torso.up, hips.up);
+    double h = std::sqrt(px * px + pz * pz), sa = h > 0 ? -px / h : 0.0, ca = h > 0 ? -pz / h : 1.0;
+    Vec axis = ca * torso.forward - sa * torso.up, turn = cross(hips.up, axis);
+    double g[3] = {std::atan2(sa, ca), std::atan2(py, h), std::atan2(dot(turn, hips.forward), dot(axis, hips.forward))};
+    double cosine = std::max(h, 0.05), square = cosine * cosine;
+    Vec along[3] = {(1 / square) * (torso.left + py * hips.up), axis, (1 / square) * (hips.up + py * torso.left)};
+    for (int k = 0; k < 3; ++k) {
+      double lo = L.pelvis[k][0], hi = L.pelvis[k][1], v = turned(PELVIS_SIGN[k] * g[k], (lo + hi) / 2);
+      double r = scale * (v - std::min(std::max(v, lo), hi));
+      chi2 += r * r;
+      if (n && r != 0) {
+        double t[18] = {};
+        Vec w = (scale * PELVIS_SIGN[k]) * along[k];
+        put_turn(t, hips, between, w);
+        put_turn(t, torso, between, -1.0 * w);
+        add_row(*n, 0, t, nullptr, r, true);
+      }
+    }
+  }
+  for (int m = 0; m < 4; ++m) {
+    if (!(parts >> (m + 1) & 1)) continue;
+    const Frame& R = m < 2 ? torso : hips;
+    const Limb s = limb_of(x, m, R);
+    double r[4], total;
+    int way = least_writing(L, m, s.g, r, total);
+    chi2 += scale * scale * total;
+    if (!n || total == 0) continue;
+    double slope[4][4];  // of each residual along each angle
+    for (int i = 0; i < 4; ++i) {
+      double g[4] = {s.g[0], s.g[1], s.g[2], s.g[3]}, moved[4];
+      g[i] += ANGLE_STEP;
+      limb_residual(L, m, g, way, moved);
+      for (int k = 0; k < 4; ++k) slope[k][i] = (moved[k] - r[k]) / ANGLE_STEP;
+    }
+    double cg = std::cos(s.g[2]), sg = std::sin(s.g[2]), ce = std::cos(s.g[3]), se = std::sin(s.g[3]);
+    double ib = 1 / std::max(s.cb, LEAST_SINE), ie = 1 / std::max(se, LEAST_SINE);
+    Vec f = -sg * s.a - cg * s.b, e = (ce * cg) * s.a - (ce * sg) * s.b - se * s.u;
+    for (int k = 0; k < 4; ++k) {
+      if (r[k] == 0) continue;
+      // Coefficients along the tangents a, b (upper), f, e (lower), and the parent's turn.
+      double on_c = slope[k][2] * ie, on_e = slope[k][3];
+      double on_a = (slope[k][0] + on_c * (s.cb * ce * sg + s.sb * se) - on_e * s.cb * cg) * ib;
+      double on_b = slope[k][1] + on_c * ce * cg + on_e * sg;
+      Vec du = (scale / s.upper) * (on_a * s.a + on_b * s.b), dl = (scale / s.lower) * (on_c * f + on_e * e);
+      Vec w = scale * (on_b * s.a - on_a * s.b + on_e * f - on_c * e);
+      double t[18] = {}, d[6] = {du.x - dl.x, du.y - dl.y, du.z - dl.z, dl.x, dl.y, dl.z};
+      if (trunk) put(t, START[m], du, -1), put_turn(t, R, between, w);
+      add_row(*n, m, t, d, scale * r[k], trunk);
+    }
+  }
+  return chi2;
+}
+
+// Sum of squares at x; with `n` the normal equations.
+double evaluate(const Problem& p, const Limits* limits, const double* at, unsigned parts, Normal* n) {
+  const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
+  const double size = at[42];
+  const bool trunk = parts & 1, sized = trunk && p.size_weight > 0;
+  auto free_ = [&](int j) { return j < TRUNK ? trunk : bool(parts >> (LIMB_OF[j] + 1) & 1); };
+  auto block = [&](int j, int i, int k) -> double& {
+    return j < TRUNK ? n->H[3 * j + i][3 * j + k] : n->L[LIMB_OF[j]][ROW_OF[j] + i][ROW_OF[j] + k];
+  };
+  auto slope = [&](int j, int i) -> double& { return j < TRUNK ? n->g[3 * j + i] : n->l[LIMB_OF[j]][ROW_OF[j] + i]; };
+  if (n) std::memset(n, 0, sizeof *n);
+  double chi2 = 0;
+  for (int j = 0; j < J; ++j) {
+    const double(*w)[2] = p.image[j];
+    if (!free_(j) || (w[0][0] == 0 && w[1][1] == 0)) continue;
+    double iz = 1, u = x[j][0], v = x[j][1];
+    if (p.perspective > 0) {
+      if (!(x[j][2] > 0)) return INFINITY;
+      iz = 1 / x[j][2], u *= iz, v *= iz;
+    }
+    double du = u - p.ray[j][0], dv = v - p.ray[j][1], r[2], d[2][3], e = 0, g = 1;
+    for (int i = 0; i < 2; ++i) {
+      r[i] = w[i][0] * du + w[i][1] * dv, e += r[i] * r[i];
+      d[i][0] = w[i][0] * iz, d[i][1] = w[i][1] * iz;
+      d[i][2] = p.perspective > 0 ? -(w[i][0] * u + w[i][1] * v) * iz : 0.0;
+    }
+    if (p.robust > 0) g = p.robust / (p.robust + e), e *= g, g *= g;
+    chi2 += e;
+    if (n)
+      for (int i = 0; i < 3; ++i) {
+        slope(j, i) += g * (d[0][i] * r[0] + d[1][i] * r[1]);
+        for (int k = 0; k < 3; ++k) block(j, i, k) += g * (d[0][i] * d[0][k] + d[1][i] * d[1][k]);
+      }
+  }
+  if (trunk) {
+    for (int k = 0; k < 3; ++k) {
+      double r = 0;
+      for (int i = 0; i < 3; ++i) r += p.root_weight[k][i] * (x[0][i] - p.root[i]);
+      chi2 += r * r;
+      if (n)
+        for (int i = 0; i < 3; ++i) {
+          n->g[i] += p.root_weight[k][i] * r;
+          for (int j = 0; j < 3; ++j) n->H[i][j] += p.root_weight[k][i] * p.root_weight[k][j];
+        }
+    }
+    chi2 += p.size_weight * p.size_weight * size * size;
+    if (n) {
+      n->H[SIZE][SIZE] = sized ? p.size_weight * p.size_weight : 1;  // a size that is not varied keeps a unit
+      n->g[SIZE] = p.size_weight * p.size_weight * size;
+    }
+  }
+  for (int s = 0; s < D; ++s) {
+    int a = A[s], b = B[s], m = LIMB_OF[b];
+    bool fa = free_(a);
+    if (!free_(b)) continue;
+    double e[3], q = 0, w = p.length_weight[s];
+    for (int i = 0; i < 3; ++i) e[i] = x[b][i] - x[a][i], q += e[i] * e[i];
+    double r = w * (0.5 * std::log(q) - p.log_length[s] - size);
+    chi2 += r * r;
+    if (!n) continue;
+    double t = w / q, bend = std::max(w * r, 0.0) / q;  // curvature of a segment that turns, where it is positive
+    for (int i = 0; i < 3; ++i) {
+      slope(b, i) += t * e[i] * r;
+      if (fa) slope(a, i) -= t * e[i] * r;
+      for (int k = 0; k < 3; ++k) {
+        double h = t * t * e[i] * e[k] + bend * ((i == k) - e[i] * e[k] / q);
+        block(b, i, k) += h;
+        if (!fa) continue;
+        block(a, i, k) += h;
+        if (m < 0) n->H[3 * a + i][3 * b + k] -= h, n->H[3 * b + i][3 * a + k] -= h;
+        else if (a < TRUNK) n->C[m][i][3 * a + k] -= h;
+        else n->L[m][i][3 + k] -= h, n->L[m][3 + i][k] -= h;
+      }
+      if (!sized) continue;
+      double c = w * t * e[i];
+      if (m < 0) n->H[3 * b + i][SIZE] -= c, n->H[SIZE][3 * b + i] -= c;
+      else n->C[m][ROW_OF[b] + i][SIZE] -= c;
+      if (a < TRUNK) n->H[3 * a + i][SIZE] += c, n->H[SIZE][3 * a + i] += c;
+      else n->C[m][ROW_OF[a] + i][SIZE] += c;
+    }
+    if (sized) n->H[SIZE][SIZE] += w * w, n->g[SIZE] -= w * r;
+  }
+  return limits && p.limit_weight > 0 ? chi2 + limit_terms(p, *limits, x, parts, n) : chi2;
+}
+
+template <int K>
+bool cholesky(double M[K][K]) {
+  for (int i = 0; i < K; ++i)
+    for (int j = 0; j <= i; ++j) {
+      double s = M[i][j];
+      for (int k = 0; k < j; ++k) s -= M[i][k] * M[j][k];
+      if (i == j) {
+        if (!(s > 0)) return false;
+        M[i][i] = std::sqrt(s);
+      } else M[i][j] = s / M[j][j];
+    }
+  return true;
+}
+
+// Eliminates limbs: n.L and n.H become Cholesky factors, n.C and n.l are divided by the limbs' factors.
+bool eliminate(Normal& n, double damping, unsigned parts, double add_l[4][6], double add_t[T]) {
+  for (int i = 0; i < T; ++i) add_t[i] = n.H[i][i] * damping + FLOOR;
+  for (int m = 0; m < 4; ++m) {
+    if (!(parts >> (m + 1) & 1)) continue;
+    for (int i = 0; i < 6; ++i) add_l[m][i] = n.L[m][i][i] * damping + FLOOR, n.L[m][i][i] += add_l[m][i];
+    if (!cholesky<6>(n.L[m])) return false;
+    for (int i = 0; i < 6; ++i) {
+      double f = 1 / n.L[m][i][i];
+      for (int k = 0; k < i; ++k) {
+        n.l[m][i] -= n.L[m][i][k] * n.l[m][k];
+        for (int c = 0; c < T; ++c) n.C[m][i][c] -= n.L[m][i][k] * n.C[m][k][c];
+      }
+      n.l[m][i] *= f;
+      for (int c = 0; c < T; ++c) n.C[m][i][c] *= f;
+    }
+    if (parts & 1)
+      for (int k = 0; k < 6; ++k)
+        for (int i = 0; i < T; ++i) {
+          n.g[i] -= n.C[m][k][i] * n.l[m][k];
+          for (int j = 0; j <= i; ++j) n.H[i][j] -= n.C[m][k][i] * n.C[m][k][j];
+        }
+  }
+  if (!(parts & 1)) return true;
+  for (int i = 0; i < T; ++i) n.H[i][i] += add_t[i];
+  return cholesky<T>(n.H);
+}
+
+// One damped step; returns the decrease of chi2 that the linear model promises, negative if there is none.
+double step(const Normal& start, double damping, unsigned parts, double dx[N]) {
+  Normal n = start;
+  double add_l[4][6], add_t[T], t[T] = {}, gain = 0;
+  if (!eliminate(n, damping, parts, add_l, add_t)) return -1;
+  if (parts & 1) {
+    for (int i = 0; i < T; ++i) {
+      double s = n.g[i];
+      for (int k = 0; k < i; ++k) s -= n.H[i][k] * t[k];
+      t[i] = s / n.H[i][i], gain += t[i] * t[i];
+    }
+    for (int i = T - 1; i >= 0; --i) {
+      for (int k = i + 1; k < T; ++k) t[i] -= n.H[k][i] * t[k];
+      t[i] /= n.H[i][i];
+    }
+    for (int i = 0; i < T; ++i) gain += add_t[i] * t[i] * t[i], dx[i < 18 ? i : 42] = -t[i];
+  }
+  for (int m = 0; m < 4; ++m) {
+    if (!(parts >> (m + 1) & 1)) continue;
+    double d[6];
+    for (int i = 0; i < 6; ++i) {
+      gain += n.l[m][i] * n.l[m][i], d[i] = n.l[m][i];
+      if (parts & 1)
+        for (int c = 0; c < T; ++c) d[i] -= n.C[m][i][c] * t[c];
+    }
+    for (int i = 5; i >= 0; --i) {
+      for (int k = i + 1; k < 6; ++k) d[i] -= n.L[m][k][i] * d[k];
+      d[i] /= n.L[m][i][i];
+    }
+    for (int i = 0; i < 6; ++i) gain += add_l[m][i] * d[i] * d[i], dx[3 * (i < 3 ? MID[m] : END[m]) + i % 3] = -d[i];
+  }
+  return gain;
+}
+
+double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double precision,
+               double hopeless, int& steps) {
+  Normal here, there;
+  double damping = 1e-4, chi2 = evaluate(p, L, x, parts, &here), dx[N] = {}, y[N];
+  for (; steps < most && std::isfinite(chi2); ++steps) {
+    double gain = step(here, damping, parts, dx);
+    if (gain < 0) {
+      damping = std::max(damping * 8, 1e-4);
+      continue;
+    }
+    if ((gain <= precision && damping <= 0.1) || damping > 1e6 || (chi2 > hopeless && gain < 0.5 * chi2)) break;
+    for (int i = 0; i < N; ++i) y[i] = x[i] + dx[i];
+    double value = evaluate(p, L, y, parts, &there);
+    if (value <= chi2) {
+      double ratio = (chi2 - value) / gain;
+      damping = std::max(ratio > 0.75 ? damping * 0.1 : ratio < 0.25 ? damping * 4 : damping, 1e-12);
+      std::memcpy(x, y, sizeof y);
+      std::swap(here, there);
+      chi2 = value;
+    } else damping *= 8;
+  }
+  return chi2;
+}
+
+// Adds what is known besides the residuals: places at all, hidden joints about their modes, and turns of segments near
+// a right angle to their rays (see modes.py).
+void inform(Normal& n, const Problem& p, const double* at, const double known[3]) {
+  const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
+  for (int j = 0; j < J; ++j) {
+    double own = p.image[j][0][0] == 0 && p.image[j][1][1] == 0 ? known[1] : known[0];
+    for (int i = 0; i < 3; ++i) {
+      int at_limb = ROW_OF[j] + i;
+      (j < TRUNK ? n.H[3 * j + i][3 * j + i] : n.L[LIMB_OF[j]][at_limb][at_limb]) += own;
+    }
+  }
+  for (int m = 0; m < 4; ++m)
+    for (int lower = 0; lower < 2; ++lower) {
+      int a = lower ? MID[m] : START[m], b = lower ? END[m] : MID[m];
+      Vec line = vec(x[b]) - vec(x[a]), ray = p.perspective > 0 ? vec(x[b]) : Vec{0, 0, 1};
+      double square = dot(line, line), weight = 0;
+      for (int i = 0; i < 4; ++i) weight += p.image[b][i / 2][i % 2] * p.image[b][i / 2][i % 2] / 2;
+      Vec turn = ray - (dot(ray, line) / square) * line;
+      double size = norm(turn), depth = p.perspective > 0 ? std::fabs(x[b][2]) : 1.0;
+      if (!(size > 0)) continue;
+      double info = known[2] * std::sqrt(weight / square) * size / norm(ray) / depth;
+      double t[3] = {turn.x / size, turn.y / size, turn.z / size};
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+          double h = info * t[i] * t[k];
+          n.L[m][3 * lower + i][3 * lower + k] += h;
+          if (lower) n.L[m][i][k] += h, n.L[m][i][3 + k] -= h, n.L[m][3 + i][k] -= h;
+          else n.H[3 * a + i][3 * a + k] += h, n.C[m][i][3 * a + k] -= h;
+        }
+    }
+}
+
+// Logarithm of the determinant of the information, and every joint's covariance.
+double summarize(Normal& n, double covariance[J][3][3]) {
+  double add_l[4][6], add_t[T], inverse[T][T] = {}, logdet = 0;
+  if (!eliminate(n, 0, 31, add_l, add_t)) return NAN;
+  for (int c = 0; c < T; ++c) {  // inverse of the trunk's factor, then of the trunk's matrix
+    for (int i = c; i < T; ++i) {
+      double s = i == c;
+      for (int k = c; k < i; ++k) s -= n.H[i][k] * inverse[k][c];
+      inverse[i][c] = s / n.H[i][i];
+    }
+    logdet += 2 * std::log(n.H[c][c]);
+  }
+  double S[T][T] = {};
+  for (int k = 0; k < T; ++k)
+    for (int i = 0; i <= k; ++i)
+      for (int j = 0; j <= k; ++j) S[i][j] += inverse[k][i] * inverse[k][j];
+  for (int j = 0; j < TRUNK; ++j)
+    for (int i = 0; i < 9; ++i) covariance[j][i / 3][i % 3] = S[3 * j + i / 3][3 * j + i % 3];
+  for (int m = 0; m < 4; ++m) {
+    double U[6][6] = {}, K[6][T], M[6][T];  // U: inverse of the limb's factor; K = U' C
+    for (int c = 0; c < 6; ++c) {
+      for (int i = c; i < 6; ++i) {
+        double s = i == c;
+        for (int k = c; k < i; ++k) s -= n.L[m][i][k] * U[k][c];
+        U[i][c] = s / n.L[m][i][i];
+      }
+      logdet += 2 * std::log(n.L[m][c][c]);
+    }
+    for (int i = 0; i < 6; ++i)
+      for (int c = 0; c < T; ++c) {
+        K[i][c] = 0;
+        for (int k = i; k < 6; ++k) K[i][c] += U[k][i] * n.C[m][k][c];
+      }
+    for (int i = 0; i < 6; ++i)
+      for (int c = 0; c < T; ++c) {
+        M[i][c] = 0;
+        for (int k = 0; k < T; ++k) M[i][c] += K[i][k] * S[k][c];
+      }
+    for (int e = 0; e < 2; ++e)
+      for (int i = 3 * e; i < 3 * e + 3; ++i)
+        for (int j = 3 * e; j < 3 * e + 3; ++j) {
+          double s = 0;
+          for (int k = std::max(i, j); k < 6; ++k) s += U[k][i] * U[k][j];
+          for (int c = 0; c < T; ++c) s += M[i][c] * K[j][c];
+          covariance[e ? END[m] : MID[m]][i - 3 * e][j - 3 * e] = s;
+        }
+  }
+  return logdet;
+}
+
+// The matrix of the normal equations, dense, in the order of the unknowns.
+void spread(const Normal& n, double H[N][N]) {
+  int trunk[T];
+  for (int i = 0; i < T; ++i) trunk[i] = i < 18 ? i : 42;
+  std::memset(H, 0, sizeof(double) * N * N);
+  for (int i = 0; i < T; ++i)
+    for (int j = 0; j < T; ++j) H[trunk[i]][trunk[j]] = n.H[i][j];
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 6; ++i) {
+      int row = 3 * (i < 3 ? MID[m] : END[m]) + i % 3;
+      for (int j = 0; j < 6; ++j) H[row][3 * (j < 3 ? MID[m] : END[m]) + j % 3] = n.L[m][i][j];
+      for (int c = 0; c < T; ++c) H[row][trunk[c]] = H[trunk[c]][row] = n.C[m][i][c];
+    }
+}
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Longs = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+
+const Problem* problems_of(const py::array& problems) {
+  if (problems.itemsize() != (py::ssize_t)sizeof(Problem)) throw std::invalid_argument("records of another layout");
+  return static_cast<const Problem*>(problems.data());
+}
+const Limits* limits_of(const py::object& limits) {
+  if (limits.is_none()) return nullptr;
+  py::array array = py::cast<py::array>(limits);
+  if (array.itemsize() != (py::ssize_t)sizeof(Limits)) throw std::invalid_argument("limits of another layout");
+  return static_cast<const Limits*>(array.data());
+}
+
+py::tuple descend_all(py::array problems, py::object limits, Longs which, Doubles start, unsigned parts, int most,
+                      double precision, Doubles hopeless) {
+  const Problem* p = problems_of(problems);
+  const Limits* L = limits_of(limits);
+  const py::ssize_t count = which.size();
+  py::array_t<double> x({count, (py::ssize_t)N}), chi2(count);
+  py::array_t<std::int64_t> steps(count);
+  std::memcpy(x.mutable_data(), start.data(), sizeof(double) * N * count);
+  double *at = x.mutable_data(), *value = chi2.mutable_data();
+  const std::int64_t* row = which.data();
+  std::int64_t* taken = steps.mutable_data();
+  const double* limit = hopeless.data();
+  {
+    py::gil_scoped_release released;
+    std::atomic<py::ssize_t> next{0};
+    auto work = [&] {
+      for (py::ssize_t first; (first = next.fetch_add(ROWS_AT_ONCE)) < count;)
+        for (py::ssize_t k = first; k < std::min(first + ROWS_AT_ONCE, count); ++k) {
+          int done = 0;
+          value[k] = descend(p[row[k]], L, at + k * N, parts, most, precision, limit[k], done);
+          taken[k] = done;
+        }
+    };
+    std::vector<std::thread> others;
+    const py::ssize_t wanted = std::min<py::ssize_t>(std::thread::hardware_concurrency(), count / ROWS_A_THREAD);
+    for (py::ssize_t k = 1; k < wanted; ++k) others.emplace_back(work);
+    work();
+    for (auto& one : others) one.join();
+  }
+  return py::make_tuple(x, chi2, steps);
+}
+
+// Information on the unknowns of whole bodies as dense matrices (M, 43, 43).
+py::array_t<double> information(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+  const Problem* p = problems_of(problems);
+  const Limits* L = limits_of(limits);
+  const py::ssize_t count = which.size();
+  py::array_t<double> matrix({count, (py::ssize_t)N, (py::ssize_t)N});
+  Normal n;
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const double* x = at.data() + k * N;
+    evaluate(p[which.data()[k]], L, x, 31, &n);
+    inform(n, p[which.data()[k]], x, known.data());
+    spread(n, reinterpret_cast<double(*)[N]>(matrix.mutable_data() + k * N * N));
+  }
+  return matrix;
+}
+
+// Logarithms of determinants (M,) of the information, and covariances (M, 14, 3, 3) of joints.
+py::tuple summaries(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+  const Problem* p = problems_of(problems);
+  const Limits* L = limits_of(limits);
+  const py::ssize_t count = which.size();
+  py::array_t<double> logdet(count), covariance({count, (py::ssize_t)J, (py::ssize_t)3, (py::ssize_t)3});
+  Normal n;
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const double* x = at.data() + k * N;
+    evaluate(p[which.data()[k]], L, x, 31, &n);
+    inform(n, p[which.data()[k]], x, known.data());
+    logdet.mutable_data()[k] = summarize(n, reinterpret_cast<double(*)[3][3]>(covariance.mutable_data() + k * J * 9));
+  }
+  return py::make_tuple(logdet, covariance);
+}
+
+// For bodies by frame, the best first, whether each differs from all that are kept before: see modes.py.
+py::array_t<bool> separate(py::array problems, py::object limits, Longs which, Doubles at, Doubles known, double within,
+                           double reach, double level) {
+  const Problem* p = problems_of(problems);
+  const Limits* L = limits_of(limits);
+  const py::ssize_t count = which.size();
+  py::array_t<bool> keep(count);
+  std::vector<std::vector<double>> matrices;
+  std::vector<py::ssize_t> kept;
+  Normal n;
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const double* a = at.data() + k * N;
+    if (k && which.data()[k] != which.data()[k - 1]) kept.clear(), matrices.clear();
+    bool same = false;
+    for (size_t i = 0; i < kept.size() && !same; ++i) {
+      const double* b = at.data() + kept[i] * N;
+      double d[N], far = 0;
+      for (int j = 0; j < N; ++j) d[j] = a[j] - b[j];
+      for (int j = 3; j < 42 && far < reach * reach; j += 3) {
+        Vec apart = vec(d + j) - vec(d);
+        far = std::max(far, dot(apart, apart));
+      }
+      if (far >= reach * reach) continue;
+      same = far < within * within;
+      if (same) continue;
+      if (matrices[i].empty()) {
+        const double* x = at.data() + kept[i] * N;
+        matrices[i].resize(N * N);
+        evaluate(p[which.data()[k]], L, x, 31, &n);
+        inform(n, p[which.data()[k]], x, known.data());
+        spread(n, reinterpret_cast<double(*)[N]>(matrices[i].data()));
+      }
+      double total = 0;
+      for (int j = 0; j < N; ++j) {
+        double s = 0;
+        for (int c = 0; c < N; ++c) s += matrices[i][j * N + c] * d[c];
+        total += s * d[j];
+      }
+      same = total < level;
+    }
+    keep.mutable_data()[k] = !same;
+    if (!same) kept.push_back(k), matrices.emplace_back();
+  }
+  return keep;
+}
+
+// For rows in order of preference within each group, whether each is farther than `within` from all that are kept.
+py::array_t<bool> distinct(Longs group, Doubles points, double within) {
+  const py::ssize_t count = group.size(), width = count ? points.size() / count : 0;
+  py::array_t<bool> keep(count);
+  std::vector<py::ssize_t> kept;
+  const std::int64_t* g = group.data();
+  for (py::ssize_t k = 0; k < count; ++k) {
+    if (k && g[k] != g[k - 1]) kept.clear();
+    const double* a = points.data() + k * width;
+    bool near = false;
+    for (size_t i = 0; i < kept.size() && !near; ++i) {
+      const double* b = points.data() + kept[i] * width;
+      near = true;
+      for (py::ssize_t j = 0; j < width && near; j += 3) {
+        Vec apart = vec(a + j) - vec(b + j);
+        near = dot(apart, apart) < within * within;
+      }
+    }
+    keep.mutable_data()[k] = !near;
+    if (!near) kept.push_back(k);
+  }
+  return keep;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_compiled, m) {
+  m.def("descend", &descend_all);
+  m.def("information", &information);
+  m.def("summaries", &summaries);
+  m.def("separate", &separate);
+  m.def("distinct", &distinct);
+}

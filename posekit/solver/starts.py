@@ -1,0 +1,230 @@
+"""Starts of the descents: near and far choices on the rays, times a few depths; many directions for hidden joints."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posekit.geometry import Array, Flags, Ints, best_rotation, cross, dot, unit
+from posekit.skeleton import PARENTS, SEGMENTS
+from posekit.solver.limits import ENDS, MIDDLES, STARTS
+from posekit.solver.problem import Problem
+
+TRUNK: Final = 6
+TRUNK_SEGMENTS: Final = tuple(k for k, pair in enumerate(SEGMENTS) if max(pair) < TRUNK)
+#: The segment that lifts each joint from its parent.
+LIFTED: Final = {max(pair): k for k, pair in enumerate(SEGMENTS[:13])}
+
+#: Distances of a neck whose position is not known, as fractions of the largest at which the trunk fits its image.
+DEPTHS: Final = np.array([1.02, 0.95, 0.87, 0.78, 0.68])
+
+#: Distance of a person of whose trunk no two joints are seen.
+UNSEEN_TRUNK_METRES: Final = 5.0
+
+#: Directions in which a hidden joint starts from its neighbour.
+DIRECTIONS: Final = 30
+
+#: Distances from shoulder to wrist, or hip to ankle, over the limb's length, if the joint between is hidden.
+REACHES: Final = (0.55, 0.8, 0.97)
+
+#: Positions of a hidden elbow or knee around the line between its neighbours.
+AROUND: Final = 6
+
+
+def sphere(count: int) -> Array:
+    """Return unit vectors (count, 3) spread evenly over the sphere (Fibonacci lattice)."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+class Rays:
+    """Rays of the image points of F frames: origins and unit directions (F, 14, 3).
+
+    Parameters
+    ----------
+    problem : Problem
+        The frames.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        ones = np.ones((*problem.rays.shape[:2], 1))
+        if problem.perspective:
+            self.direction = unit(np.concatenate([problem.rays, ones], axis=2))
+            self.origin = np.zeros_like(self.direction)
+        else:
+            self.direction = np.broadcast_to([0.0, 0.0, 1.0], (*problem.rays.shape[:2], 3))
+            self.origin = np.concatenate([problem.rays, 0 * ones], axis=2)
+
+    def lift(self, frame: Ints, joint: int, start: Array, length: Array, far: Flags) -> Array:
+        """Return the end (N, 3) of segments on a joint's ray, near or far; the foot of the start if it is too short."""
+        o, d = self.origin[frame, joint], self.direction[frame, joint]
+        foot = o + dot(start - o, d)[:, None] * d
+        off = foot - start
+        half = np.sqrt(np.maximum(length * length - dot(off, off), 0.0))
+        return np.asarray(foot + np.where(far, half, -half)[:, None] * d)
+
+
+def necks(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
+    """Return where necks may be: frames (K,), ascending, and positions (K, 3)."""
+    known = problem.rooted | (not problem.perspective)
+    frames, places = [np.flatnonzero(known)], []
+    if problem.perspective:
+        places.append(problem.root[known])
+    else:
+        places.append(rays.origin[known, 0] + problem.root[known] * [0.0, 0.0, 1.0])
+    open_ = np.flatnonzero(~known)
+    if open_.size:
+        d, seen = rays.direction[open_], problem.seen_joints[open_]
+        farthest = np.full(open_.size, np.inf)
+        for k in TRUNK_SEGMENTS:
+            a, b = SEGMENTS[k]
+            sine = np.linalg.norm(cross(d[:, a], d[:, b]), axis=1)
+            length = np.exp(problem.log_lengths[open_, k])
+            both = seen[:, a] & seen[:, b] & (sine > 1e-6)
+            farthest = np.where(both, np.minimum(farthest, length / np.where(both, sine, 1.0)), farthest)
+        farthest = np.where(np.isfinite(farthest), farthest, UNSEEN_TRUNK_METRES)
+        # A hidden neck starts on the mean ray of the trunk.
+        mean = np.einsum("fji,fj->fi", d[:, :TRUNK], seen[:, :TRUNK].astype(float))
+        ray = np.where(seen[:, :1], d[:, 0], mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-9)[:, None])
+        frames.append(np.repeat(open_, len(DEPTHS)))
+        places.append((farthest[:, None] * DEPTHS)[..., None] * ray[:, None])
+        places[-1] = places[-1].reshape(-1, 3)
+    frame = np.concatenate(frames)
+    order = np.argsort(frame, kind="stable")
+    return frame[order], np.concatenate(places)[order]
+
+
+def trunk_starts(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
+    """Return frames (S,) and trunks (S, 6, 3): near and far of five joints from every neck."""
+    frame, neck = necks(problem, rays)
+    lengths = np.exp(problem.log_lengths)
+    signs = (np.arange(32)[:, None] >> np.arange(5)[::-1]) & 1
+    own = np.repeat(frame, 32)
+    far = np.tile(signs, (len(frame), 1)).astype(np.bool_)
+    trunk = np.empty((len(own), TRUNK, 3))
+    trunk[:, 0] = np.repeat(neck, 32, axis=0)
+    for joint in range(1, TRUNK):
+        length = lengths[own, LIFTED[joint]]
+        trunk[:, joint] = rays.lift(own, joint, trunk[:, PARENTS[joint]], length, far[:, joint - 1])
+    hidden = ~problem.seen_joints[:, :TRUNK]
+    if not hidden.any():
+        return own, trunk
+    # Signs of hidden joints say nothing: one of each is kept, and the hidden joints follow from the others.
+    once = ~(far & hidden[own, 1:]).any(axis=1)
+    own, trunk = own[once], trunk[once]
+    plain = ~hidden[own].any(axis=1)
+    frames, trunks = [own[plain]], [trunk[plain]]
+    for pattern in np.unique(hidden[own[~plain]], axis=0):
+        rows = np.flatnonzero((hidden[own] == pattern).all(axis=1))
+        for turned in _filled(trunk[rows], ~pattern, lengths[own[rows]]):
+            frames.append(own[rows])
+            trunks.append(turned)
+    frame = np.concatenate(frames)
+    order = np.argsort(frame, kind="stable")
+    return frame[order], np.concatenate(trunks)[order]
+
+
+def _filled(trunk: Array, seen: Flags, lengths: Array) -> list[Array]:
+    """Lay a trunk of these lengths onto the seen joints (R, 6, 3) to place the hidden ones, in several turns.
+
+    Fewer than three joints leave a turn open: a point beside the trunk then ties it to one direction.
+    """
+    body = np.stack([_template(one) for one in lengths])
+    source, target = body[:, seen], trunk[:, seen]
+    out = []
+    for turn in sphere(DIRECTIONS) if seen.sum() < 3 else np.zeros((1, 3)):
+        if turn.any():
+            centre = trunk[:, seen if seen.any() else ~seen].mean(axis=1, keepdims=True)
+            source = np.concatenate([body[:, seen], body[:, :1] + [0.3, 0.1, 0.2]], axis=1)
+            target = np.concatenate([trunk[:, seen], centre + 0.3 * turn], axis=1)
+        a, b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
+        R, _ = best_rotation(np.einsum("rki,rkj->rij", target - b, source - a))
+        laid = np.einsum("rij,rkj->rki", R, body - a) + b
+        laid[:, seen] = trunk[:, seen]
+        out.append(laid)
+    return out
+
+
+def _template(lengths: Array) -> Array:
+    """Return a trunk (6, 3) that stands, of 17 lengths."""
+    by = {tuple(sorted(pair)): lengths[k] for k, pair in enumerate(SEGMENTS)}
+    out = np.zeros((TRUNK, 3))
+    down, right, left = by[0, 3], by[0, 1], by[0, 2]
+    out[3] = 0.0, down, 0.0
+    half = by[1, 2] / (right + left)
+    out[1], out[2] = [-half * right, 0.0, 0.0], [half * left, 0.0, 0.0]
+    wide = by[4, 5] / 2
+    low = np.sqrt(max(((by[3, 4] + by[3, 5]) / 2) ** 2 - wide**2, 0.0))
+    out[4], out[5] = [-wide, down + low, 0.0], [wide, down + low, 0.0]
+    return out
+
+
+def limb_starts(problem: Problem, rays: Rays, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
+    """Return trunks (S,), ascending, and middle and end (S, 2, 3) of one limb from each of them.
+
+    Parameters
+    ----------
+    problem, rays
+        The frames.
+    frame : int array (T,)
+        Of each trunk.
+    trunk : array (T, 6, 3)
+        Metres.
+    limb : int
+        Of `posekit.solver.limits.LIMBS`.
+    """
+    middle, end = MIDDLES[limb], ENDS[limb]
+    lengths = np.exp(problem.log_lengths[frame])
+    upper, lower = lengths[:, LIFTED[middle]], lengths[:, LIFTED[end]]
+    start = trunk[:, STARTS[limb]]
+    seen = problem.seen_joints[frame][:, [middle, end]]
+    rows, ends = [np.empty(0, dtype=np.intp)], [np.empty((0, 2, 3))]
+    for of_middle, of_end in ((True, True), (True, False), (False, True), (False, False)):
+        own = np.flatnonzero((seen == [of_middle, of_end]).all(axis=1))
+        if not own.size:
+            continue
+        s, f, u, w = start[own], frame[own], upper[own], lower[own]
+
+        def lifts(joint: int, origin: Array, length: Array, f: Ints = f) -> list[Array]:
+            return [rays.lift(f, joint, origin, length, np.full(len(f), far)) for far in (False, True)]
+
+        ways = sphere(DIRECTIONS)
+        if of_middle and of_end:
+            pairs = [(a, b) for a in lifts(middle, s, u) for b in lifts(end, a, w)]
+        elif of_middle:
+            pairs = [(a, a + w[:, None] * way) for a in lifts(middle, s, u) for way in ways]
+        elif of_end:
+            tips = [tip for reach in REACHES for tip in lifts(end, s, reach * (u + w))]
+            pairs = [pair for tip in tips for pair in _around(s, tip, u, w)]
+        else:
+            bent = [(way, other) for way in ways for other in (way, -way, _side(way))]
+            pairs = [(s + u[:, None] * a, s + u[:, None] * a + w[:, None] * b) for a, b in bent]
+        rows += [own] * len(pairs)
+        ends += [np.stack(pair, axis=1) for pair in pairs]
+    row = np.concatenate(rows)
+    order = np.argsort(row, kind="stable")
+    return row[order], np.concatenate(ends)[order]
+
+
+def _around(start: Array, end: Array, upper: Array, lower: Array) -> list[tuple[Array, Array]]:
+    """Return a hidden middle joint in some turns about the line from start to end, with the end (N, 3)."""
+    line = end - start
+    reach = np.sqrt(dot(line, line))
+    axis = unit(line)
+    along = (reach**2 + upper**2 - lower**2) / (2 * reach)
+    off = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
+    other = np.where(np.abs(axis[:, :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    first = unit(cross(axis, other))
+    second = cross(axis, first)
+    return [
+        (start + along[:, None] * axis + off[:, None] * (np.cos(t) * first + np.sin(t) * second), end)
+        for t in np.arange(AROUND) * 2 * np.pi / AROUND
+    ]
+
+
+def _side(way: Array) -> Array:
+    """Return a unit vector square to another."""
+    return unit(np.cross(way, [0.0, 1.0, 0.0] if abs(way[1]) < 0.9 else [1.0, 0.0, 0.0]))
