@@ -1,14 +1,120 @@
-"""Pictures: postures as meshcat scenes, drawn without a server; the paper's plots; pages to be opened anywhere.
+"""Pictures, animations, pages, overlays and plots of bodies: `draw` makes each of them."""
 
-`scene` says what is drawn, `browser` draws it, `pictures`, `moving` and `video` write files, `overlay` draws over
-photographs and videos, `page` is the interactive page, `plots` has the paper's figures and joint angles.
-"""
+from __future__ import annotations
 
-from posekit.viewer.pictures import Shot as Shot
-from posekit.viewer.pictures import write_picture as write_picture
-from posekit.viewer.scene import DrawnSubject as DrawnSubject
-from posekit.viewer.scene import Eye as Eye
-from posekit.viewer.scene import ParallelEye as ParallelEye
-from posekit.viewer.scene import Style as Style
-from posekit.viewer.scene import ViewEye as ViewEye
-from posekit.viewer.scene import subject_of as subject_of
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.cameras import View
+from posekit.errors import refusal
+from posekit.recovery import Recovery
+from posekit.validators import Report
+from posekit.viewer.subjects import as_motion, frame_with_postures, subjects_of
+
+PICTURES: Final = (".png", ".gif", ".mp4")
+PLOTS: Final = (".png", ".svg", ".pdf")
+PLOT_NAMES: Final = ("angles", "timeline")
+
+
+def draw(
+    source: Any,
+    target: str | PathLike[str],
+    *,
+    view: Any = None,
+    frame: int | tuple[int, int] | None = None,
+    which: str = "",
+    size: tuple[int, int] = (1280, 720),
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    over: str | PathLike[str] | None = None,
+    urdf: str = "",
+) -> None:
+    """Draw bodies as a picture, an animation or a page, over photographs, or as plots.
+
+    Parameters
+    ----------
+    source : Motion, Recovery, View with truth, Report or array (T, 14, 3)
+        What is drawn; arrays are in metres.
+    target : path
+        ``.png`` (frames or alternative postures side by side), ``.gif`` and ``.mp4`` (one frame after the other),
+        ``.html`` (a page that needs nothing else), ``.svg`` and ``.pdf`` (plots).
+    view : View or Motion, optional
+        What a result was recovered from: its image and its camera are drawn, too. For a report, the motion that it
+        judges, or several: the page then shows the body in each frame.
+    frame : int or (int, int), optional
+        Frame, or first and last, from 0. By default a few frames of a motion, or all in an animation.
+    which : str
+        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers as ``0,4``. ``angles`` draws a plot
+        of joint angles over time, ``timeline`` one of a report's findings.
+    size : (int, int)
+        Pixels.
+    azimuth, elevation : float, optional
+        Degrees by which the eye is turned to the person's left, from the front or from the camera of a result, and
+        raised above the level. 35 and 8 by default.
+    over : path, optional
+        Picture, folder of pictures or film that is drawn over, through the view's camera.
+    urdf : str
+        Robot of configurations whose robot is not known.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to draw, or the target is none of these.
+    ViewerError
+        If a picture needs a browser and there is none, or it fails.
+
+    Examples
+    --------
+    >>> import tempfile, posekit
+    >>> standing = posekit.load_figure().neutral_points[None, :14]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     posekit.render(standing, f"{folder}/standing.html")
+    """
+    from posekit.viewer.files import encoded, stride, write_whole
+
+    path = Path(target)
+    suffix = path.suffix.lower()
+    if suffix not in (".html", *PICTURES, *PLOTS):
+        expected = f"{', '.join((*PICTURES, '.html', '.svg', '.pdf'))}"
+        raise refusal(path, "", f"the format {suffix or 'of no ending'}", expected, "name one of these")
+    if over is not None:
+        from posekit.viewer.overlay import overlaid
+
+        moving, drawn = suffix != ".png", source if isinstance(source, View) else as_motion(source)
+        frames, rate = overlaid(drawn, Path(over), view=view, frame=frame, which=which, moving=moving)
+        return write_whole(path, encoded(frames, suffix, rate))
+    source = as_motion(source)
+    if suffix == ".html":
+        from posekit.viewer.page import write_page
+
+        return write_page(source, path, view=view, frame=frame, urdf=urdf)
+    if which in PLOT_NAMES or isinstance(source, Report) or suffix not in PICTURES:
+        from posekit.viewer.plots import plotted
+
+        kind = which if which in PLOT_NAMES else "timeline" if isinstance(source, Report) else "angles"
+        if suffix not in PLOTS:
+            raise refusal(path, "", f"the format {suffix}", ", ".join(PLOTS), "name a plot so")
+        return write_whole(path, plotted(source, kind, suffix, frame=frame, view=view))
+    from posekit.viewer.scene import camera_lines, pictures
+
+    seen = view if isinstance(view, View) else None
+    moving = suffix != ".png"
+    subjects, captions, rate = subjects_of(
+        source, which=which, frame=frame, urdf=urdf, view=seen, azimuth=azimuth, moving=moving
+    )
+    camera = image = None
+    if isinstance(source, Recovery) and seen is not None and not moving:
+        number = frame_with_postures(source, frame)
+        image = None if isinstance(frame, tuple) else np.asarray(seen.image[number])
+        if len(subjects) == 1:  # a camera fits one body alone: others were moved aside
+            turned = subjects[0].R_world_data
+            joints = subjects[0].robot.points(subjects[0].q)[0]
+            camera = camera_lines(seen, number, joints, turned, subjects[0].offset)
+    step = stride(suffix, rate) if frame is None else 1
+    made = pictures(
+        subjects, captions=captions, size=size, elevation=elevation, camera=camera, image=image, step=step
+    )
+    write_whole(path, encoded(made, suffix, None if rate is None else rate / step))

@@ -1,70 +1,51 @@
-"""`posekit follow`: live, JSON lines of key points in, JSON lines of postures out."""
+"""`posekit follow`: live, lines of key points in, lines of postures out."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import Any
 
-import typer
+import click
 
-from posekit.cli.asked import settings_of
-from posekit.cli.detector_options import Who
-from posekit.cli.detector_source import source_of
-from posekit.cli.groups import with_groups
-from posekit.cli.judging_options import Judging, Tolerances
-from posekit.cli.live_options import Watching
-from posekit.cli.noise_options import UncertainAsRecover
-from posekit.cli.options import ContactMargin, examples, signed_length
+from posekit.cli.command import command, option, settings_from, settings_options
+from posekit.cli.recover import picture_size
 from posekit.errors import InputError
+from posekit.settings import RecoverSettings
 
-FOLLOW_EXAMPLES = examples(
+
+@command(
+    "follow",
     "detector | posekit follow --stdin --layout coco_17 --size 1280x720 --stature 175cm | viewer",
-    "posekit follow --stdin --camera calibration.toml:cam_01 --lengths me.toml --deviation 2 < joints.jsonl",
 )
-
-
-@with_groups
+@option("--stdin", is_flag=True, help="Read JSON lines from standard input and answer each at once.")
+@option("--keep-going", is_flag=True, help='Answer a line that cannot be read with {"error": …} and go on.')
+@option("--layout", "--skeleton", default="", metavar="NAME|FILE.toml", help="Names of the key points.")
+@option("--camera", metavar="FILE[:NAME]", default=None, help="Calibration. Default: a webcam of --size.")
+@option("--size", default=None, metavar="WxH", help="Width and height of the pictures, pixels.")
+@option(
+    "--lag", default=5, type=click.IntRange(0, 1000), metavar="N", help="Pictures that a path looks ahead."
+)
+@settings_options(RecoverSettings, {"stature": "LENGTH", "deviation": "PX", "checks": "LIST"})
 def follow(
-    *,
-    stdin: Annotated[
-        bool, typer.Option("--stdin", help="Read JSON lines from standard input, and answer each at once.")
-    ] = False,
-    keep_going: Annotated[
-        bool,
-        typer.Option("--keep-going", help='Answer a line that cannot be read with {"error": …}, and go on.'),
-    ] = False,
-    watching: Watching,
-    who: Who,
-    judging: Judging,
-    tolerances: Tolerances,
-    contact_margin: ContactMargin = "0cm",
-    uncertain: UncertainAsRecover,
+    stdin: bool, keep_going: bool, layout: str, camera: str | None, size: str | None, lag: int, **given: Any
 ) -> None:
-    """Follow a person live: a line of key points in, a line with the likeliest posture and the path out.
+    """Follow a person live.
 
     A line is {"time": seconds, "points": [[x, y], …]} or {"time": …, "points": {"left_wrist": [x, y, confidence], …}}.
-    The first may be a header instead: camera, size, lengths, stature, deviation, layout; options come before it.
-    Of a recording, all frames at once: posekit recover --follow. From Python live: posekit.Tracker; of a recovery:
-    posekit.follow.
     """
     if not stdin:
-        raise InputError("posekit follow: nothing says what to follow; expected JSON lines; give --stdin")
-    from posekit.live.lines import line_of
-    from posekit.live.stream import LiveRequest, answers
+        raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")
+    from posekit.doors import opened_camera
+    from posekit.following import Tracker
+    from posekit.following.lines import answers
 
-    asked = LiveRequest(
-        settings=settings_of(
-            judging, tolerances, uncertain, contact_margin=signed_length(contact_margin, "--contact-margin")
-        ),
-        source=source_of(watching.reading(), who, deviation=uncertain.deviation),
-        lag=watching.lag,
+    tracker = Tracker(
+        settings=settings_from(RecoverSettings, given),
+        camera=opened_camera(camera),
+        layout=layout,
+        size=picture_size(size),
+        lag=lag,
     )
-    told = answers(
-        sys.stdin.buffer, asked.tracker, least=asked.source.minimum_confidence, keep_going=keep_going
-    )
-    try:
-        for one in told:
-            sys.stdout.write(line_of(one))
-            sys.stdout.flush()
-    except KeyboardInterrupt:
-        return  # how a live stream usually ends
+    for line in answers(sys.stdin.buffer, tracker, keep_going=keep_going):
+        sys.stdout.write(line)
+        sys.stdout.flush()

@@ -2,184 +2,132 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
+import difflib
 import os
+import signal
 import sys
 import warnings
 from importlib import import_module
-from typing import Annotated, Any, Final, TextIO
+from typing import Any, Final
 
-import typer
+import click
 
-from posekit.cli.guarded_command import GuardedCommand
-from posekit.cli.options import examples, on_terminal
-from posekit.cli.signals import take_signals
-from posekit.cli.terminal import INTERRUPTED_CODE, Ended, say
-from posekit.compiled.compiling import when_compiling
-from posekit.errors import PosekitError
+from posekit.cli.command import say
+from posekit.errors import PosekitError, refusal
 
-BAD_INPUT = 2
+BAD_INPUT: Final = 2
+INTERRUPTED: Final = 130
+TERMINATED: Final = 143
 
-NEW_OBJECTS_PER_COLLECTION = 100_000
-"""Containers made between two collections of garbage, in a process of the command."""
+#: Commands in the order of the help; each is a module of `posekit.cli` with a function of the same name.
+COMMANDS: Final = {
+    "validate": "Judge postures, motion and folders of it: what is wrong, where, and which clips to keep.",
+    "recover": "Recover every posture behind a view, from exact points, key points or a photograph.",
+    "render": "Draw postures, motion, results and reports: a picture, an animation or a page.",
+    "view": "Open the page of a file in the browser.",
+    "convert": "Convert between the files that the field exchanges.",
+    "inspect": "Tell what a file holds and how it was understood.",
+    "follow": "Follow a person live: key points in, postures out, line by line.",
+    "batch": "Recover an archive: every file once, resumable.",
+    "evaluate": "Compare results with the truth, or recover views whose truth is known.",
+    "synth": "Make views with truth: a walker, random postures, motion capture, an object.",
+    "reproduce": "Reproduce the papers' tables and figures.",
+    "samples": "Write a folder of small files to try posekit with.",
+    "settings": "List the settings of a command with defaults and units.",
+    "demo": "Run all of it on the built-in views.",
+}
 
-SYSTEM_REMEDIES: Final = {"libgomp.so.1": "on Debian and Ubuntu run: apt-get install libgomp1"}
-"""By library of the system that packages of ours load and do not bring: how to get it."""
-
-# Typer brings click along in its own name space, or takes the installed one, version by version.
-UsageError: Any = typer.BadParameter.__bases__[0]
-ClickError: Any = UsageError.__bases__[0]
-
-COMMAND_NAMES: Final = (
-    "recover",
-    "follow",
-    "validate",
-    "convert",
-    "inspect",
-    "evaluate",
-    "synth",
-    "reproduce",
-    "batch",
-    "render",
-    "view",
-    "demo",
-    "samples",
-)
-"""In the order of the help; each has its own module of that name."""
+#: Words of other programs for commands.
+SYNONYMS: Final = {
+    "check": "validate",
+    "judge": "validate",
+    "draw": "render",
+    "plot": "render",
+    "info": "inspect",
+}
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
+class Commands(click.Group):
+    """The commands, each loaded when it is called."""
 
-        say(f"posekit {version('posekit')}")
-        raise typer.Exit
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """List the commands in the order of the help."""
+        return list(COMMANDS)
 
-
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Every physically possible posture behind one view, each certified."""
-
-
-def application(first: str) -> typer.Typer:
-    """Make the command line: of the command that is named `first` alone, or of all where that is no command."""
-    app = typer.Typer(
-        name="posekit",
-        help="Every physically possible posture behind one view, each certified.",
-        epilog=examples(
-            "posekit demo -o demo-results",
-            "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
-            "posekit recover --help",
-        ),
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,
-    )
-    app.callback()(_root)
-    # What reads the options of a command takes some milliseconds to make: those of the others are not needed.
-    for name in (first,) if first in COMMAND_NAMES else COMMAND_NAMES:
+    def get_command(self, ctx: click.Context, name: str) -> click.Command:
+        """Load a command."""
+        if name not in COMMANDS:
+            near = next(iter(difflib.get_close_matches(name, [*COMMANDS, *SYNONYMS], n=1)), "")
+            near = SYNONYMS.get(near, near)
+            remedy = f"did you mean {near}?" if near else "see posekit --help"
+            raise refusal("posekit", name, "an unknown command", ", ".join(COMMANDS), remedy)
         module = import_module(f"posekit.cli.{name}")
-        if name == "synth":
-            app.add_typer(module.app, name=name)
-        else:
-            examples_of = getattr(module, f"{name.upper()}_EXAMPLES")
-            app.command(name, epilog=examples_of, cls=GuardedCommand)(getattr(module, name))
-    return app
+        found: click.Command = getattr(module, name)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
 
-def _misused(error: Any, command: str) -> str:
-    """Say what is wrong with a command's words, and where to look."""
-    said: str = error.format_message().rstrip(".")
-    if said.startswith("Got unexpected extra") and command == "recover":
-        said += "; files of several pictures are given as their folder"
-    return said + (f"; see {error.ctx.command_path} --help" if error.ctx else "")
+@click.command(cls=Commands, no_args_is_help=True)
+@click.version_option(package_name="posekit", message="posekit %(version)s")
+def posekit() -> None:
+    """Validate human and humanoid postures and motion, and recover every posture behind one view."""
 
 
-def _tell_of_compiling() -> None:
-    say("compiling loops for this machine, once: half a minute", err=True)
+class Terminated(BaseException):
+    """The process received SIGTERM; files that are half written are removed on the way out."""
 
 
 def main() -> None:
-    """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
+    """Run the command line: 0 done, 1 something is not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
-    # Importing makes some hundred thousand objects that stay: looking for garbage among them takes a tenth of a start.
-    gc.set_threshold(NEW_OBJECTS_PER_COLLECTION)
-    # Before it ends, Python looks for garbage among all of it: a process that ends gives everything back anyway.
-    atexit.register(gc.freeze)
-    # Models of files have no plugins: looking for some reads the metadata of all that is installed.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    when_compiling(_tell_of_compiling if on_terminal() else None)
+    signal.signal(signal.SIGTERM, _terminate)
     try:
-        sys.exit(_run())
-    except (typer.Abort, KeyboardInterrupt):
-        code = _fail("interrupted", INTERRUPTED_CODE)
-    except Ended as ended:
-        code = _fail(str(ended), ended.code)
-    sys.exit(code)
-
-
-def _run() -> int:
-    """Run the command, say its error, and return the exit code; a signal ends that, too, and is the caller's."""
-    try:
-        take_signals()
-        arguments = sys.argv[1:] or ["--help"]
-        code = application(arguments[0])(arguments, standalone_mode=False)
-        if callable(code):  # a command with groups of options
-            code = code()
-    except typer.Exit as ended:
+        code = posekit.main(standalone_mode=False)
+    except (click.Abort, KeyboardInterrupt):
+        code = _fail("interrupted", INTERRUPTED)
+    except Terminated:
+        code = _fail("terminated", TERMINATED)
+    except click.exceptions.Exit as ended:
         code = ended.exit_code
     except PosekitError as error:
         code = _fail(str(error))
-    except UsageError as error:
-        code = _fail(_misused(error, arguments[0]))
-    except ClickError as error:
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = 0
+    except click.UsageError as error:
+        where = f"; see posekit {error.ctx.info_name} --help" if error.ctx and error.ctx.parent else ""
+        said = error.format_message().rstrip(".")
+        if said.startswith("Got unexpected extra") and "recover" in where:
+            said += "; give the files of several pictures as their folder"
+        code = _fail(said + where)
+    except click.ClickException as error:
         code = _fail(error.format_message())
     except BrokenPipeError:
-        # What is still to be written has no reader: it goes nowhere.
+        # The remaining output has no reader.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
-    except ImportError as error:
-        # A package that is there and does not load: a shared library of the system is missing.
-        library = str(error).partition(":")[0]
-        if ".so" not in library:
-            raise
-        code = _fail(
-            f"{library} cannot be loaded, which {error.name or 'a package'} needs; expected that library of the "
-            f"system; {SYSTEM_REMEDIES.get(library, 'install the package of the system that has it')}"
-        )
     except MemoryError:
-        code = _fail(
-            "there is not enough memory for this; expected some 300 MB and what the input needs; "
-            "give fewer frames at a time"
-        )
+        code = _fail("not enough memory; expected some 300 MB besides the input; give fewer frames at a time")
     except OSError as error:
         place = f"{error.filename}: " if error.filename is not None else ""
         code = _fail(f"{place}{error.strerror or error}; expected a file or folder that can be used")
-    return code if isinstance(code, int) else 0
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _terminate(number: int, frame: Any) -> None:
+    raise Terminated
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:
-    _say_line("error", message)
+    say(f"posekit: error: {' '.join(message.split())}", err=True)
     return code
 
 
-def _say_line(kind: str, message: str) -> None:
-    from posekit.safe_io import bounded  # what --help does not need
-
-    say(f"posekit: {kind}: {bounded(' '.join(message.split()))}", err=True)
-
-
-def _warn(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    """Print a warning to the user as one line, without the place in the code; others are for developers."""
+def _warn(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
+    """Print a warning for users as one line; warnings for developers are dropped."""
     if issubclass(category, UserWarning):
-        _say_line("warning", str(message))
+        say(f"posekit: warning: {' '.join(str(message).split())}", err=True)

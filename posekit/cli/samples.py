@@ -1,33 +1,19 @@
-"""`posekit samples`: files to try the other commands with."""
+"""`posekit samples`: small files to try posekit with."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+import click
 
-from posekit.cli.options import examples
-from posekit.cli.terminal import say
-
-SAMPLES_EXAMPLES = examples(
-    "posekit samples samples",
-    "posekit recover samples/walk.json -o postures.json",
-)
+from posekit.cli.command import command, say
 
 
-def samples(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Where to write; made where it is not there.")
-    ],
-) -> None:
-    """Write a folder of small files to try posekit with: views, motion, key points, a photograph, robots."""
-    from posekit.safe_io.writing import results_folder
-    from posekit.samples import write_samples
+@command("samples", "posekit samples samples", "posekit validate samples/jump.bvh")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+def samples(folder: Path) -> None:
+    """Write a folder of small files: views, motion, key points, a photograph, a robot."""
+    from posekit.samples import samples as write
 
-    with results_folder(folder):
-        contents = write_samples(folder)
-    width = max(map(len, contents))
-    for name, what in contents.items():
-        say(f"{name:{width}}  {what}")
-    say(f"written: {folder}")
+    for line in write(folder):
+        say(line)

@@ -1,231 +1,192 @@
-"""`posekit synth`: synthetic views, with their truth."""
+"""`posekit synth`: views with truth."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Any
 
-import typer
+import click
 
-from posekit.cli.guarded_command import GuardedCommand
-from posekit.cli.options import Noise, OutputView, Seed, examples, numbers, option
-from posekit.cli.terminal import say
-from posekit.display.plural import plural
-from posekit.errors import InputError
+from posekit.cli.command import Command, apply, option, output, reading, say
+from posekit.errors import refusal, shown
 
 if TYPE_CHECKING:
-    from posekit.geometry import Array
-    from posekit.synthesis import SyntheticScene
-
-app = typer.Typer(
-    help="Make synthetic views with truth: a walker, random legal postures, motion capture, or a robot.",
-    epilog=examples("posekit synth walker -o walk.json", "posekit synth random -o random.json --frames 100"),
-    rich_markup_mode=None,
-)
-
-MOST_FRAMES: Final = 10_000_000
-"""Frames that are made at once: above, memory ends."""
-
-Frames = Annotated[int, typer.Option("--frames", min=1, max=MOST_FRAMES, help="How many frames.")]
-Uncalibrated = Annotated[
-    bool,
-    typer.Option(
-        "--uncalibrated",
-        help="Forget the camera: write the (perspective) pictures as photographs without one.",
-    ),
-]
-Photographs = Annotated[
-    Path | None,
-    option(
-        "--pictures", "FOLDER|FILE.mp4", "Also write what the camera would have seen: PNG files, or a video."
-    ),
-]
-Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
+    from posekit.cameras import View
 
 
-@app.command(
-    cls=GuardedCommand,
-    epilog=examples(
-        "posekit synth walker -o seq1.json --camera 400,0,0",
-        "posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2",
-    ),
-)
-def walker(
-    output: OutputView,
-    camera: Annotated[
-        str, option("--camera", "X,Y,Z", "Camera position in the head's frame, cm: x ahead, y up, z right.")
-    ] = "400,0,0",
-    frames: Frames = 5,
-    dt: Dt = 0.2,
-    velocity: Annotated[
-        float, typer.Option("--velocity", help="Relative velocity, leg lengths a second, 0.5 to 1.3.")
-    ] = 1.0,
-    lean: Annotated[
-        float, typer.Option("--lean", help="How far the back leans forward besides, degrees, -30 to 30.")
-    ] = 0.0,
-    phase: Annotated[float, typer.Option("--phase", help="Phase of the first frame, in cycles.")] = 0.0,
-    noise: Annotated[
-        float,
-        typer.Option(
-            "--noise",
-            min=0.0,
-            help="Standard deviation of the image points' noise, cm on the image plane (f = 1 cm: "
-            "0.0001 is a good camera's).",
-        ),
-    ] = 0.0,
-    seed: Seed = 0,
-) -> None:
-    """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1."""
-    import numpy as np
-
-    from posekit import synthesis
-
-    x, y, z = numbers(camera, 3, "--camera")
-    scene = synthesis.walker_scene(
-        synthesis.Walker(velocity=velocity, lean=np.radians(lean)),
-        camera=(x / 100, y / 100, z / 100),
-        frames=frames,
-        dt=dt,
-        phase0=phase,
-    )
-    _write(output, scene, noise / 100, seed)
+@click.group("synth", no_args_is_help=True)
+def synth() -> None:
+    """Make synthetic views with truth: a walker, random legal postures, motion capture, or an object."""
 
 
-@app.command(
-    cls=GuardedCommand, epilog=examples("posekit synth random -o random.json --frames 100 --noise 1 --seed 7")
-)
-def random(
-    output: OutputView,
-    frames: Frames = 1,
-    distance: Annotated[str, option("--distance", "MIN,MAX", "Distances of the cameras, metres.")] = "2.5,6",
-    noise: Noise = 0.0,
-    seed: Seed = 0,
-    uncalibrated: Uncalibrated = False,
-    pictures: Photographs = None,
-) -> None:
-    """Draw random legal postures, each seen from anywhere on a sphere around the person."""
-    import numpy as np
-
-    from posekit import synthesis
-    from posekit.body import load_figure
-
-    near, far = numbers(distance, 2, "--distance")
-    sphere = synthesis.CameraSphere(distance=(near, far))
-    scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), sphere)
-    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
-
-
-@app.command(
-    cls=GuardedCommand,
-    epilog=examples("posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1"),
-)
-def mocap(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")
-    ],
-    output: OutputView,
-    frames: Frames = 5,
-    clip: Annotated[str, typer.Option("--clip", help="The clip, by name. Default: the first.")] = "",
-    camera: Annotated[
-        str,
+def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare the options of every kind of view."""
+    return apply(
+        output("VIEW", "View file to write, .json."),
         option(
-            "--camera",
-            "X,Y,Z",
-            "Camera position in the file's world, metres. Default: drawn on a sphere around the person.",
+            "--frames", default=frames, type=click.IntRange(1), metavar="N", help="Frames.", show_default=True
         ),
-    ] = "",
-    dt: Annotated[
-        float | None,
-        option("--dt", "SECONDS", "Seconds between frames. Default: 0.2; less where the clip is too short."),
-    ] = None,
-    noise: Noise = 0.0,
-    seed: Seed = 0,
-    uncalibrated: Uncalibrated = False,
-    pictures: Photographs = None,
-) -> None:
-    """See a motion-capture clip through a virtual camera, with the segment lengths of the clip."""
-    import numpy as np
-
-    from posekit import synthesis
-
-    capture = synthesis.read_capture(file)
-    position = numbers(camera, 3, "--camera") if camera else None
-    name = clip or capture.names[0]
-    for step in (0.2, None) if dt is None else (dt,):
-        scene = synthesis.mocap_scene(
-            capture, name, np.random.default_rng(seed), frames=frames, dt=step, position=position
-        )
-        if len(scene.joints_cam) == frames:
-            break
-    else:
-        say(
-            f"{len(scene.joints_cam)} of {plural(frames, 'frame')}: the clip has no more; name another --clip or --dt"
-        )
-    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures, up=capture.up)
+        option(
+            "--noise",
+            default=0.0,
+            type=click.FloatRange(0),
+            metavar=noise_unit,
+            help="Noise of the image points.",
+        ),
+        option(
+            "--seed", default=0, type=click.IntRange(0), help="Seed of the random numbers.", show_default=True
+        ),
+    )
 
 
-@app.command(
-    "object",
-    cls=GuardedCommand,
-    epilog=examples("posekit synth object panda -o panda.json --frames 3 --seed 1"),
+@synth.command("walker", cls=Command, examples=["posekit synth walker -o walk.json --camera 400,0,0"])
+@shared(5, "CM")
+@option(
+    "--camera", default="400,0,0", metavar="X,Y,Z", help="Camera in the head's frame, cm.", show_default=True
 )
-def articulated(
-    robot: Annotated[
-        str, typer.Argument(metavar="NAME|URDF", help="A robot: panda, ur5, allegro, or a URDF.")
-    ],
-    output: OutputView,
-    frames: Frames = 1,
-    noise: Noise = 0.0,
-    seed: Seed = 0,
-) -> None:
-    """Draw a robot within its limits, seen from anywhere by a camera of which nothing is known."""
-    import numpy as np
-
-    from posekit import objects
-    from posekit.formats import own as files
-
-    _check_name(output)
-    thing = objects.load_object(robot)
-    view = objects.draw_view(thing, frames, np.random.default_rng(seed), noise=noise, scale_known=False)
-    files.write_object_view(output, view)
-    say(f"written: {output} ({plural(frames, 'frame')} of {', '.join(thing.linkage.points)})")
-
-
-def _check_name(output: Path) -> None:
-    if output.suffix.lower() != ".json":
-        raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
-
-
-def _write(
+@option(
+    "--dt",
+    default=0.2,
+    type=click.FloatRange(0),
+    metavar="S",
+    help="Seconds between frames.",
+    show_default=True,
+)
+@option("--velocity", default=1.0, type=float, help="Leg lengths a second, 0.5 to 1.3.", show_default=True)
+@option("--lean", default=0.0, type=float, metavar="DEGREES", help="Additional forward lean of the back.")
+@option("--phase", default=0.0, type=float, metavar="CYCLES", help="Phase of the first frame.")
+def walker(
     output: Path,
-    scene: SyntheticScene,
+    frames: int,
     noise: float,
     seed: int,
-    *,
-    uncalibrated: bool = False,
-    pictures: Path | None = None,
-    up: Array | None = None,
+    camera: str,
+    dt: float,
+    velocity: float,
+    lean: float,
+    phase: float,
 ) -> None:
-    """Add noise, write the view, in the world whose `up` is known, and the pictures where asked for; say so."""
-    from dataclasses import replace
+    """Walk past the camera of 1985 with the gait of Boulic, Thalmann & Thalmann 1990."""
+    import math
+
+    from posekit.synthesis import Walker, walker_view
+
+    place = numbers("--camera", camera, 3)
+    person = Walker(velocity=velocity, lean=math.radians(lean))
+    view = walker_view(person, camera=[x / 100 for x in place], frames=frames, dt=dt, phase0=phase)
+    write(view, output, noise / 100, seed)
+
+
+@synth.command("random", cls=Command, examples=["posekit synth random -o random.json --frames 100"])
+@shared(1, "PX")
+@option(
+    "--distance", default="2.5,6", metavar="MIN,MAX", help="Distances of the cameras, m.", show_default=True
+)
+@option("--uncalibrated", is_flag=True, help="Write the view without its camera.")
+def random(output: Path, frames: int, noise: float, seed: int, distance: str, uncalibrated: bool) -> None:
+    """Draw random legal postures, each seen from anywhere on a sphere."""
+    import numpy as np
+
+    from posekit.synthesis import random_views
+
+    near, far = numbers("--distance", distance, 2)
+    write(
+        random_views(frames, np.random.default_rng(seed), distance=(near, far)),
+        output,
+        noise,
+        seed,
+        uncalibrated,
+    )
+
+
+@synth.command("mocap", cls=Command, examples=["posekit synth mocap jump.bvh -o jump.json --noise 2"])
+@click.argument("source", metavar="MOTION", type=click.Path(path_type=Path))
+@shared(60, "PX")
+@option("--clip", default="", metavar="NAME", help="Recording of the file. Default: the first.")
+@option(
+    "--dt",
+    default=None,
+    type=float,
+    metavar="S",
+    help="Seconds between frames. Default: evenly over the clip.",
+)
+@option(
+    "--camera",
+    default="",
+    metavar="X,Y,Z",
+    help="Camera in the file's world, m. Default: drawn from the seed.",
+)
+@option("--uncalibrated", is_flag=True, help="Write the view without its camera.")
+@reading(urdf=False)
+def mocap(
+    source: Path,
+    output: Path,
+    frames: int,
+    noise: float,
+    seed: int,
+    clip: str,
+    dt: float | None,
+    camera: str,
+    uncalibrated: bool,
+    layout: str,
+    **facts: Any,
+) -> None:
+    """See motion capture through a virtual camera that stands still."""
+    import numpy as np
+
+    from posekit.formats import open as open_file
+    from posekit.motion import Motion
+    from posekit.synthesis import mocap_view
+
+    motion = open_file(source, layout, **facts)
+    if not isinstance(motion, Motion):
+        raise refusal(source, "", f"a {type(motion).__name__}", "motion", "give a file of motion")
+    place = numbers("--camera", camera, 3) if camera else None
+    rng = np.random.default_rng(seed)
+    view = mocap_view(motion, rng, clip=clip, frames=frames, dt=dt, position=place)
+    write(view, output, noise, seed, uncalibrated)
+
+
+@synth.command("object", cls=Command, examples=["posekit synth object panda -o panda.json"])
+@click.argument("robot", metavar="NAME|URDF")
+@shared(1, "PX")
+def object_command(robot: str, output: Path, frames: int, noise: float, seed: int) -> None:
+    """Draw a robot within its limits, seen from anywhere by a camera without perspective."""
+    import json
 
     import numpy as np
 
-    from posekit import views
-    from posekit.formats import own as files
-    from posekit.safe_io.writing import check_target
+    from posekit.formats.files import write_bytes
+    from posekit.recovery.objects import load_linkage
+    from posekit.robots import load_robot
+    from posekit.synthesis import object_document, object_view
 
-    _check_name(output)
-    check_target(output)
-    if noise > 0:
-        scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
-    view = views.view_of(scene)
-    view = view if up is None else views.in_world(view, scene, up)
-    if noise > 0 and scene.lee_chen_f is None:
-        view = replace(view, deviation=noise)
-    if pictures is not None:
-        from posekit.viewer.overlay import write_photographs
+    points = load_linkage(robot).points
+    loaded, rng = load_robot(robot, bodies="none"), np.random.default_rng(seed)
+    image, truth = object_view(loaded, points, frames, rng, noise=noise)
+    write_bytes(output, json.dumps(object_document(points, image, truth), indent=1).encode() + b"\n")
+    say(str(output))
 
-        say(f"written: {pictures} ({plural(write_photographs(pictures, view), 'picture')})")
-    files.write_view(output, views.forget_camera(view) if uncalibrated else view)
-    say(f"written: {output} ({plural(len(scene), 'frame')})")
+
+def write(view: View, output: Path, noise: float, seed: int, uncalibrated: bool = False) -> None:
+    """Add noise, forget the camera if that is requested, and write the view."""
+    import numpy as np
+
+    from posekit import save
+    from posekit.synthesis import forget_camera, with_noise
+
+    seen = with_noise(view, noise, np.random.default_rng([seed, 1])) if noise else view
+    save(forget_camera(seen) if uncalibrated else seen, output)
+    say(str(output))
+
+
+def numbers(flag: str, text: str, count: int) -> list[float]:
+    """Read numbers between commas."""
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != count:
+        raise refusal("", flag, shown(text), f"{count} numbers", "write them with commas between")
+    return found

@@ -1,6 +1,66 @@
-"""What the two papers print, reproduced."""
+"""The statements of both papers, row by row, beside our calculation."""
 
-from posekit.papers.all_papers import reproduce_all as reproduce_all
-from posekit.papers.demo_results import demo as demo
-from posekit.papers.lee_chen import reproduce_lee_chen as reproduce_lee_chen
-from posekit.papers.taylor import reproduce_taylor as reproduce_taylor
+from __future__ import annotations
+
+from pathlib import Path
+
+from posekit.errors import nearest, refusal, shown
+from posekit.papers.rows import Rows, write_rows
+
+PAPER_NAMES = ("all", "lee-chen", "taylor")
+EFFORTS = ("quick", "fine")
+
+
+def reproduce(
+    paper: str = "all", folder: str | Path | None = None, *, effort: str = "quick", pictures: bool = False
+) -> Rows:
+    """Reproduce the papers' statements, tables and figures.
+
+    Parameters
+    ----------
+    paper : {"all", "lee-chen", "taylor"}
+        Lee & Chen 1985, Taylor 2000, or both.
+    folder : path, optional
+        Folder for ``papers.md``, ``papers.html`` and ``papers.json``; it is made if it is missing.
+    effort : {"quick", "fine"}
+        Number of settings of the walker for Tables 3 and 4: 500 or 8,100.
+    pictures : bool
+        Draw figures of the papers again into the folder, too; needs matplotlib.
+
+    Returns
+    -------
+    Rows
+        Place, printed statement, our result and the verdict of each.
+
+    Raises
+    ------
+    InputError
+        If a name is not known.
+    ViewerError
+        If pictures are requested without matplotlib.
+    """
+    for field, value, known in (("paper", paper, PAPER_NAMES), ("effort", effort, EFFORTS)):
+        if value not in known:
+            raise refusal("", field, shown(value), f"one of {', '.join(known)}", nearest(value, known))
+    rows = Rows()
+    if paper != "taylor":
+        from posekit.papers.lee_chen_camera import camera_rows
+        from posekit.papers.lee_chen_constraints import constraint_rows
+        from posekit.papers.lee_chen_walks import walk_rows
+
+        rows += [*camera_rows(), *constraint_rows(), *walk_rows(effort)]
+    if paper != "lee-chen":
+        from posekit.papers.taylor import taylor_rows
+        from posekit.papers.taylor_objects import object_rows
+
+        rows += [*taylor_rows(), *object_rows()]
+    if folder is not None:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        drawn: list[Path] = []
+        if pictures:
+            from posekit.papers.figures import draw_lee_chen, draw_taylor
+
+            drawn += draw_lee_chen(Path(folder), effort) if paper != "taylor" else []
+            drawn += draw_taylor(Path(folder)) if paper != "lee-chen" else []
+        write_rows(Path(folder), rows, drawn)
+    return rows

@@ -1,45 +1,58 @@
-"""Rows of the papers, each with its check beside it: one page that a reviewer can follow."""
+"""Rows of the papers, each with the calculation beside it: one page that a reviewer can follow."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Mapping, Sequence
+import json
+import tomllib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from posekit.formats.markdown import table_lines
-from posekit.safe_io.writing import write_json, write_lines
+from posekit.formats.files import write_bytes
 
 Verdict = Literal["agrees", "differs", "open"]
-VERDICT_MEANINGS: Final[dict[Verdict, str]] = {
-    "agrees": "what is printed comes out, as near as its digits or its bound",
-    "differs": "something else comes out: the last column says why",
-    "open": "the print leaves open what decides it (motion, body, camera or noise): sizes can be compared",
+
+PAPERS: Final = {"lee-chen": "Lee & Chen 1985", "taylor": "Taylor 2000"}
+
+VERDICTS: Final[dict[Verdict, str]] = {
+    "agrees": "the printed statement is reproduced to its digits or its bound",
+    "differs": "the calculation gives another result; the last column gives the reason",
+    "open": "the paper does not print what decides it (motion, body, camera or noise): orders of magnitude compare",
 }
-PAGE_STYLE: Final = (
+
+COLUMNS: Final = ("place", "printed", "here", "verdict", "check", "why")
+
+#: Reason of a row that differs although nothing in ``rows.toml`` explains it.
+UNEXPLAINED: Final = "not explained"
+
+STYLE: Final = (
     "body{font:15px/1.4 sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse}"
     "td,th{border:1px solid #ccc;padding:.3em .5em;text-align:left;vertical-align:top}"
-    ".differs{background:#fde5d4}.open{background:#eef1f6}img{max-width:100%}"
+    ".differs{background:#fde5d4}.open{background:#eef1f6}"
 )
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperRow:
-    """One thing that a paper prints.
+class Row:
+    """One statement of a paper beside our calculation.
 
     Parameters
     ----------
-    paper, place : str
-        Where it is printed.
-    printed, here : str
-        What is printed, and what comes out.
+    paper : str
+        Key of `PAPERS`.
+    place, printed : str
+        Place in the paper, and the statement.
+    here : str
+        Our result.
     verdict : {"agrees", "differs", "open"}
-        What that is, `VERDICT_MEANINGS`.
+        See `VERDICTS`.
     check : str
-        How what comes out was calculated or held against another calculation.
+        Calculation of our result.
     why : str
-        Why it differs, or what is left open.
+        Why it differs or is open; empty if it agrees.
     """
 
     paper: str
@@ -50,97 +63,95 @@ class PaperRow:
     check: str
     why: str = ""
 
-    def __post_init__(self) -> None:
-        if self.verdict != "agrees" and not self.why:
-            raise ValueError(f"{self.place}: what {self.verdict} has its reason")
+
+class Rows(list[Row]):
+    """The rows of one or both papers."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row that differs has its reason."""
+        return all(one.why != UNEXPLAINED for one in self)
+
+    def counts(self) -> str:
+        """Return the number of rows of each verdict in words."""
+        agree, differ, open_ = (sum(one.verdict == verdict for one in self) for verdict in VERDICTS)
+        return f"{len(self)} rows: {agree} agree, {differ} differ, {open_} are open."
+
+    def lines(self) -> list[str]:
+        """Return the page in Markdown."""
+        lines = ["# The two papers, row by row", "", self.counts(), ""]
+        lines += [f"- *{verdict}*: {meaning}." for verdict, meaning in VERDICTS.items()]
+        for paper in dict.fromkeys(one.paper for one in self):
+            lines += ["", f"## {PAPERS[paper]}", "", _line(COLUMNS), _line(["---"] * len(COLUMNS))]
+            lines += [_line([getattr(one, name) for name in COLUMNS]) for one in self if one.paper == paper]
+        return [*lines, ""]
 
 
-def agreement(fits: bool) -> Verdict:
-    """Return the verdict of a row that can be compared digit for digit."""
-    return "agrees" if fits else "differs"
+@cache
+def printed() -> dict[str, Any]:
+    """Return the printed tables of both papers, ``printed.toml``."""
+    return tomllib.loads(Path(__file__).with_name("printed.toml").read_text(encoding="utf-8"))
 
 
-def compared(
-    paper: str, place: str, printed: str, here: str, fits: bool, check: str, why: str = "not explained"
-) -> PaperRow:
-    """Make a row that can be compared: it agrees, or differs for a reason that may not be known."""
-    return PaperRow(
-        paper=paper,
-        place=place,
-        printed=printed,
-        here=here,
-        verdict=agreement(fits),
-        check=check,
-        why="" if fits else why,
-    )
+@cache
+def _texts() -> dict[str, dict[str, str]]:
+    return tomllib.loads(Path(__file__).with_name("rows.toml").read_text(encoding="utf-8"))
 
 
-def write_rows(
-    folder: Path, rows: Sequence[PaperRow], beside: Iterable[str], pictures: Mapping[str, str] | None = None
-) -> list[str]:
-    """Write ``papers.md``, ``papers.html`` and ``papers.json``.
+def row(key: str, here: str, fits: bool | None, **names: Any) -> Row:
+    """Make a row from its texts in ``rows.toml``.
 
     Parameters
     ----------
-    folder : Path
-        Must exist.
-    rows : sequence of PaperRow
-        In the papers' order.
-    beside : iterable of str
-        Names of files of the folder that tell more.
-    pictures : mapping, optional
-        Names of pictures, and which figures they are like; those that are in the folder are shown.
-
-    Returns
-    -------
-    list of str
-        The lines of ``papers.md``.
+    key : str
+        Table of ``rows.toml``.
+    here : str
+        Our result.
+    fits : bool or None
+        Whether it agrees; None if the paper leaves open what decides it.
+    **names
+        Values of the words in braces.
     """
-    counts = ", ".join(
-        f"{sum(row.verdict == verdict for row in rows)} {verdict}" for verdict in VERDICT_MEANINGS
-    )
-    head = ("place", "printed", "here", "verdict", "check", "why")
-    title, said = "The two papers, row by row", f"{len(rows)} rows: {counts}."
-    lines = [
-        f"# {title}",
-        "",
-        said,
-        "",
-        *(f"- *{name}*: {meaning}." for name, meaning in VERDICT_MEANINGS.items()),
-        "",
-    ]
+    texts = {name: text.format(**names) for name, text in _texts()[key].items()}
+    if fits:
+        texts["why"] = ""
+    elif not texts.get("why"):
+        texts["why"] = UNEXPLAINED
+    verdict: Verdict = "open" if fits is None else "agrees" if fits else "differs"
+    return Row(here=here, verdict=verdict, **texts)
+
+
+def write_rows(folder: Path, rows: Rows, pictures: Sequence[Path] = ()) -> list[Path]:
+    """Write ``papers.md``, ``papers.html`` (with pictures of the folder) and ``papers.json``; return their paths."""
     page = [
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{PAGE_STYLE}</style>',
-        f"<h1>{title}</h1><p>{said}</p><dl>",
-        *(f"<dt>{name}</dt><dd>{meaning}</dd>" for name, meaning in VERDICT_MEANINGS.items()),
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>The two papers</title><style>{STYLE}</style>',
+        f"<h1>The two papers, row by row</h1><p>{rows.counts()}</p><dl>",
+        *(f"<dt>{verdict}</dt><dd>{meaning}</dd>" for verdict, meaning in VERDICTS.items()),
         "</dl>",
     ]
-    for paper in dict.fromkeys(row.paper for row in rows):
-        cells = [
-            (row.place, row.printed, row.here, row.verdict, row.check, row.why)
-            for row in rows
-            if row.paper == paper
+    for paper in dict.fromkeys(one.paper for one in rows):
+        page.append(f"<h2>{html.escape(PAPERS[paper])}</h2><table><tr>{_cells('th', COLUMNS)}</tr>")
+        page += [
+            f'<tr class="{one.verdict}">{_cells("td", [getattr(one, name) for name in COLUMNS])}</tr>'
+            for one in rows
+            if one.paper == paper
         ]
-        lines += [f"## {paper}", "", *table_lines(head, cells)]
-        page += [f"<h2>{html.escape(paper)}</h2><table><tr>{_cells('th', head)}</tr>"]
-        page += [f'<tr class="{each[3]}">{_cells("td", each)}</tr>' for each in cells]
-        page += ["</table>"]
-    for name, caption in (pictures or {}).items():
-        if (folder / name).is_file():
-            lines += [f"![{caption}]({name})", ""]
-            said = html.escape(caption)
-            page += [
-                f'<figure><img src="{html.escape(name)}" alt="{said}"><figcaption>{said}</figcaption></figure>'
-            ]
-    beside = list(beside)
-    lines += [f"More: {', '.join(f'[{name}]({name})' for name in beside)}.", ""]
-    links = (f'<a href="{html.escape(name)}">{html.escape(name)}</a>' for name in beside)
-    page += [f"<p>More: {', '.join(links)}.</p>"]
-    write_lines(folder / "papers.md", lines)
-    write_lines(folder / "papers.html", page)
-    write_json(folder / "papers.json", {"rows": [asdict(row) for row in rows]})
-    return lines
+        page.append("</table>")
+    page += [f'<p><img src="{path.name}" alt="{path.stem}"></p>' for path in pictures]
+    texts = {
+        "papers.md": "\n".join(rows.lines()),
+        "papers.html": "\n".join(page) + "\n",
+        "papers.json": json.dumps({"rows": [asdict(one) for one in rows]}, indent=1, ensure_ascii=False)
+        + "\n",
+    }
+    for name, text in texts.items():
+        write_bytes(folder / name, text.encode())
+    return [folder / name for name in texts]
 
 
-def _cells(tag: str, texts: Iterable[str]) -> str:
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def _cells(tag: str, texts: Sequence[str]) -> str:
     return "".join(f"<{tag}>{html.escape(text)}</{tag}>" for text in texts)

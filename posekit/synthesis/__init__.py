@@ -1,20 +1,18 @@
-"""Synthetic views with truth: a walker, random legal postures, motion capture; noise and seeds.
+"""Synthetic views with truth: a walker, random legal postures, motion capture; fixed seeds, and noise."""
 
-Each is a `SyntheticScene`: a figure, a camera, every point in the camera's frame and where it is seen.
-"""
-
-from posekit.synthesis.camera_sphere import CameraPlacements as CameraPlacements
-from posekit.synthesis.camera_sphere import CameraSphere as CameraSphere
-from posekit.synthesis.capture import Capture as Capture
-from posekit.synthesis.capture_file import read_capture as read_capture
-from posekit.synthesis.gait import Gait as Gait
-from posekit.synthesis.mocap import clip_lengths as clip_lengths
-from posekit.synthesis.mocap import mocap_scene as mocap_scene
-from posekit.synthesis.mocap import mocap_scenes as mocap_scenes
-from posekit.synthesis.random_postures import random_postures as random_postures
-from posekit.synthesis.random_postures import random_views as random_views
-from posekit.synthesis.synthetic_scene import SyntheticScene as SyntheticScene
+from posekit.synthesis.cameras import default_camera as default_camera
+from posekit.synthesis.cameras import look_at as look_at
+from posekit.synthesis.cameras import place_cameras as place_cameras
+from posekit.synthesis.cameras import to_camera as to_camera
+from posekit.synthesis.objects import object_document as object_document
+from posekit.synthesis.objects import object_view as object_view
+from posekit.synthesis.objects import random_configurations as random_configurations
+from posekit.synthesis.views import builtin_view as builtin_view
+from posekit.synthesis.views import forget_camera as forget_camera
+from posekit.synthesis.views import mocap_view as mocap_view
+from posekit.synthesis.views import mocap_views as mocap_views
+from posekit.synthesis.views import random_postures as random_postures
+from posekit.synthesis.views import random_views as random_views
+from posekit.synthesis.views import walker_view as walker_view
+from posekit.synthesis.views import with_noise as with_noise
 from posekit.synthesis.walker import Walker as Walker
-from posekit.synthesis.walker_scene import seq1 as seq1
-from posekit.synthesis.walker_scene import seq2 as seq2
-from posekit.synthesis.walker_scene import walker_scene as walker_scene

@@ -1,41 +1,45 @@
-"""A walking figure: Boulic, Thalmann & Thalmann's gait on the stick figure.
+r"""A walking figure: the gait of Boulic, Thalmann & Thalmann 1990 (*The Visual Computer* 6:344-358) on the figure.
 
-The frame is the paper's head-centred one: x the moving direction, y up, z to the walker's right, and the head
-at the coordinates of Table A.2. It is carried along with the walker, as on a treadmill, and the head is kept
-upright and facing forward, so that its points rest.
+Everything follows from the relative velocity v (leg lengths per second) and the phase t of the cycle. The phase is the
+right side's: at t = 0 the right foot strikes; the left side is half a cycle later.
 
-What the model leaves open is decided here. The hips stay level and the back leans against them, by 0 to 4
-degrees and what a walker leans besides; the torso turns against the hips, by as much as they turn
-(`COUNTER_TORSION`); the neck undoes both. Arms swing in planes of the torso, legs in planes of the hips, without
-abduction and axial rotation.
+The frame is the head-centred one of Lee & Chen 1985: x the moving direction, y up, z to the walker's right, and the
+head at the coordinates of their Table A.2. The frame moves with the walker, as on a treadmill. The head stays upright
+and faces forward, so its points rest.
+
+The gait model leaves some motion open, which is decided here. The hips stay level and the back leans against them. The
+torso turns against the hips by as much as they turn, and the neck undoes both. Arms swing in planes of the torso and
+legs in planes of the hips, without abduction and axial rotation.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.body import Figure, load_figure
-from posekit.cameras.head.points import TABLE_A2
-from posekit.errors import InputError
+from posekit.cameras.head import TABLE_A2
+from posekit.errors import refusal
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation
 from posekit.skeleton import DOFS, SIDES
-from posekit.synthesis.gait import Gait, GaitAngles
 
-COUNTER_TORSION = 1.0
-"""How far the torso turns against the hips, as a fraction of the hips' torsion."""
+#: Relative velocities v of the hip, knee and elbow curves, leg lengths per second: mid gait.
+VELOCITY_RANGE: Final = (0.5, 1.3)
 
-MOST_LEAN = np.radians(30.0)
-"""Radians by which a walker leans besides at most, either way."""
+#: Largest additional lean of the back, radians, either way.
+MAX_LEAN: Final = np.radians(30.0)
 
-NECK_HEAD_CENTRED = TABLE_A2.points[0]
-"""The neck in the head-centred frame, metres (Table A.2a)."""
+HIP_FLEXION: Final = ((0.5, -15.0), (0.9, 25.0))
+#: Flexion of mid gait: (phase, degrees) through which the curve passes.
+KNEE_FLEXION: Final = ((0.17, 3.0), (0.4, 3.0), (0.75, 70.0), (1.0, 3.0))
 
-R_HEAD_REP103 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""From the URDF's axes (x forward, y left, z up) to the head-centred frame's (x forward, y up, z right)."""
+#: Rotation from the URDF's axes (x forward, y left, z up) to the head-centred axes (x forward, y up, z right).
+R_HEAD_REP103: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,20 +49,22 @@ class Walker:
     Parameters
     ----------
     figure : Figure
-        The built-in one (Table A.1) unless told otherwise.
+        The body; the built-in figure (Lee & Chen 1985, Table A.1) by default.
     velocity : float
-        Leg lengths a second, 0.5 to 1.3 (Boulic et al. 1990, mid gait).
+        Leg lengths per second, 0.5 to 1.3.
     lean : float
-        How far the back leans forward besides, radians, at most `MOST_LEAN`; negative is backward.
+        Additional forward lean of the back, radians, at most `MAX_LEAN` either way.
 
     Raises
     ------
     InputError
-        Where the velocity or the lean lies outside.
+        If the velocity or the lean is outside its range.
 
     Examples
     --------
     >>> walker = Walker(velocity=1.0)
+    >>> walker.cycle_duration
+    1.346
     >>> walker.configurations([0.0, 0.25]).shape
     (2, 29)
     """
@@ -68,53 +74,65 @@ class Walker:
     lean: float = 0.0
 
     def __post_init__(self) -> None:
-        _ = self.gait
-        if not abs(self.lean) <= MOST_LEAN:
-            raise InputError(
-                f"the walker leans by {np.degrees(self.lean):g} degrees; expected {-np.degrees(MOST_LEAN):g} to "
-                f"{np.degrees(MOST_LEAN):g}"
-            )
+        slowest, fastest = VELOCITY_RANGE
+        if not slowest <= self.velocity <= fastest:
+            got, expected = f"{self.velocity:g} leg lengths/s", f"{slowest:g} to {fastest:g}"
+            raise refusal("", "velocity", got, expected, "slower and faster gaits follow other curves")
+        if not abs(self.lean) <= MAX_LEAN:
+            raise refusal("", "lean", f"{np.degrees(self.lean):g} degrees", "-30 to 30", "reduce it")
 
-    @cached_property
-    def gait(self) -> Gait:
-        """The gait at this velocity."""
-        return Gait(velocity=self.velocity)
+    @property
+    def cycle_duration(self) -> float:
+        """Seconds of one cycle of two steps, which is 1.346 sqrt(v) leg lengths long."""
+        return 1.346 * math.sqrt(self.velocity) / self.velocity
 
     @property
     def leg_length(self) -> float:
-        """Hip to ankle, the mean of both sides, metres: the figure has no feet."""
+        """Distance from hip to ankle, metres, mean of both sides; the figure has no feet."""
         lengths = self.figure.lengths
-        thighs = sum(lengths[f"{side}_hip-{side}_knee"] for side in SIDES)
-        shanks = sum(lengths[f"{side}_knee-{side}_ankle"] for side in SIDES)
-        return (thighs + shanks) / 2
+        return sum(lengths[f"{s}_hip-{s}_knee"] + lengths[f"{s}_knee-{s}_ankle"] for s in SIDES) / 2
 
     def phase(self, time: ArrayLike, phase0: float = 0.0) -> Array:
-        """Return the phases at times (s) of a walk that is at `phase0` at time 0."""
-        return phase0 + np.asarray(time, dtype=np.float64) / self.gait.cycle_duration
+        """Return the phases at times (s) of a walk that has `phase0` at time 0."""
+        return phase0 + np.asarray(time, dtype=np.float64) / self.cycle_duration
+
+    def flexion(self, phase: ArrayLike) -> dict[str, Array]:
+        """Return the flexion of shoulder, elbow, hip and knee at phases (N,): (N, 2), right and left, radians."""
+        t, v = np.asarray(phase, dtype=np.float64), self.velocity
+        sides = np.stack([t, t + 0.5], axis=-1)
+        u = (v - VELOCITY_RANGE[0]) / (VELOCITY_RANGE[1] - VELOCITY_RANGE[0])
+        elbow = ((0.05, 6 + 8 * u), (0.5 + 0.01 * u, 20 + 24 * u), (0.9, 8 + 9 * u))
+        degrees = {
+            "shoulder": 3 - 4.94 * v - 9.88 * v * np.cos(2 * np.pi * sides),
+            "elbow": _curve(elbow, sides),
+            "hip": _curve(HIP_FLEXION, sides),
+            "knee": _curve(KNEE_FLEXION, sides),
+        }
+        return {joint: np.radians(values) for joint, values in degrees.items()}
 
     def configurations(self, phase: ArrayLike) -> Array:
-        """Return the configurations at phases (N,).
+        """Return the configurations (N, nq) at phases (N,), head-centred frame: metres, unit quaternion, radians.
 
-        Returns
-        -------
-        array (N, nq)
-            Head-centred frame: metres, unit quaternion, radians.
+        Raises
+        ------
+        InputError
+            If the phases are not finite or not of shape (N,).
         """
         phases = np.asarray(phase, dtype=np.float64)
         if phases.ndim != 1 or not np.isfinite(phases).all():
-            raise InputError(f"phases must be finite, of shape (N,); got shape {phases.shape}")
-        gait = self.gait.angles(phases)
+            raise refusal("", "phase", f"shape {phases.shape}", "finite phases (N,)", "give one a frame")
+        torsion = self._torsion(phases)
         # The torso turns against the hips, so that shoulders and hips swing in opposition.
-        R_torso = R_HEAD_REP103 @ self._torso(gait)
-        R_hips = R_HEAD_REP103 @ _turned(gait.torsion, np.zeros_like(gait.torsion))
-        neck = np.broadcast_to(NECK_HEAD_CENTRED, (len(phases), 3))
+        R_torso = R_HEAD_REP103 @ self._torso(phases)
+        R_hips = R_HEAD_REP103 @ coordinate_rotation(2, torsion)
+        neck = np.broadcast_to(TABLE_A2.points[0], (len(phases), 3))
         head = neck[:, None] + self.figure.head_points[1:]
         angles = np.zeros((len(phases), len(DOFS)))
         angles[:, :3] = self.figure.ik.neck(R_torso, neck, head)
         angles[:, 3:6] = self.figure.ik.pelvis(R_torso, R_hips)
-        for k, side in enumerate(SIDES):
-            for joint in ("shoulder", "elbow", "hip", "knee"):
-                angles[:, DOFS.index(f"{side}_{joint}.flexion")] = getattr(gait, joint)[:, k]
+        for joint, flexion in self.flexion(phases).items():
+            for k, side in enumerate(SIDES):
+                angles[:, DOFS.index(f"{side}_{joint}.flexion")] = flexion[:, k]
         q = np.empty((len(phases), self.figure.model.nq))
         q[:, :3], q[:, 3:7] = neck, quaternion_from_rotation(R_torso)
         q[:, self.figure.angle_index] = angles
@@ -123,12 +141,14 @@ class Walker:
     def travel(self, time: ArrayLike, phase0: float = 0.0) -> Array:
         """Return how far the neck has moved over the ground since time 0.
 
-        The pelvis follows the model's root; the torso's lean carries the neck.
+        The pelvis follows the model's root; the torso's lean moves the neck relative to it.
 
         Parameters
         ----------
         time : array (N,)
             Seconds.
+        phase0 : float
+            Phase at time 0, cycles.
 
         Returns
         -------
@@ -136,22 +156,38 @@ class Walker:
             Metres, axes of the head-centred frame.
         """
         times = np.concatenate([[0.0], np.asarray(time, dtype=np.float64)])
-        gait = self.gait.angles(self.phase(times, phase0))
-        up = self._torso(gait)[:, :, 2]
-        back = up * self.figure.lengths["neck-pelvis"]
-        place: Array = (self._root(times, gait) + back) @ R_HEAD_REP103.T
+        t, v = self.phase(times, phase0), self.velocity
+        # The coefficients are the paper's, in leg lengths.
+        support = 0.752 * self.cycle_duration - 0.143
+        early = 0.625 - support / self.cycle_duration
+        forward = v * times - 0.021 * _wave(2 * t + 2 * early)
+        vertical = -0.015 * v + 0.015 * v * _wave(2 * t - 0.35)
+        root = self.leg_length * np.stack([forward, -0.032 * _wave(t - 0.1), vertical], axis=-1)
+        place = (root + self._torso(t)[:, :, 2] * self.figure.lengths["neck-pelvis"]) @ R_HEAD_REP103.T
         return np.asarray(place[1:] - place[0])
 
-    def _torso(self, gait: GaitAngles) -> Array:
-        """Return the torso's rotations (N, 3, 3), REP-103 axes."""
-        return _turned(-COUNTER_TORSION * gait.torsion, gait.lean + self.lean)
+    def _torsion(self, phase: Array) -> Array:
+        """Return the turn of the hips to the left, radians; positive brings the right hip forward.
 
-    def _root(self, time: Array, gait: GaitAngles) -> Array:
-        """Return the root's path (N, 3) in REP-103 axes, metres."""
-        forward = self.velocity * time + gait.fore_aft
-        return self.leg_length * np.stack([forward, gait.lateral, gait.vertical], axis=-1)
+        The printed angle has the other sign: the hip of the leading leg leads, too.
+        """
+        return np.asarray(np.radians(4 * self.velocity * np.cos(2 * np.pi * phase)))
+
+    def _torso(self, phase: Array) -> Array:
+        """Return the torso's rotations (N, 3, 3), URDF axes; the back flexes by minus the model's pelvis tilt."""
+        tilt = np.radians(2 - 2 * _wave(2 * phase - 0.1))
+        return coordinate_rotation(2, -self._torsion(phase)) @ coordinate_rotation(1, tilt + self.lean)
 
 
-def _turned(yaw: Array, pitch: Array) -> Array:
-    """Return R_z(yaw) R_y(pitch) (N, 3, 3): turned to the left, leaning forward."""
-    return coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch)
+def _wave(turns: Array) -> Array:
+    return np.sin(2 * np.pi * turns)
+
+
+def _curve(knots: Sequence[tuple[float, float]], phase: Array) -> Array:
+    """Evaluate the periodic monotone cubic through (phase, value) knots (Fritsch & Butland 1984)."""
+    from scipy.interpolate import PchipInterpolator
+
+    x, y = np.array(knots).T
+    # Three periods give each knot of the middle one two neighbours.
+    curve = PchipInterpolator(np.concatenate([x - 1, x, x + 1]), np.tile(y, 3))
+    return np.asarray(curve(x[0] + np.mod(phase - x[0], 1.0)))

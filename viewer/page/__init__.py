@@ -1,5 +1,74 @@
-"""The interactive page of a result: one file that works offline, or served on this machine alone."""
+"""The page of a result, a motion or a report: one HTML file that loads nothing and works offline."""
 
-from posekit.viewer.page.page import page_html as page_html
-from posekit.viewer.page.page import write_page as write_page
-from posekit.viewer.page.server import PageServer as PageServer
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+from posekit.viewer.files import write_whole
+from posekit.viewer.page.data import page_data
+from posekit.viewer.subjects import as_motion
+
+#: In the order in which they need each other.
+SCRIPTS: Final = ("sight.js", "panel.js", "tables.js", "scene.js", "play.js")
+
+#: Content security policy of a page: nothing is loaded.
+POLICY: Final = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+
+
+def write_page(
+    source: Any,
+    path: str | Path,
+    *,
+    view: Any = None,
+    frame: int | tuple[int, int] | None = None,
+    urdf: str = "",
+) -> None:
+    """Write the page of a result, a motion, postures or a report.
+
+    Parameters
+    ----------
+    source : Recovery, Motion, Report, View with truth or array (T, 14, 3)
+        A motion is judged by the usual checks; its page shows the findings beside the body.
+    path : path
+        The HTML file.
+    view : View, Motion or sequence of Motion, optional
+        What a result was recovered from; or the motions that a report judges, in its order.
+    frame : int or (int, int), optional
+        Frame, or first and last, from 0; all by default.
+    urdf : str
+        Robot of configurations whose robot is not known.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to show, or the file cannot be written.
+    """
+    path = Path(path)
+    data = page_data(as_motion(source), path.stem, view=view, frame=frame, urdf=urdf)
+    write_whole(path, page_html(data).encode())
+
+
+def page_html(data: Mapping[str, Any]) -> str:
+    """Return the page of `posekit.viewer.page.data.page_data` as text."""
+    # No text of a file may end the script element or start a comment.
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    parts = {
+        "policy": POLICY,
+        "title": html.escape(f"{data['title']} - posekit"),
+        "style": _file("page.css"),
+        "scripts": "\n".join(_file(name) for name in SCRIPTS),
+        "data": text,
+    }
+    return re.sub(r"\{(policy|title|style|scripts|data)\}", lambda found: parts[found[1]], _file("page.html"))
+
+
+def _file(name: str) -> str:
+    return (resources.files("posekit.viewer.page") / name).read_text(encoding="utf-8")

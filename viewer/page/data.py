@@ -1,473 +1,509 @@
-"""What the interactive page knows: a result, its frames and survivors, in the page's own world."""
+"""What a page holds: bodies frame by frame in a world whose z points up, and what is known of them."""
 
 from __future__ import annotations
 
 import json
+import re
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from math import isnan
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, with_head
-from posekit.errors import ViewerError
-from posekit.formats.held_postures import HeldPostures
-from posekit.formats.own.camera_model import LeeChenModel, ScaledOrthographicModel
-from posekit.formats.own.postures import Postures
-from posekit.formats.own.result import Result, ResultFrame
-from posekit.formats.own.view import View
-from posekit.geometry import cross
-from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
-from posekit.viewer.page.answer_page import answer_data, answer_segments, image_distances
-from posekit.viewer.page.family_page import family_data, inferred_data, tree_of, walk
-from posekit.viewer.page.findings_page import PageFindings
-from posekit.viewer.page.hand_page import flips_of, units_of, verdicts
-from posekit.viewer.page.packed import branch_bits, origins, packed, steps
-from posekit.viewer.page.paths_page import paths_shown
-from posekit.viewer.page.rejected_page import rejected_shown
-from posekit.viewer.page.shown_survivors import postures_shown, survivors_shown
-from posekit.viewer.scene.colours import ALARM_RGB, GROUP_RGB, SIDE_RGB, number, side
-from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
-from posekit.viewer.scene.world import CAMERA_UPRIGHT, World, upright_world
+from posekit.body import Figure, load_figure
+from posekit.body.capsules import CAPSULE_AXES
+from posekit.cameras import ScaledOrthographicCamera, View
+from posekit.errors import InputError, refusal
+from posekit.geometry import Array
+from posekit.motion import Motion
+from posekit.recovery import Recovery
+from posekit.robots import Robot
+from posekit.skeleton import JOINTS, POINTS, SEGMENTS, TREE_SEGMENTS
+from posekit.validators import Report, Validator
+from posekit.validators.report import quantity
+from posekit.viewer import subjects as drawn
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
+#: Frames of motion in a page; of more clips the worst are in it.
+MOST_FRAMES: Final = 20_000
+
+MOST_POSTURES: Final = 60_000
+#: Survivors in a page, and of one frame: the likeliest, and those that stand for the others.
+MOST_OF_FRAME: Final = 400
+
+MOST_CLIPS: Final = 300
+MOST_SPANS: Final = 40
+#: Clips of a report, spans of a clip and reasons of rejection in a frame that a page lists.
 MOST_REASONS: Final = 60
-"""Reasons of rejection that are told of each frame, the most frequent."""
 
-OUTLYING_SHARE: Final = 0.1
-"""Share of a result's frames that may be below the ground: the likeliest posture of one frame can be wrong."""
+#: Points are whole steps from their frame's origin: an unknown one, the largest, and the least step, metres.
+UNKNOWN, LARGEST, FINEST = -32_768, 32_767, 1e-4
 
-FRAMES_THAT_TELL: Final = 10
-"""From so many frames on trunks tell how a camera is tilted that does not say it."""
+#: Radius of the lines that stand for a robot's links, metres.
+LINK_RADIUS: Final = 0.025
 
-ALIKE_TRUNKS: Final = 0.9
-"""Length of the mean of the trunks' directions, of unit length each, from which on they lean one way."""
+#: Height of the lowest joint above the ground, metres.
+SOLE: Final = 0.03
 
-LEVEL_COSINE: Final = 0.94
-"""Trunks that lean by less than 20 degrees, on average, may do so by themselves."""
+#: Share of frames that may lie below the drawn ground: a single wrong frame does not move it.
+LOW_SHARE: Final = 0.05
 
-STEEP_SINE: Final = 0.995
-"""A camera that looks straight down does not see how tall anybody stands."""
+#: Unit and factor in which the margins of these checks are shown.
+MARGIN_UNITS: Final = {"joint-range": ("°", 1.0), "rigid-parts": ("mm", 1e3), "collision": ("mm", 1e3)}
 
-MARGIN_UNITS: Final = {
-    "joint_range": ("°", 1.0),
-    "rigid_parts": ("mm", 1000.0),
-    "collision": ("mm", 1000.0),
-}
-"""How the margins of these checks are shown; those of others as they are."""
+#: Okabe & Ito's palette, one colour a group.
+GROUP_COLOURS: Final = (0x009E73, 0xCC79A7, 0x56B4E9, 0xD55E00, 0xF0E442, 0x0072B2, 0xE69F00, 0x505050)
+
+#: Difference of depth along a segment that is called nearer or farther, metres.
+CLEARLY_NEARER: Final = 0.05
 
 
 def page_data(
-    given: Result | Postures | HeldPostures,
-    view: View | None = None,
+    source: Recovery | Motion | Report,
+    title: str,
     *,
-    title: str = "posekit",
-    frames: Sequence[int] | None = None,
-    findings: PageFindings | None = None,
+    view: Any = None,
+    frame: int | tuple[int, int] | None = None,
+    urdf: str = "",
 ) -> Json:
-    """Gather what the page shows.
-
-    Parameters
-    ----------
-    given : Result, Postures or HeldPostures
-        Postures are shown as the survivors of a single frame, or of their frames, without margins or a tree.
-    view : View, optional
-        What the result was recovered from: the page then shows the image and, where it is known, the truth.
-    title : str
-        Shown as it is, whatever it holds.
-    frames : sequence of int, optional
-        Which of the result's frames, from 0; all by default.
-    findings : PageFindings, optional
-        What checks found in postures that are no result's.
+    """Gather what the page shows; see `posekit.viewer.page.write_page`.
 
     Returns
     -------
     dict
-        Positions in whole steps from each frame's origin, in a world whose z is up: ``step`` says their metres.
-
-    Raises
-    ------
-    ViewerError
-        Where there is no posture in any frame, or the view has other frames.
+        Plain lists, numbers and text. ``packed`` holds arrays as base64; points are whole steps of ``step`` metres
+        from the ``origin`` of their frame.
     """
-    if isinstance(given, Result):
-        return _result_data(given, view, title, frames)
-    shown = postures_shown(given)
-    subject = subject_of(shown)
-    chosen = _chosen(len(subject.frames), frames)
-    picked = [subject.frames[index] for index in chosen]
-    bodies = [one.aligned_points for one in picked]
-    _check_count(bodies)
-    world = _world(bodies, subject.R_cam_world, outlying=0.0)
-    numbers = findings.numbers() if findings is not None else {}
-    of_frame = _numbers_in_frames(shown, chosen)
-    step, arrays, starts = _packed_bodies([world.place(body) for body in bodies])
-    arrays["number"] = packed(np.concatenate(of_frame).astype(np.uint32))
-    counts = [len(body) for body in bodies]
+    if isinstance(source, Recovery):
+        return _of_result(source, title, view if isinstance(view, View) else None, frame)
+    if isinstance(source, Report):
+        motions = (
+            [] if view is None or isinstance(view, View) else [view] if isinstance(view, Motion) else view
+        )
+        count = sum(len(one) for one in motions)
+        if motions and count != len(source):
+            raise refusal(
+                "render", "view", f"{count} frames", f"{len(source)}, those of the report", "give its motions"
+            )
+        return _of_motions(motions, source, title, urdf)
+    motion = source.take(drawn.frame_rows(len(source), frame, source.source))
+    return _of_motions([motion], _judged(motion, urdf), title, urdf)
+
+
+def _judged(motion: Motion, urdf: str) -> Report:
+    """Judge a motion by the usual checks; frames of a robot that is no humanoid one by one, without time."""
+    robot, q = drawn.configured(motion, urdf)
+    if isinstance(robot, Figure):
+        return Validator().check(motion)
+    try:
+        _ = robot.joint_map
+    except InputError:
+        return Validator(robot).check(q)
+    return Validator(robot).check(replace(motion, q=q, q_names=robot.configuration_names))
+
+
+def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str) -> Json:
+    """Gather motions and the report about them: its rows are the motions' frames, clip by clip."""
+    summary = _summary(report)
+    if not motions:
+        return {"kind": "report", "title": title, "frames": [], **summary}
+    parts: list[Array] = []
+    for motion in motions:
+        robot, q = drawn.configured(motion, urdf)
+        R = drawn.facing(robot, q, drawn.upright(motion))
+        order = np.argsort(np.asarray(motion.clip), kind="stable")
+        parts.append(_points(motion, robot, q)[order] @ R.T)
+    if len({part.shape[1] for part in parts}) > 1:  # bodies of several kinds have no skeleton in common
+        return {"kind": "report", "title": title, "frames": [], **summary}
+    points, skeleton = np.concatenate(parts), _skeleton(robot)
+    rows = _kept(report)
+    # Alternative postures of a frame follow each other.
+    changes = (np.diff(report.clip[rows]) != 0) | (np.diff(report.frame[rows]) != 0)
+    groups = np.split(rows, np.flatnonzero(changes) + 1)
+    frames: list[Json] = []
+    for group in groups:
+        frames.append(
+            {"number": int(report.frame[group[0]]), "clip": int(report.clip[group[0]]), "count": len(group)}
+        )
+        frames[-1]["held"] = len(group)
+        if np.isfinite(report.time[group[0]]):
+            frames[-1]["time"] = round(float(report.time[group[0]]), 6)
+    places = _add_findings(frames, groups, report, skeleton["points"])
+    kept = {(one["clip"], one["number"]): k for k, one in reversed(list(enumerate(frames)))}
+    for clip in summary["clips"]:
+        for span in clip["spans"]:
+            span["index"] = kept.get((clip["clip"], span["worst"]), -1)
     return {
-        **_of_figure(subject.figure, world, title),
-        "kind": "motion" if len(chosen) > 1 and max(counts) == 1 else "postures",
-        "judged": findings is not None,
-        "findings": [] if findings is None else findings.described(),
-        "left": len(_joints(given)) - len(_joints(shown)),
-        **_recordings(shown),
-        "step": step,
-        "packed": arrays,
-        "frames": [
-            {
-                "number": index,
-                "count": count,
-                "held": count,
-                **starts[k],
-                **({} if isnan(picked[k].time) else {"time": picked[k].time}),
-                **_findings_of(numbers, rows),
-                **_recording_of(shown, rows),
-            }
-            for k, (index, count, rows) in enumerate(zip(chosen, counts, of_frame, strict=True))
-        ],
-    }
-
-
-def _result_data(given: Result, view: View | None, title: str, frames: Sequence[int] | None) -> Json:
-    chosen = _chosen(len(given.frames), frames)
-    kept = survivors_shown(given, chosen)
-    result = kept.result
-    if not any(len(rows) for rows in kept.rows):
-        raise ViewerError("there is no posture in any frame; nothing can be shown; was everything rejected?")
-    subject = subject_of(result, view)
-    shown = [subject.frames[index] for index in chosen]
-    bodies = [one.aligned_points for one in shown]
-    paths = paths_shown(given.paths, chosen, kept.rows, bodies, [one.alignment for one in shown])
-    likeliest = [body[:1] for body in bodies] if paths is None else list(paths.points[0][:, None])
-    R_cam_world = _upright(likeliest, subject.R_cam_world)
-    world = _world(likeliest, R_cam_world, outlying=OUTLYING_SHARE)
-    truth = None if view is None else _truth(result, view, subject, chosen)
-    rejected = [rejected_shown(result, subject, index, world) for index in chosen]
-    placed = [world.place(body) for body in bodies]
-    extra = [
-        [each.points for each in rejected],
-        [] if truth is None else [world.place(truth[k : k + 1]) for k in range(len(chosen))],
-        [] if paths is None else [world.place(paths.points[:, k]) for k in range(len(chosen))],
-    ]
-    step, arrays, starts = _packed_bodies(placed, extra)
-    arrays |= _packed_columns([result.frames[index] for index in chosen], kept.rows)
-    told: Json = {}
-    if paths is not None:
-        arrays["pathSurvivor"] = packed(np.ascontiguousarray(paths.survivor.T))
-        arrays["pathBridged"] = packed(np.ascontiguousarray(_bits(paths.bridged).T))
-        told["paths"] = {"probability": _numbers(paths.probability), "words": paths.words}
-    reasons: dict[str, int] = {}
-    for index in chosen:
-        for reason in given.frames[index].rejected:
-            reasons.setdefault(reason, len(reasons))
-    whole = [given.frames[index] for index in chosen]
-    pruned, judged = verdicts(whole, reasons)
-    arrays |= pruned
-    units = units_of(whole)
-    levels = result.frames[0].levels["joint"]
-    return {
-        **_of_figure(subject.figure, world, title),
-        **told,
-        "kind": "result",
-        "judged": False,
-        "findings": [],
-        "left": sum(kept.counts) - sum(len(row) for row in kept.rows),
-        "refined": any(given.frames[index].refined is not None for index in chosen),
-        "deviation": _deviation(given.settings),
-        "tree": tree_of(levels),
-        "flips": flips_of(walk(levels), levels) | {"frames": len(given.frames)},
-        "upright": "" if subject.R_cam_world is not None else "level" if R_cam_world is None else "trunks",
-        "camera": _camera(world) | {"parallel": any(given.frames[k].family is not None for k in chosen)},
-        "margins": _margins(result.frames[0]),
-        "settings": _settings(given.settings),
-        "reasons": [[*reason.partition("/")[::2], units.get(reason, "")] for reason in reasons],
-        "answerSegments": answer_segments(),
-        "step": step,
-        "packed": arrays,
-        "frames": [
-            {
-                "number": index,
-                "count": kept.counts[k],
-                "held": len(kept.rows[k]),
-                **starts[k],
-                **_frame(given.frames[index], kept.rows[k], reasons),
-                **judged[k],
-                **_uncalibrated(result.frames[index], shown[k], world),
-                **_image(result.frames[index], shown[k], view, index),
-                **({"picture": given.pictures[index]} if given.pictures else {}),
-                "examples": [reasons.get(reason, -1) for reason in rejected[k].reasons],
-            }
-            for k, index in enumerate(chosen)
-        ],
-    }
-
-
-def _of_figure(figure: Figure, world: World, title: str) -> Json:
-    return {
+        "kind": "motion" if 1 < len(frames) == len(rows) else "postures",
         "title": title,
-        "points": list(POINTS),
-        "joints": len(JOINTS),
-        "colours": {name or "middle": number(colour) for name, colour in SIDE_RGB.items()}
-        | {"alarm": number(ALARM_RGB)},
-        "groupColours": [number(colour) for colour in GROUP_RGB],
-        "pointSides": [side(name) or "middle" for name in POINTS],
-        "segments": [[a, b, _segment_side(a, b)] for a, b in SEGMENTS],
-        "capsules": _capsules(figure),
-        "tree": None,
-        "upright": "",
-        "camera": _camera(world) | {"parallel": False},
-        "margins": [],
-        "settings": [],
-        "reasons": [],
-        "paths": None,
+        "front": -np.pi / 2,
+        "left": len(points) - len(rows),
+        "places": places,
+        **skeleton,
+        **_packed(_grounded([points[group] for group in groups])[0], frames),
+        **summary,
     }
 
 
-def _camera(world: World) -> Json:
-    axes = {"right": 0, "down": 1, "forward": 2}
-    placed = {name: world.R_world_cam[:, k].tolist() for name, k in axes.items()}
-    return {"position": world.t_world_cam.tolist(), **placed}
+def _kept(report: Report) -> NDArray[np.intp]:
+    """Return the rows that the page holds: all, or those of the worst clips."""
+    if len(report) <= MOST_FRAMES:
+        return np.arange(len(report))
+    order = np.argsort([-one.severity for one in report.clips], kind="stable")
+    counts = np.cumsum(np.bincount(report.clip, minlength=len(order))[order])
+    kept = np.flatnonzero(np.isin(report.clip, order[counts <= MOST_FRAMES]))
+    return kept if len(kept) else np.arange(MOST_FRAMES)
 
 
-def _world(bodies: Sequence[Array], R_cam_world: Array | None, *, outlying: float) -> World:
-    """Stand the world on the likeliest postures, but for those that are lower than the rest."""
-    R = CAMERA_UPRIGHT if R_cam_world is None else R_cam_world.T
-    joints = [body[:, : len(JOINTS)] for body in bodies]
-    lowest = np.array([_least((one @ R.T)[..., 2]) for one in joints])
-    if outlying and np.isfinite(lowest).sum() > 1:
-        least = np.nanquantile(lowest, outlying)
-        joints = [one for one, low in zip(joints, lowest.tolist(), strict=True) if low >= least]
-    return upright_world(np.concatenate(joints), R_cam_world)
+def _points(motion: Motion, robot: Robot, q: Array) -> Array:
+    """Return the points (T, P, 3) that are drawn: joints and head of a figure, or a robot's links."""
+    if isinstance(robot, Figure):
+        if motion.joints is None:
+            return robot.forward_kinematics(q)
+        return np.concatenate([motion.figure_joints, motion.head], axis=1)
+    known = np.isfinite(q).all(axis=1)
+    places = np.full((len(q), len(drawn.link_frames(robot)), 3), np.nan)
+    places[known] = drawn.link_places(robot, q[known])
+    return places
 
 
-def _upright(bodies: Sequence[Array], R_cam_world: Array | None) -> Array | None:
-    """Return the rotation from a world whose z is up: the view's, else by the trunks where they all lean one way."""
-    if R_cam_world is not None or len(bodies) < FRAMES_THAT_TELL:
-        return R_cam_world
-    trunks = np.concatenate([body[:, JOINT["neck"]] - body[:, JOINT["pelvis"]] for body in bodies])
-    trunks = trunks[np.isfinite(trunks).all(axis=1)]
-    if len(trunks) < FRAMES_THAT_TELL:
-        return None
-    mean = (trunks / np.linalg.norm(trunks, axis=1, keepdims=True)).mean(axis=0)
-    alike = float(np.linalg.norm(mean))
-    up = mean / alike
-    if alike < ALIKE_TRUNKS or -up[1] > LEVEL_COSINE or abs(up[2]) > STEEP_SINE:
-        return None
-    ahead = np.array([0.0, 0.0, 1.0]) - up[2] * up
-    ahead /= np.linalg.norm(ahead)
-    return np.array([ahead, cross(up, ahead), up]).T
-
-
-def _least(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.min()) if len(known) else float("nan")
-
-
-def _packed_bodies(
-    bodies: Sequence[Array], extra: Sequence[Sequence[Array]] = ()
-) -> tuple[float, Json, list[Json]]:
-    """Pack points in the world, with those of rejected branches, of the truth and of paths."""
-    together = [
-        np.concatenate([body, *(one[k] for one in extra if len(one))]) for k, body in enumerate(bodies)
-    ]
-    found, step = origins(together)
-
-    def text(parts: Sequence[Array]) -> dict[str, str]:
-        return packed(np.concatenate([steps(part, found[k], step) for k, part in enumerate(parts)]))
-
-    arrays: Json = {"points": text(bodies)}
-    for name, parts in zip(("rejected", "truth", "paths"), extra, strict=False):
-        if len(parts) and sum(map(len, parts)):
-            arrays[name] = text(parts)
-    starts = []
-    first = examples = 0
-    for k, body in enumerate(bodies):
-        starts.append(
-            {
-                "origin": [round(value, 6) for value in found[k].tolist()],
-                "first": first,
-                "firstExample": examples,
-            }
-        )
-        first += len(body)
-        examples += len(extra[0][k]) if extra and extra[0] else 0
-    return step, arrays, starts
-
-
-def _packed_columns(frames: Sequence[ResultFrame], rows: Sequence[NDArray[np.intp]]) -> Json:
-    """Pack what is known of each survivor: frame after frame."""
-    arrays: Json = {
-        "number": packed(np.concatenate(rows).astype(np.uint32)),
-        "branches": packed(np.concatenate([branch_bits(frame.branches) for frame in frames])),
-    }
-    for name, kind in (("groups", np.uint32), ("probability", np.float32)):
-        if getattr(frames[0], name) is not None:
-            arrays[name] = packed(np.concatenate([getattr(frame, name) for frame in frames]).astype(kind))
-    for k, name in enumerate(frames[0].margins):
-        arrays[f"margin{k}"] = packed(
-            np.concatenate([frame.margins[name] for frame in frames]).astype(np.float32)
-        )
-    return arrays
-
-
-def _frame(frame: ResultFrame, rows: NDArray[np.intp], reasons: Mapping[str, int]) -> Json:
-    rejected = sorted(frame.rejecting.items(), key=lambda item: (-item[1], item[0]))
+def _skeleton(robot: Robot) -> Json:
+    """Describe what joins the points: segments, and bodies relative to the distance of the points that place them."""
+    colours = {name: red << 16 | green << 8 | blue for name, (red, green, blue) in drawn.COLOURS.items()}
+    shared: Json = {"colours": {**colours, "alarm": 0xD4006A}, "groupColours": GROUP_COLOURS}
+    if isinstance(robot, Figure):
+        neutral, bodies = robot.neutral_points, []
+        for one in robot.capsules:
+            start, end = (neutral[list(points)].mean(axis=0) for points in (one.start, one.end))
+            length = float(np.linalg.norm(end - start))
+            bodies.append(
+                {
+                    "start": one.start,
+                    "end": one.end,
+                    "center": round(one.center / length, 6),
+                    "half": round(one.half_length / length, 6),
+                    "radius": one.radius,
+                    "side": drawn.side(one.link),
+                }
+            )
+        limbs = ("elbow", "wrist", "knee", "ankle")
+        segments = [
+            [a, b, drawn.side(JOINTS[b]) if JOINTS[max(a, b)].endswith(limbs) else "middle"]
+            for a, b in SEGMENTS
+        ]
+        names, count = list(POINTS), len(JOINTS)
+    else:
+        frames, model = drawn.link_frames(robot), robot.model
+        names, segments = [model.frames[k].name for k in frames], []
+        count = len(names)
+        for child, k in enumerate(frames):
+            above = model.frames[k].parentFrame
+            while above and above not in frames:
+                above = model.frames[above].parentFrame
+            if above in frames and above != k:
+                segments.append([frames.index(above), child, drawn.side(names[child])])
+        usual = drawn.link_places(robot, robot.neutral[None])[0]
+        bodies = [
+            {"start": [a], "end": [b], "center": 0.5, "half": 0.5, "radius": LINK_RADIUS, "side": side}
+            for a, b, side in segments
+            if np.linalg.norm(usual[a] - usual[b]) > LINK_RADIUS
+        ]
     return {
-        "time": frame.time,
-        "levels": {name: list(frame.levels[name]) for name in ("joint", "physical", "motion")},
-        "answer": answer_data(frame, rows),
-        "unlisted": float(f"{frame.unlisted_probability:.3g}"),
-        "rejected": [[reasons[reason], leaves] for reason, leaves in rejected[:MOST_REASONS]],
-        "notListed": sum(frame.rejected.values()) - sum(frame.rejecting.values()),
-        "rejectedMore": sum(leaves for _, leaves in rejected[MOST_REASONS:]),
+        **shared,
+        "points": names,
+        "joints": count,
+        "figure": isinstance(robot, Figure),
+        "pointSides": [drawn.side(name) for name in names],
+        "segments": segments,
+        "capsules": bodies,
     }
 
 
-def _findings_of(findings: Mapping[int, list[list[float]]], rows: NDArray[np.intp]) -> Json:
-    found = {str(k): findings[row] for k, row in enumerate(rows.tolist()) if row in findings}
-    return {"findings": found} if found else {}
+def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
+    """Stand bodies on z = 0 and the first known point over x = y = 0; return what was added (3,), too."""
+    low = [float(np.nanmin(one[:1, :, 2])) for one in bodies if np.isfinite(one[:1, :, 2]).any()]
+    if not low:
+        raise refusal("render", "", "no posture in any frame", "at least one", "see recover --explain")
+    first = next(one for one in bodies if np.isfinite(one).any())
+    shift = np.array([*-np.nanmean(first[0], axis=0)[:2], SOLE - float(np.quantile(low, LOW_SHARE))])
+    return [one + shift for one in bodies], shift
 
 
-def _recordings(given: Postures | HeldPostures) -> Json:
-    """Return the names of a file's recordings, where it has several."""
-    if isinstance(given, HeldPostures) and len(given.clips) > 1:
-        return {"clips": list(given.clips)}
-    return {}
+def _packed(
+    bodies: Sequence[Array], frames: Sequence[Json], extra: Mapping[str, Sequence[Array]] | None = None
+) -> Json:
+    """Pack points (H, P, 3) of each frame, and other points of each frame, as whole steps from its origin."""
+    origins, widest, first = [], 0.0, 0
+    for k, body in enumerate(bodies):
+        both = np.concatenate([body, *(one[k] for one in (extra or {}).values())]).reshape(-1, 3)
+        known = both[np.isfinite(both).all(axis=1)]
+        low, high = (known.min(axis=0), known.max(axis=0)) if len(known) else (np.zeros(3), np.zeros(3))
+        origins.append(np.round((low + high) / 2, 6))
+        widest = max(widest, float((high - low).max()) / 2)
+        frames[k].update(origin=origins[k].tolist(), first=first)
+        first += len(body)
+    step = max(FINEST, widest / LARGEST)
+
+    def whole(parts: Sequence[Array]) -> Json:
+        counted = [
+            np.where(np.isfinite(one).all(axis=-1, keepdims=True), np.rint((one - origin) / step), UNKNOWN)
+            for one, origin in zip(parts, origins, strict=True)
+        ]
+        return packed(np.concatenate(counted).astype(np.int16))
+
+    arrays = {"points": whole(bodies), **{name: whole(parts) for name, parts in (extra or {}).items()}}
+    return {"step": step, "packed": arrays, "frames": list(frames)}
 
 
-def _recording_of(given: Postures | HeldPostures, rows: NDArray[np.intp]) -> Json:
-    if isinstance(given, Postures) or len(given.clips) < 2 or not len(rows):
-        return {}
-    return {"clip": int(given.clip[rows[0]])}
+def packed(values: NDArray[Any]) -> Json:
+    """Pack an array, little-endian, as base64 and the name of its type."""
+    plain = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+    return {"type": values.dtype.name, "base64": b64encode(plain.tobytes()).decode("ascii")}
 
 
-def _joints(given: Postures | HeldPostures) -> Array:
-    return given.joints if isinstance(given, Postures) else given.postures.joints
-
-
-def _numbers_in_frames(given: Postures | HeldPostures, frames: Sequence[int]) -> list[NDArray[np.intp]]:
-    """Return the number of each posture in its file, frame by frame."""
-    if isinstance(given, Postures):
-        return [np.arange(len(given.joints))]
-    return [np.flatnonzero(given.frame == index) for index in frames]
-
-
-def _deviation(settings: Mapping[str, Any]) -> float | None:
-    """Return the noise of the image points that a result was recovered with, in the image's unit."""
-    noise = settings.get("noise")
-    value = noise.get("deviation") if isinstance(noise, Mapping) else None
-    return float(value) if isinstance(value, int | float) else None
-
-
-def _bits(flags: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return flags (..., 14) as bits, the first the lowest."""
-    return np.asarray((flags * (1 << np.arange(flags.shape[-1]))).sum(axis=-1), dtype=np.uint16)
-
-
-def _uncalibrated(frame: ResultFrame, shown: Shown, world: World) -> Json:
-    """Return what a frame has where its camera is not calibrated, or where joints were not seen."""
-    found: Json = {}
-    family = family_data(frame, shown, world, walk(frame.levels["joint"]))
-    if family is not None:
-        found["family"] = family
-    if frame.inferred is not None:
-        found["inferred"] = inferred_data(frame)
-    return found
-
-
-def _truth(result: Result, view: View, subject: DrawnSubject, chosen: Sequence[int]) -> Array:
-    """Return the true postures; of an uncalibrated view they are moved to where the survivors are drawn."""
-    truth = with_head(np.array(view.truth[list(chosen)]))
-    for row, index in enumerate(chosen):
-        shown = subject.frames[index]
-        if result.frames[index].family is None or not len(shown):
-            continue
-        # Depth is relative, and so is the place in a picture whose scale is another one.
-        moves = shown.points[0, : len(JOINTS)] - truth[row, : len(JOINTS)]
-        known = np.asarray(np.isfinite(moves).all(axis=1))
-        if known.any():
-            root = JOINT.get(result.frames[index].levels["joint"][0], 0)
-            root = root if known[root] else int(np.argmax(known))
-            truth[row] += [*moves[known, :2].mean(axis=0), moves[root, 2]]
-    return truth
-
-
-def _chosen(count: int, frames: Sequence[int] | None) -> list[int]:
-    wanted: Sequence[int] = range(count) if frames is None else frames
-    if not 0 < len(wanted) <= count or min(wanted) < 0 or max(wanted) >= count:
-        raise ViewerError(
-            f"frames: got some that do not exist, or none; there are {count}; choose among them"
+def _summary(report: Report) -> Json:
+    """Gather the decision, the counts of each check, and the clips, the worst first."""
+    checks = []
+    for name, one in report.by_check().items():
+        value = one.pop("value")
+        worst = quantity(value, one["unit"]) if one["frames"] else ""
+        checks.append({"name": name, **one, "worst": worst, "message": str(report.messages.get(name, ""))})
+    every = report.clips
+    order = sorted(range(len(every)), key=lambda k: (every[k].decision == "keep", -every[k].severity))
+    clips = []
+    for k in order[:MOST_CLIPS]:
+        clip = every[k]
+        spans = [
+            {name: getattr(span, name) for name in ("check", "first", "last", "verdict")}
+            | {"text": str(span), "worst": span.worst_frame, "index": -1}
+            for span in clip.spans[:MOST_SPANS]
+        ]
+        name = " ".join(part for part in (_short(clip.file), clip.name) if part)
+        clips.append(
+            {field: getattr(clip, field) for field in ("decision", "reason", "frames", "good")}
+            | {"clip": k, "name": name, "path": clip.title, "bad": clip.invalid + clip.undecided}
+            | {"spans": spans, "more": len(clip.spans) - len(spans)}
         )
-    return list(wanted)
+    lines = [f"warning: {one}" for one in report.warnings] + list(report.notes)
+    lines += [f"unreadable: {one}" for one in report.refused]
+    for why in dict.fromkeys(report.not_asked.values()):
+        names = [name for name, one in report.not_asked.items() if one == why]
+        lines.append(f"not asked: {', '.join(names)}: {why}")
+    return {
+        "judged": True,
+        "decision": report.decision,
+        "valid": int(report.ok.sum()),
+        "asked": len(report),
+        "checks": checks,
+        "clips": clips,
+        "moreClips": max(len(report.clips) - MOST_CLIPS, 0),
+        "notes": lines,
+        "settings": _settings(report.settings),
+    }
 
 
-def _check_count(bodies: Sequence[Array]) -> None:
-    if not any(len(body) for body in bodies):
-        raise ViewerError("there is no posture in any frame; nothing can be shown; was everything rejected?")
+def _short(file: str) -> str:
+    """Return the last two parts of a path: enough to tell clips apart in a list."""
+    return "/".join(file.replace("\\", "/").split("/")[-2:])
 
 
-def _segment_side(a: int, b: int) -> str:
-    """Return the limb's side; the trunk, whose segments have no child in a limb, is in the middle."""
-    name = JOINTS[max(a, b)]
-    limb = any(part in name for part in ("elbow", "wrist", "knee", "ankle"))
-    return side(name) if limb else "middle"
+def _add_findings(
+    frames: Sequence[Json], rows: Sequence[NDArray[np.intp]], report: Report, names: Sequence[str]
+) -> list[Json]:
+    """Add the findings of each posture: the number of a place, value and bound; return the places."""
+    found = report.findings
+    places: dict[tuple[int, str], tuple[int, Json]] = {}
+    starts = np.searchsorted(found["row"], np.arange(len(report) + 1))
+    for one, mine in zip(frames, rows, strict=True):
+        for k, row in enumerate(mine.tolist()):
+            for cell in range(starts[row], starts[row + 1]):
+                check, place = int(found["check"][cell]), report.places[found["place"][cell]]
+                if (check, place) not in places:
+                    entry = {"check": report.checks[check], "where": place, "joints": joints_of(place, names)}
+                    places[check, place] = (len(places), entry)
+                value, low, high = (float(found[name][cell]) for name in ("value", "lower", "upper"))
+                numbers = (value, low if value < low else high)
+                text = [quantity(x, report.units[check]) if np.isfinite(x) else "" for x in numbers]
+                mine_of = one.setdefault("findings", {}).setdefault(str(k), [])
+                mine_of.append([places[check, place][0], *text])
+    return [entry for _, entry in places.values()]
 
 
-def _capsules(figure: Figure) -> list[Json]:
-    """Describe the bodies relative to the distance of the points that place them: a measured limb may differ."""
-    neutral = figure.neutral_points
-    found = []
-    for capsule in figure.capsules:
-        start, end = (neutral[list(points)].mean(axis=0) for points in (capsule.start, capsule.end))
-        length = float(np.linalg.norm(end - start))
-        found.append(
-            {
-                "start": list(capsule.start),
-                "end": list(capsule.end),
-                "center": round(capsule.center / length, 6),
-                "half": round(capsule.half_length / length, 6),
-                "radius": capsule.radius,
-                "side": side(capsule.link) or "middle",
-            }
-        )
-    return found
+def joints_of(place: str, names: Sequence[str]) -> list[int]:
+    """Return the points that a finding is about: joints, the ends of bodies, or a robot's links, by their names.
 
-
-def _margins(frame: ResultFrame) -> list[Json]:
-    found = []
-    for name in frame.margins:
-        unit, scale = MARGIN_UNITS.get(name, ("", 1.0))
-        found.append({"name": name, "unit": unit, "scale": scale})
-    return found
+    Examples
+    --------
+    >>> from posekit.skeleton import POINTS
+    >>> joints_of("right_elbow.flexion", POINTS), joints_of("left_forearm-torso", POINTS)
+    ([6], [0, 3, 7, 9])
+    """
+    found: set[int] = set()
+    for word in re.split(r"[.\-/ ]+", place):
+        if word in names:
+            found.add(names.index(word))
+        elif word in CAPSULE_AXES and "neck" in names:
+            found.update(k for ends in CAPSULE_AXES[word] for k in ends if k < len(JOINTS))
+    return sorted(found)
 
 
 def _settings(settings: Mapping[str, Any]) -> list[list[str]]:
-    def text(value: Any) -> str:
-        return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
-
-    return [[str(name), text(value)] for name, value in settings.items()]
+    plain = ((name, one) for name, one in settings.items() if one is not None)
+    return [[str(name), one if isinstance(one, str) else json.dumps(one, default=str)] for name, one in plain]
 
 
-def _image(frame: ResultFrame, shown: Shown, view: View | None, index: int) -> Json:
-    """Return the image points, as wide as the view's pixels, and how far the likeliest posture's image is off."""
-    if view is None:
-        return {} if shown.sight is None else {"image": _rows(shown.sight.image)}
-    width = view.camera.aspect if isinstance(view.camera, ScaledOrthographicModel) else 1.0
-    points = np.concatenate([view.image[index], view.head_image[index], view.own_head_image[index]])
-    found: Json = {"image": _rows(points * [width, 1.0])}
-    if len(frame.joints) and not isinstance(view.camera, LeeChenModel):
-        away = image_distances(frame.joints[0], shown.sight)
-        if np.isfinite(away).any():
-            found["off"] = [float(f"{of(away):.3g}") for of in (np.nanmedian, np.nanmax)]
+def _of_result(
+    recovery: Recovery, title: str, view: View | None, frame: int | tuple[int, int] | None
+) -> Json:
+    drawn.frame_with_postures(recovery, None)
+    chosen: list[int] = drawn.frame_rows(len(recovery), frame, recovery.source).tolist()
+    if view is not None and len(view) != len(recovery):
+        raise refusal(
+            "render",
+            "--view",
+            f"{len(view)} frames",
+            f"{len(recovery)}, those of the result",
+            "give its own view",
+        )
+    table, answer = recovery.survivors, recovery.answer
+    most = min(MOST_OF_FRAME, max(20, MOST_POSTURES // len(chosen)))
+    points = np.concatenate([table.joints, np.asarray(table.head)], axis=1)
+    R = drawn.upright_camera(view)
+    kept: list[NDArray[np.intp]] = []
+    frames: list[Json] = []
+    reasons: dict[str, int] = {}
+    survivor = np.asarray(answer.survivor)
+    for k in chosen:
+        start, stop = recovery.rows(k).start, recovery.rows(k).stop
+        best = [int(survivor[k])] if survivor[k] >= 0 else []
+        standing = np.array([*answer.representatives[k], *best], dtype=np.intp)
+        rows = np.unique(np.concatenate([np.arange(start, min(stop, start + most)), standing]))
+        kept.append(rows)
+        frames.append(_frame(recovery, k, rows, reasons))
+        if view is not None:
+            frames[-1]["image"] = _image(view, k)
+    bodies, shift = _grounded([points[rows] @ R.T for rows in kept])
+    every = np.concatenate(kept)
+    extra: dict[str, list[Array]] = {}
+    if view is not None and np.isfinite(view.truth).any():
+        truth = np.array(view.truth)[chosen]
+        if not view.camera.perspective:  # depth and scale are relative: the truth is moved onto the answer
+            truth += np.nanmean(answer.joints[chosen] - truth, axis=1, keepdims=True)
+        extra["truth"] = [_with_head(one[None]) @ R.T + shift for one in truth]
+    paths = recovery.path
+    if paths is not None and len(paths):
+        extra["paths"] = [_with_head(paths.joints[:, k]) @ R.T + shift for k in chosen]
+    data = _packed(bodies, frames, extra)
+    start_of = np.array([recovery.rows(k).start for k in chosen])
+    data["packed"] |= {
+        "number": packed((every - np.repeat(start_of, [len(rows) for rows in kept])).astype(np.uint32)),
+        "probability": packed(np.asarray(table.probability)[every].astype(np.float32)),
+        "inferred": packed(
+            (np.asarray(table.inferred)[every] * (1 << np.arange(len(JOINTS)))).sum(axis=1).astype(np.uint16)
+        ),
+        "radius": packed(
+            np.clip(np.nan_to_num(np.asarray(table.radius)[every]) * 1000, 0, 65535).astype(np.uint16)
+        ),
+        **{
+            f"margin{k}": packed(one[every].astype(np.float32))
+            for k, one in enumerate(table.margins.values())
+        },
+    }
+    groups = np.asarray(table.group)[every]
+    if (groups >= 0).any():
+        data["packed"]["groups"] = packed(groups.astype(np.int32))
+    parallel = recovery.camera.get("type", "") == "scaled-orthographic" or (
+        view is not None and isinstance(view.camera, ScaledOrthographicCamera)
+    )
+    axes = dict(zip(("right", "down", "forward"), R.T.tolist(), strict=True))
+    return {
+        "kind": "result",
+        "title": title,
+        **_skeleton(load_figure().scaled(recovery.lengths)),
+        "front": -np.pi / 2,
+        "camera": {"position": shift.tolist(), **axes, "parallel": bool(parallel)},
+        "margins": [_margin(name) for name in table.margins],
+        "treeSegments": TREE_SEGMENTS,
+        "settings": _settings(recovery.settings),
+        "reasons": [reason.partition("/")[::2] for reason in reasons],
+        "paths": None
+        if "paths" not in extra
+        else {
+            "probability": [float(f"{p:.4g}") for p in paths.probability],  # type: ignore[union-attr]
+            "survivor": [[int(row) for row in paths.survivor[:, k]] for k in chosen],  # type: ignore[union-attr]
+        },
+        "judged": False,
+        "left": sum(int(recovery.rows(k).stop) - int(recovery.rows(k).start) for k in chosen) - len(every),
+        **data,
+    }
+
+
+def _margin(name: str) -> Json:
+    unit, scale = MARGIN_UNITS.get(name, ("", 1.0))
+    return {"name": name, "unit": unit, "scale": scale}
+
+
+def _with_head(joints: Array) -> Array:
+    """Append unknown head points to joints (H, 14, 3)."""
+    return np.concatenate([joints, np.full((len(joints), len(POINTS) - len(JOINTS), 3), np.nan)], axis=1)
+
+
+def _frame(recovery: Recovery, k: int, rows: NDArray[np.intp], reasons: dict[str, int]) -> Json:
+    """Gather what is known of one frame; `rows` are the survivors that the page holds."""
+    seen, answer, one = recovery.frames, recovery.answer, recovery[k]
+    place = {row: number for number, row in enumerate(rows.tolist())}
+    rejected = sorted(seen.rejected[k].items(), key=lambda item: (-item[1], item[0]))
+    time = float(seen.time[k])
+    found: Json = {
+        "number": k,
+        "count": len(one),
+        "held": len(rows),
+        "unlisted": float(f"{np.asarray(seen.unlisted_probability)[k]:.3g}"),
+        "unlistedCount": int(np.asarray(seen.unlisted)[k]),
+        "reason": seen.reason[k],
+        "levels": list(seen.levels[k]),
+        "rejected": [
+            [reasons.setdefault(name, len(reasons)), int(count)] for name, count in rejected[:MOST_REASONS]
+        ],
+        "rejectedMore": int(sum(count for _, count in rejected[MOST_REASONS:])),
+    }
+    if np.isfinite(time):
+        found["time"] = round(time, 6)
+    if seen.pictures:
+        found["picture"] = str(seen.pictures[k])
+    if not len(rows):
+        return found
+    best = int(np.asarray(answer.survivor)[k])
+    found["best"] = place.get(best, 0)
+    sure, nearer_sure = float(answer.sure[k]), np.asarray(answer.nearer_sure)[k]
+    if np.isfinite(sure):
+        found |= {"sure": float(f"{sure:.4g}"), "sureOf": answer.sure_of[k]}
+    found["nearer"] = np.asarray(answer.nearer)[k].tolist()
+    found["nearerSure"] = [None if np.isnan(p) else round(float(p), 3) for p in nearer_sure]
+    stands = answer.representatives[k].tolist()
+    joints = recovery.survivors.joints
+    found["representatives"] = [
+        {"at": place[row], "p": float(f"{p:.4g}"), "how": _difference(joints[stands[0]], joints[row])}
+        for row, p in zip(stands[:6], np.asarray(answer.represented[k])[:6], strict=False)
+    ]
+    found["moreRepresentatives"] = max(len(stands) - 6, 0)
     return found
 
 
-def _rows(points: Array) -> list[list[float] | None]:
-    return [None if np.isnan(point).any() else [float(f"{value:.6g}") for value in point] for point in points]
+def _difference(first: Array, other: Array) -> str:
+    """Say in few words which joints of a posture (14, 3) are nearer to the camera, or farther, than in the first."""
+    depths = [np.array([one[b, 2] - one[a, 2] for a, b in TREE_SEGMENTS]) for one in (first, other)]
+    change = np.nan_to_num(depths[1] - depths[0])
+    order = [int(k) for k in np.argsort(-np.abs(change)) if abs(change[k]) > CLEARLY_NEARER][:2]
+    words = [f"{JOINTS[TREE_SEGMENTS[k][1]]} {'farther' if change[k] > 0 else 'nearer'}" for k in order]
+    return ", ".join(words).replace("_", " ")
 
 
-def _numbers(values: Array) -> list[float | None]:
-    return [None if isnan(value) else float(f"{value:.6g}") for value in values.tolist()]
+def _image(view: View, k: int) -> list[list[float] | None]:
+    """Return the image points of a frame, as wide as the picture's pixels."""
+    aspect = view.camera.aspect if isinstance(view.camera, ScaledOrthographicCamera) else 1.0
+    points = np.concatenate([view.image[k], view.head_image[k]]) * [aspect, 1.0]
+    return [None if np.isnan(one).any() else [float(f"{value:.6g}") for value in one] for one in points]

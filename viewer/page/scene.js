@@ -6,30 +6,23 @@ const scene = (() => {
   // Kept in the processor's memory, and opaque: without a graphics card that is several times as quick.
   const pen = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
   const { dot, minus, along, cross, unit } = sight.vectors;
-  const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16, CLICK = 5;
-  const { position: eye, forward, right, down } = DATA.camera, axes = [right, down, forward];
-  // Several postures in the frames of a file are people: all are seen.
-  const people = DATA.kind === "postures" && DATA.frames.length > 1;
+  const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16, camera = DATA.camera;
+  const people = DATA.kind === "postures";
   const shownNow = { bodies: true, others: people, rays: false, truth: false };
-  document.querySelector("[data-show=others]").checked = people;
   const css = (colour, alpha = 1) => `rgba(${colour >> 16},${(colour >> 8) & 255},${colour & 255},${alpha})`;
   const mixed = (colour, other, t) => [16, 8, 0].reduce((sum, bit) => sum | (Math.round(((colour >> bit) & 255) * (1 - t) + ((other >> bit) & 255) * t) << bit), 0);
-  const shades = Object.fromEntries(Object.entries(DATA.colours).map(([side, colour]) => [side, { light: mixed(colour, 0xffffff, 0.5), plain: colour, dark: mixed(colour, 0x10202c, 0.42) }]));
-  let chosenNow = null, places = [], drawnLayers = {}, boxes = [];
+  const shades = Object.fromEntries(Object.entries(DATA.colours ?? {}).map(([side, colour]) => [side, { light: mixed(colour, 0xffffff, 0.5), plain: colour, dark: mixed(colour, 0x10202c, 0.42) }]));
+  let chosenNow = null, places = [];
 
-  // The chosen posture: as it was recovered, at the slider's scale, on the path, or a rejected branch beside it.
   function chosen() {
-    const { survivor, scale: s, path } = page.state, frame = page.frame();
-    if (path !== null) return pack.path(page.state.frame, path);
-    if (!(survivor >= 0 && survivor < frame.held)) return null;
-    if (!frame.family || (s === null && !page.state.hand)) return pack.points(frame, survivor);
-    return lift.world(frame, survivor, s, page.state.hand ?? undefined);
+    const { survivor, path, frame } = page.state;
+    if (path !== null) return pack.path(frame, path);
+    return survivor >= 0 && survivor < page.frame().held ? pack.points(page.frame(), survivor) : null;
   }
 
   function mean(all, indices) {
     const some = indices.map((index) => all[index]);
-    if (some.some((point) => !point)) return null;
-    return [0, 1, 2].map((axis) => some.reduce((sum, point) => sum + point[axis], 0) / some.length);
+    return some.some((point) => !point) ? null : [0, 1, 2].map((axis) => some.reduce((sum, point) => sum + point[axis], 0) / some.length);
   }
 
   // The outline of two circles and what is between them.
@@ -70,26 +63,24 @@ const scene = (() => {
     pen.setLineDash([]);
   }
 
-  // Where no head is known one is drawn, hollow: a figure without is hard to read.
+  // A head that is not known is drawn hollow over the neck: a figure without one is hard to read.
   function withHead(all) {
     const [neck, pelvis] = [all[0], all[3]], head = all.slice(DATA.joints);
-    if (!neck || !pelvis || head.every((point) => point)) return { all, made: false };
-    const up = unit(minus(neck, pelvis)), whole = [...all];
-    for (let k = DATA.joints; k < whole.length; k++) whole[k] = along(neck, 0.17, up);
-    return { all: whole, made: true };
+    if (!DATA.figure || !neck || !pelvis || head.every((point) => point)) return { all, made: false };
+    const top = along(neck, 0.17, unit(minus(neck, pelvis)));
+    return { all: [...all.slice(0, DATA.joints), ...head.map(() => top)], made: true };
   }
 
-  function capsulesOf(given, notSeen) {
-    const found = [], { all, made } = withHead(given), unseen = (joint) => notSeen(joint) || (made && joint >= DATA.joints);
+  function capsulesOf(given, unseen) {
+    const found = [], { all, made } = withHead(given);
     for (const capsule of DATA.capsules) {
       const [start, end] = [mean(all, capsule.start), mean(all, capsule.end)];
       if (!start || !end) continue;
-      const axis = minus(end, start);
-      const ends = [-1, 1].map((way) => along(start, capsule.center + way * capsule.half, axis));
+      const axis = minus(end, start), ends = [-1, 1].map((way) => along(start, capsule.center + way * capsule.half, axis));
       const [from, to] = ends.map(sight.project);
       if (!from || !to) continue;
       [from, to].forEach((place) => place.push(place[3] * capsule.radius));
-      const guessed = [...capsule.start, ...capsule.end].some((index) => unseen(index));
+      const guessed = [...capsule.start, ...capsule.end].some((index) => unseen(index) || (made && index >= DATA.joints));
       found.push({ from, to, ends, side: capsule.side, radius: capsule.radius, guessed, depth: (from[2] + to[2]) / 2 });
     }
     return found.sort((a, b) => b.depth - a.depth);
@@ -110,21 +101,20 @@ const scene = (() => {
     pen.setLineDash([]);
   }
 
-  const stick = (all) => DATA.segments.flatMap(([a, b]) => (all[a] && all[b] ? [[all[a], all[b]]] : []));
+  const stick = (all, side) => DATA.segments.flatMap(([a, b, of]) => (all[a] && all[b] && (!side || of === side) ? [[all[a], all[b]]] : []));
 
   function drawGround(index) {
-    if (sight.state.elevation < -0.02) return;
+    if (sight.state.elevation < -0.02 || (camera?.parallel && sight.state.look === "camera")) return;
     const [x, y] = sight.middle(index).map((value) => Math.round(value * 2) / 2), wide = 3;
     for (let k = -2 * wide; k <= 2 * wide; k++) {
-      const fade = 0.34 * (1 - Math.abs(k) / (2 * wide + 1));
-      const reach = Math.sqrt(Math.max(0, wide * wide - (k * k) / 4));
+      const fade = 0.34 * (1 - Math.abs(k) / (2 * wide + 1)), reach = Math.sqrt(Math.max(0, wide * wide - (k * k) / 4));
       polyline([[[x + k / 2, y - reach, 0], [x + k / 2, y + reach, 0]], [[x - reach, y + k / 2, 0], [x + reach, y + k / 2, 0]]], `rgba(96,112,128,${fade})`, 1);
     }
-    if (DATA.kind !== "result" || sight.state.look === "camera") return;
-    // Which way the camera is: an arrow on the ground.
-    const [cx, cy] = sight.middle(index), away = 0.45 * sight.reach, towards = sight.back, side = [-towards[1], towards[0], 0];
-    const foot = [cx + away * towards[0], cy + away * towards[1], 0];
-    const tip = along(foot, 0.22, towards), corners = [tip, along(foot, 0.1, side), along(foot, -0.1, side)].map(sight.project);
+    if (!camera || sight.state.look === "camera") return;
+    // An arrow on the ground shows where the camera is.
+    const [cx, cy] = sight.middle(index), towards = unit([-camera.forward[0], -camera.forward[1], 0]), side = [-towards[1], towards[0], 0];
+    const foot = along([cx, cy, 0], 0.45 * sight.reach, towards);
+    const corners = [along(foot, 0.22, towards), along(foot, 0.1, side), along(foot, -0.1, side)].map(sight.project);
     if (corners.some((corner) => !corner)) return;
     pen.beginPath();
     corners.forEach(([px, py], k) => (k ? pen.lineTo(px, py) : pen.moveTo(px, py)));
@@ -154,116 +144,73 @@ const scene = (() => {
   }
 
   function drawBody(all) {
-    const unseen = (joint) => page.unseen(joint), parts = capsulesOf(all, unseen);
+    const unseen = page.unseen, parts = capsulesOf(all, unseen);
     drawShadow(parts);
     if (shownNow.bodies) {
-      const thick = Math.max(2, 0.014 * (parts[0]?.from[3] ?? 0));
-      polyline(DATA.segments.flatMap(([a, b, side]) => (side === "middle" && all[a] && all[b] ? [[all[a], all[b]]] : [])), css(shades.middle.dark, 0.75), thick);
+      if (DATA.figure) polyline(stick(all, "middle"), css(shades.middle.dark, 0.75), Math.max(2, 0.014 * (parts[0]?.from[3] ?? 0)));
       parts.forEach(drawCapsule);
-    } else for (const side of ["middle", "right", "left"]) {
-      const of = DATA.segments.filter((one) => one[2] === side);
-      for (const guessed of [false, true]) {
-        const ends = of.flatMap(([a, b]) => (all[a] && all[b] && (unseen(a) || unseen(b)) === guessed ? [[all[a], all[b]]] : []));
-        polyline(ends, css(DATA.colours[side]), 5, guessed ? [6, 4] : []);
-      }
-    }
-    const findings = page.findings();
+    } else for (const side of ["middle", "right", "left"]) polyline(stick(all, side), css(DATA.colours[side]), 5);
     places = all.map((point) => point && sight.project(point));
     places.forEach((place, joint) => {
-      if (!place) return;
-      const shade = shades[DATA.pointSides[joint]], radius = Math.max(joint < DATA.joints ? 2.5 : 1.2, place[3] * (joint < DATA.joints ? 0.017 : 0.008));
+      if (!place || !DATA.figure) return;
+      const shade = shades[DATA.pointSides[joint]], own = joint < DATA.joints;
       pen.beginPath();
-      pen.arc(place[0], place[1], radius, 0, 2 * Math.PI);
+      pen.arc(place[0], place[1], Math.max(own ? 2.5 : 1.2, place[3] * (own ? 0.017 : 0.008)), 0, 2 * Math.PI);
       pen.fillStyle = unseen(joint) ? "#fff" : css(shade.dark);
       pen.strokeStyle = unseen(joint) ? css(shade.dark) : "rgba(255,255,255,.85)";
       pen.lineWidth = unseen(joint) ? 2 : 1.2;
       pen.fill();
       pen.stroke();
     });
-    for (const joint of new Set(findings.flatMap((one) => one.joints))) ring(places[joint]);
+    for (const joint of new Set(page.findings().flatMap((one) => one.joints))) ring(places[joint]);
   }
 
-  // What a check finds is ringed, and has a mark: not by colour alone.
+  // A finding is ringed and has a mark: colour alone does not say it.
   function ring(place) {
     if (!place) return;
     const radius = Math.max(9, 0.045 * place[3]);
     pen.beginPath();
     pen.arc(place[0], place[1], radius, 0, 2 * Math.PI);
-    pen.strokeStyle = css(DATA.colours.alarm);
+    pen.strokeStyle = pen.fillStyle = css(DATA.colours.alarm);
     pen.lineWidth = 2.5;
     pen.stroke();
     pen.font = "bold 14px system-ui, sans-serif";
     pen.textAlign = "center";
-    pen.lineWidth = 3;
-    pen.strokeStyle = "#fff";
-    pen.strokeText("!", place[0] + radius + 5, place[1] - radius + 6);
-    pen.fillStyle = css(DATA.colours.alarm);
     pen.fillText("!", place[0] + radius + 5, place[1] - radius + 6);
   }
 
-  // The likelier, the stronger: the rest of the survivors as lines, those of a group in its colour.
+  // The likelier, the stronger: the other postures as lines, those of a group in its colour.
   function drawOthers() {
     const frame = page.frame(), most = Math.min(frame.held, MOST_OTHERS), best = pack.probability(frame, 0);
-    let drawn = 0;
     for (let index = most - 1; index >= 0; index--) {
       if (index === page.state.survivor) continue;
       const share = best ? Math.sqrt(Math.min((pack.probability(frame, index) ?? 0) / best, 1)) : 0.5;
-      const ends = stick(pack.points(frame, index));
-      polyline(ends, css(page.groupColour(index), 0.12 + 0.68 * share), 1.2 + 1.6 * share);
-      drawn += 1;
-    }
-    return drawn;
-  }
-
-  // The boxes that hold all positions of joints that were not seen, at the recovered scale.
-  function drawRegions(all) {
-    boxes = [];
-    if (page.state.path !== null || scale.elsewhere()) return;
-    for (const [joint, one] of Object.entries(page.frame().inferred?.[page.state.survivor] ?? {})) {
-      const size = one.upper.map((high, k) => high - one.lower[k]);
-      if (!all[joint] || Math.max(...size) < 1e-4) continue;
-      const corner = (bits) => axes.reduce((sum, axis, k) => along(sum, (bits >> k) & 1 ? one.upper[k] : one.lower[k], axis), all[joint]);
-      const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
-      const edges = corners.flatMap((from, k) => [1, 2, 4].flatMap((bit) => (k & bit ? [] : [[from, corners[k | bit]]])));
-      polyline(edges, css(DATA.colours[DATA.pointSides[joint]], 0.8), 1.2);
-      boxes.push({ name: DATA.points[joint], corners });
+      polyline(stick(pack.points(frame, index)), css(page.groupColour(index), 0.12 + 0.68 * share), 1.2 + 1.6 * share);
     }
   }
 
   // The camera's pyramid, the rays to the joints, and the image that they make on a plane in front of it.
   function drawRays(every) {
-    const frame = page.frame(), unseen = frame.inferred?.[page.state.survivor] ?? {};
-    const all = every.slice(0, DATA.joints).map((point, k) => (k in unseen && !frame.image?.[k] ? null : point));
-    const known = all.filter((point) => point);
-    if (!known.length) return 0;
-    const { parallel } = DATA.camera, depths = known.map((point) => dot(minus(point, eye), forward));
+    const { position: eye, forward, right, down, parallel } = camera, seen = page.frame().image;
+    const all = every.slice(0, DATA.joints).map((point, k) => (seen && !seen[k] ? null : point)), known = all.filter((point) => point);
+    if (!known.length) return;
+    const depths = known.map((point) => dot(minus(point, eye), forward));
     const depth = parallel ? Math.min(...depths) - IMAGE_DEPTH : Math.min(IMAGE_DEPTH, 0.5 * Math.min(...depths));
     const image = all.map((point) => {
       if (!point) return null;
       const from = minus(point, eye), far = dot(from, forward);
       return parallel ? along(point, depth - far, forward) : along(eye, depth / far, from);
     });
-    const seen = image.filter((point) => point).map((point) => minus(point, eye));
     polyline(all.flatMap((point, k) => (point ? [[parallel ? image[k] : eye, point]] : [])), "rgba(110,124,138,.55)", 1);
-    for (const side of ["middle", "right", "left"]) {
-      polyline(DATA.segments.filter((one) => one[2] === side).flatMap(([a, b]) => (image[a] && image[b] ? [[image[a], image[b]]] : [])), css(DATA.colours[side]), 2);
-    }
-    const [[west, east], [north, south]] = [right, down].map((axis) => seen.map((from) => dot(from, axis))).map((values) => {
+    for (const side of ["middle", "right", "left"]) polyline(stick(image, side), css(DATA.colours[side]), 2);
+    const flat = image.filter((point) => point).map((point) => minus(point, eye));
+    const [[west, east], [north, south]] = [right, down].map((axis) => flat.map((from) => dot(from, axis))).map((values) => {
       const [low, high] = [Math.min(...values), Math.max(...values)], border = 0.15 * (high - low) + 0.02;
       return [low - border, high + border];
     });
     const corner = (x, y) => along(along(along(eye, depth, forward), x, right), y, down);
     const corners = [corner(west, north), corner(east, north), corner(east, south), corner(west, south)];
     polyline(corners.flatMap((place, k) => [[place, corners[(k + 1) % 4]], ...(parallel ? [] : [[eye, place]])]), "#303030", 1.3);
-    return 1;
-  }
-
-  function drawRejected() {
-    const example = page.example();
-    if (!example) return 0;
-    polyline(stick(example.points), css(DATA.colours.alarm), 3, [9, 4, 2, 4]);
-    for (const joint of example.joints) if (example.points[joint]) ring(sight.project(example.points[joint]));
-    return 1;
   }
 
   function draw() {
@@ -283,16 +230,11 @@ const scene = (() => {
     drawGround(index);
     chosenNow = chosen();
     places = [];
-    boxes = [];
     const truth = shownNow.truth && pack.truth(index);
-    drawnLayers = { others: shownNow.others ? drawOthers() : 0, rays: shownNow.rays && chosenNow ? drawRays(chosenNow) : 0 };
-    if (chosenNow) {
-      drawBody(chosenNow);
-      drawRegions(chosenNow);
-    }
+    if (shownNow.others) drawOthers();
+    if (shownNow.rays && camera && chosenNow) drawRays(chosenNow);
+    if (chosenNow) drawBody(chosenNow);
     if (truth) polyline(stick(truth), "#111", 2.2, [7, 4]);
-    drawnLayers.truth = truth ? stick(truth).length : 0;
-    drawnLayers.rejected = drawRejected();
     scene.pictures += 1;
   }
 
@@ -307,9 +249,7 @@ const scene = (() => {
     });
   }
 
-  function press() {
-    for (const button of document.querySelectorAll("#looks button")) button.setAttribute("aria-pressed", button.dataset.look === sight.state.look);
-  }
+  const press = () => document.querySelectorAll("#looks button").forEach((button) => button.setAttribute("aria-pressed", button.dataset.look === sight.state.look));
 
   function look(name) {
     sight.look(name);
@@ -325,7 +265,6 @@ const scene = (() => {
     draw();
   }
 
-  // The joint, or the part of the body, under a finger.
   function jointAt(x, y) {
     let best = null, least = FINGER;
     places.forEach((place, joint) => {
@@ -341,30 +280,21 @@ const scene = (() => {
     soon();
   }
 
-  // The segment under a finger that can be turned, by its number among the flips.
-  function segmentAt(x, y) {
-    let best = null, least = FINGER;
-    for (const [number, { joints }] of page.frame().family ? DATA.flips.segments.entries() : []) {
-      const [a, b] = joints.map((some) => mean(chosenNow ?? [], some)).map((point) => point && sight.project(point));
-      if (!a || !b) continue;
-      const along = [b[0] - a[0], b[1] - a[1]], part = ((x - a[0]) * along[0] + (y - a[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2 || 1);
-      const t = Math.min(Math.max(part, 0), 1), away = Math.hypot(x - a[0] - t * along[0], y - a[1] - t * along[1]);
-      if (away < least) [best, least] = [number, away];
-    }
-    return best;
+  function tell(joint, x, y) {
+    const tip = document.getElementById("tip");
+    tip.hidden = joint === null;
+    if (joint === null) return;
+    tip.replaceChildren(...page.about(joint).map((line, k) => page.tools.element(k ? "div" : "strong", line)));
+    tip.style.left = `${Math.max(4, Math.min(x + 14, sight.size().width - tip.offsetWidth - 8))}px`;
+    tip.style.top = `${Math.max(4, y - tip.offsetHeight - 8)}px`;
   }
 
   const fingers = new Map();
-  let apart = 0, moved = 0;
+  let apart = 0;
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
     apart = 0;
-    moved = fingers.size > 1 || event.button ? Infinity : 0;
-  });
-  canvas.addEventListener("pointerup", (event) => {
-    const at = moved < CLICK ? segmentAt(event.offsetX, event.offsetY) : null;
-    if (at !== null) hand.click(at);
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
   canvas.addEventListener("pointermove", (event) => {
@@ -373,7 +303,6 @@ const scene = (() => {
     tell(null);
     fingers.set(event.pointerId, now);
     const [x, y] = [now[0] - before[0], now[1] - before[1]];
-    moved += Math.hypot(x, y);
     if (fingers.size > 1) {
       const [p, q] = [...fingers.values()], wide = Math.hypot(p[0] - q[0], p[1] - q[1]);
       if (apart) turned(() => sight.zoom(apart / Math.max(wide, 1)));
@@ -399,36 +328,23 @@ const scene = (() => {
     turned(moves[event.key]);
   });
 
-  function tell(joint, x, y) {
-    const tip = document.getElementById("tip");
-    tip.hidden = joint === null;
-    if (joint === null) return;
-    tip.replaceChildren(...page.about(joint).map((line, k) => {
-      const made = document.createElement(k ? "div" : "strong");
-      made.textContent = line;
-      return made;
-    }));
-    tip.style.left = `${Math.max(4, Math.min(x + 14, sight.size().width - tip.offsetWidth - 8))}px`;
-    tip.style.top = `${Math.max(4, y - tip.offsetHeight - 8)}px`;
-  }
-
   for (const button of document.querySelectorAll("#looks button")) button.onclick = () => look(button.dataset.look);
   for (const box of document.querySelectorAll("#shown input")) box.onchange = () => show(box.dataset.show, box.checked);
-  new ResizeObserver(() => {
-    if (sight.state.look) sight.look(sight.state.look);
-    draw();
-  }).observe(canvas);
-  page.onChange(soon);
+  document.querySelector("[data-show=others]").checked = people;
+  if (FIGURED) {
+    sight.look("free");
+    press();
+    new ResizeObserver(() => {
+      if (sight.state.look) sight.look(sight.state.look);
+      draw();
+    }).observe(canvas);
+    page.onChange(soon);
+  }
 
   return {
     look, show, draw, pictures: 0,
+    // Where the joints of the drawn posture are in the picture, pixels; for tests and for the console.
+    places: () => { draw(); return places.slice(0, DATA.joints).map((place) => place && place.slice(0, 2)); },
     points: () => chosen(),
-    // What is drawn now, metres, and where in the picture, from -1 to 1; for tests and for the console.
-    drawn: () => { const all = chosen(); return Array.from({ length: DATA.joints }, (_, k) => all?.[k] ?? null); },
-    projected: () => { draw(); const { width, height } = sight.size(); return places.slice(0, DATA.joints).map((place) => place && [(2 * place[0]) / width - 1, 1 - (2 * place[1]) / height]); },
-    layers: () => { draw(); return drawnLayers; },
-    regions: () => { draw(); return boxes; },
   };
 })();
-scene.look("free");
-

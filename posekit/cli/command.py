@@ -1,0 +1,292 @@
+"""What the commands share: options made from settings, panels in the help, suggestions, and one-line messages."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from posekit.errors import InputError, one_line, refusal, shown
+from posekit.settings import Settings
+
+#: Parameters that name what a command writes.
+OUTPUTS: Final = frozenset({"output", "keep", "repair"})
+
+#: Words of other programs, and of earlier versions, for options.
+ALIASES: Final = {
+    "--fps": "--rate",
+    "--skeleton": "--layout",
+    "--format": "--layout",
+    "--unit-of-length": "--unit",
+    "--robot": "--urdf",
+    "--model": "--urdf",
+    "--height": "--stature",
+    "--out": "--output",
+    "--noise-px": "--deviation",
+    "--check": "--checks",
+}
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print lines without control characters: names in files may hold escapes and line ends."""
+    click.echo("\n".join(one_line(line) for line in text.split("\n")), err=err)
+
+
+class Command(click.Command):
+    """A command whose help shows its options in panels, and whose unknown options get a suggestion."""
+
+    def __init__(self, *args: Any, examples: Sequence[str] = (), **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.examples = examples
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; an option without its output, or an output that is an input, is refused."""
+        try:
+            rest = super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            known = [name for option in self.params for name in option.opts if name.startswith("--")]
+            near = next(iter(difflib.get_close_matches(error.option_name, [*known, *ALIASES], n=1)), "")
+            near = ALIASES.get(near, near)
+            hint = f"did you mean {near}?" if near else f"see posekit {self.name} --help"
+            raise refusal(
+                "", error.option_name, "an unknown option", f"an option of {self.name}", hint
+            ) from None
+        _refuse_overwriting(ctx.params)
+        return rest
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options panel by panel."""
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.params:
+            record = parameter.get_help_record(ctx)
+            if isinstance(parameter, click.Option) and record is not None:
+                panels.setdefault(getattr(parameter, "panel", "Options"), []).append(record)
+        for title, records in panels.items():
+            with formatter.section(title):
+                formatter.write_dl(records)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples as they are typed."""
+        if self.examples:
+            with formatter.section("Examples"):
+                formatter.write("".join(f"  {line}\n" for line in self.examples))
+
+
+class Option(click.Option):
+    """An option in a panel of the help."""
+
+    def __init__(self, *args: Any, panel: str = "Options", **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.panel = panel
+
+
+def command(name: str, *examples: str) -> Callable[[Callable[..., Any]], click.Command]:
+    """Make a function the command `name`, with examples at the end of its help."""
+    return click.command(name, cls=Command, examples=examples)
+
+
+def option(*names: str, panel: str = "Options", **kwargs: Any) -> Callable[[Any], Any]:
+    """Declare an option of a panel."""
+    return click.option(*names, cls=Option, panel=panel, **kwargs)
+
+
+def output(
+    metavar: str, help: str, *, required: bool = True
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare ``-o``."""
+    return option(
+        "-o", "--output", metavar=metavar, help=help, required=required, type=click.Path(path_type=Path)
+    )
+
+
+def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Join decorators; the first is listed first in the help."""
+
+    def joined(function: Any) -> Any:
+        for one in reversed(decorators):
+            function = one(function)
+        return function
+
+    return joined
+
+
+#: Options of everything that reads a file, by the names of `posekit.open`.
+READING: Final = ("layout", "unit", "up", "rate", "urdf")
+
+
+def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare the options by which a file is read."""
+    panel = "Reading"
+    robot = option(
+        "--urdf",
+        default="",
+        metavar="NAME|FILE",
+        panel=panel,
+        help="Robot whose configurations the file holds.",
+    )
+    return apply(
+        option(
+            "--layout",
+            "--skeleton",
+            "--format",
+            default="",
+            metavar="NAME|FILE.toml",
+            panel=panel,
+            help="Names of the file's joints or columns. Default: recognised.",
+        ),
+        option(
+            "--unit",
+            default=None,
+            metavar="m|cm|mm|in",
+            panel=panel,
+            help="Unit of length. Default: the file's.",
+        ),
+        option(
+            "--up",
+            default=None,
+            metavar="AXIS",
+            panel=panel,
+            help="Axis that points up, as +z. Default: found.",
+        ),
+        option(
+            "--rate",
+            "--fps",
+            default=None,
+            type=click.FloatRange(min=0, min_open=True),
+            metavar="HZ",
+            panel=panel,
+            help="Frames a second where the file has no times.",
+        ),
+        *([robot] if urdf else []),
+    )
+
+
+def settings_options(
+    kind: type[Settings], shown_in_help: Mapping[str, str], panel: str = "Settings"
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare an option for every field of a settings record.
+
+    Parameters
+    ----------
+    kind : type of Settings
+        The record.
+    shown_in_help : mapping of str to str
+        Fields that the help lists, with the metavar of each. The others work as options, too; `posekit settings`
+        lists them.
+    panel : str
+        Panel of the help.
+    """
+    described = descriptions(kind)
+    made: list[Callable[[Any], Any]] = []
+    names = [*shown_in_help, *(one.name for one in fields(kind) if one.name not in shown_in_help)]
+    for name in names:
+        flag = "--" + name.replace("_", "-")
+        hidden = name not in shown_in_help
+        default = next(one.default for one in fields(kind) if one.name == name)
+        switch = isinstance(default, bool) or name == "refine"
+        made.append(
+            option(
+                f"{flag}/--no-{flag[2:]}" if switch else flag,
+                name,
+                default=None,
+                metavar=None if switch else shown_in_help.get(name, "VALUE"),
+                panel=panel,
+                hidden=hidden,
+                help=described.get(name, ""),
+            )
+        )
+    made += [
+        option(
+            "--settings", "settings_file", panel=panel, metavar="FILE.toml", help="Read settings from a file."
+        ),
+        option(
+            "--set",
+            "set_fields",
+            multiple=True,
+            panel=panel,
+            metavar="FIELD=VALUE",
+            help=f"Any other setting; see `posekit settings {kind.__name__.removesuffix('Settings').lower()}`.",
+        ),
+    ]
+    return apply(*made)
+
+
+def descriptions(kind: type[Settings]) -> dict[str, str]:
+    """Return the description of each field, from the numpydoc sections of a record and its bases."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        name = ""
+        for line in (base.__doc__ or "").split("\n"):
+            if line.startswith("    ") and " : " in line and not line.startswith("        "):
+                name = line.strip().partition(" : ")[0]
+                found[name] = ""
+            elif line.startswith("        ") and name:
+                found[name] = f"{found[name]} {line.strip()}".strip()
+    return {one: text.replace("``", "") for one, text in found.items()}
+
+
+def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
+    """Take the settings' options out of a command's parameters and make the record.
+
+    A file is read first, then ``--set``, then the options.
+    """
+    names = [one.name for one in fields(kind)]
+    options = {name: given.pop(name) for name in names if name in given}
+    path, pairs = given.pop("settings_file", None), given.pop("set_fields", ())
+    record = kind.from_toml(path) if path else kind()
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise refusal("", "--set", shown(pair), "FIELD=VALUE", "write it as --set coverage=1")
+        record = record.changed(**{name.strip().replace("-", "_"): _value(text.strip())})
+    try:
+        return record.changed(**{name: value for name, value in options.items() if value is not None})
+    except InputError as error:
+        name, colon, rest = str(error).partition(": ")
+        if name not in names:
+            raise
+        raise InputError(f"--{name.replace('_', '-')}{colon}{rest}") from None
+
+
+def _value(text: str) -> Any:
+    """Read the value of ``--set``: true, false, none, or text, which the record turns into what it needs."""
+    return {"true": True, "false": False, "none": None}.get(text.lower(), text)
+
+
+def _refuse_overwriting(given: Mapping[str, Any]) -> None:
+    """Refuse an output that is also an input or in a folder that is read, and two outputs of one name."""
+    written: list[Path] = []
+    read: list[Path] = []
+    for name, value in given.items():
+        for one in value if isinstance(value, list | tuple) else [value]:
+            if isinstance(one, str | os.PathLike) and str(one):
+                (written if name in OUTPUTS else read).append(Path(one))
+    try:
+        inputs = {path.resolve() for path in read if path.is_file()}
+        folders = {path.resolve() for path in read if path.is_dir()}
+        targets = [path.resolve() for path in written]
+    except (OSError, ValueError) as error:
+        raise InputError(f"{error}; expected the name of a file; correct it") from None
+    for path, target in zip(written, targets, strict=True):
+        if target in inputs or folders & {target, *target.parents} or targets.count(target) > 1:
+            raise refusal(
+                path, "", "an output that is also read or written", "a new name", "choose another name"
+            )
+
+
+def progress(items: Iterable[Any], label: str, length: int | None = None) -> Any:
+    """Return a progress bar over items on a terminal, and the items themselves elsewhere."""
+    if not sys.stderr.isatty():
+        return items
+    return _bar(items, label, length)
+
+
+def _bar(items: Iterable[Any], label: str, length: int | None) -> Iterable[Any]:
+    with click.progressbar(items, label=label, length=length, file=sys.stderr) as bar:
+        yield from bar

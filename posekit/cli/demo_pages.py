@@ -1,0 +1,107 @@
+"""What `posekit demo` writes: samples, a judged motion, recovered views, the papers' rows, and a page that leads on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Any, Final
+
+#: Built-in views that are recovered: the walker of Lee & Chen 1985 before two cameras.
+VIEWS: Final = ("seq1", "seq2")
+
+PAGE: Final = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>posekit demo</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: #222 }}
+h2 {{ margin-top: 2rem }}
+img {{ max-width: 100%; border: 1px solid #ddd }}
+code {{ background: #f3f3f3; padding: 0 .2em }}
+</style>
+<h1>posekit demo</h1>
+{sections}
+</html>
+"""
+
+
+def write_demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
+    """Write the demo and yield one line for each step.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write; made if it is not there.
+    pictures : bool
+        Draw pictures and pages, which need a browser and Pillow.
+
+    Raises
+    ------
+    PosekitError
+        If the folder cannot be written, or no browser is found.
+    """
+    import posekit
+    from posekit.papers import reproduce
+    from posekit.samples import samples
+
+    folder.mkdir(parents=True, exist_ok=True)
+    samples(folder / "samples")
+    yield f"{folder / 'samples'}: files to try every command with"
+
+    jump = folder / "samples" / "jump.bvh"
+    report = posekit.validate(jump)
+    report.save(folder / "jump.json")
+    yield f"jump.bvh: {report.decision}"
+    sections = [
+        _section(
+            "Is this motion good?", report.decision, "posekit validate samples/jump.bvh -o jump.html", []
+        )
+    ]
+    if pictures:
+        posekit.render(report, folder / "jump.html", view=posekit.open(jump))
+        posekit.render(jump, folder / "jump.png", frame=0)
+        sections[0] = _section(
+            "Is this motion good?",
+            report.decision,
+            "posekit validate samples/jump.bvh -o jump.html",
+            ["jump.png", "jump.html", "jump.json"],
+        )
+
+    for name in VIEWS:
+        view = posekit.builtin_view(name)
+        recovery = posekit.recover(view, group=0.05)
+        recovery.save(folder / f"{name}.json")
+        said = f"{len(recovery.survivors)} postures behind {len(recovery)} frames of the view {name}"
+        yield said
+        files = [f"{name}.json"]
+        if pictures:
+            posekit.render(recovery, folder / f"{name}.html", view=view)
+            posekit.render(recovery, folder / f"{name}.png", view=view, frame=1)
+            files = [f"{name}.png", f"{name}.html", *files]
+        sections.append(
+            _section(
+                f"Every posture behind a view: {name}", said, "posekit recover VIEW -o postures.html", files
+            )
+        )
+
+    rows = reproduce("all", folder / "papers", pictures=False)
+    yield rows.counts()
+    sections.append(
+        _section(
+            "The papers, row by row", rows.counts(), "posekit reproduce all -o papers", ["papers/papers.html"]
+        )
+    )
+    (folder / "index.html").write_text(PAGE.format(sections="\n".join(sections)), encoding="utf-8")
+
+
+def _section(title: str, text: str, command: str, files: list[Any]) -> str:
+    pictures = "".join(
+        f'<p><img src="{escape(name)}" alt="{escape(title)}"></p>' for name in files if name.endswith(".png")
+    )
+    links = ", ".join(
+        f'<a href="{escape(name)}">{escape(name)}</a>' for name in files if not name.endswith(".png")
+    )
+    return (
+        f"<h2>{escape(title)}</h2><p>{escape(text)}</p>{pictures}"
+        f"<p>{links}</p><p>The command: <code>{escape(command)}</code></p>"
+    )

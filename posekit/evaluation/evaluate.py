@@ -1,0 +1,348 @@
+"""Quality of one result if the truth is known: errors, retained truth, calibration and regions, frame by frame."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import View
+from posekit.errors import refusal, shown
+from posekit.evaluation.scores import MEASURES, correct_poses_score, posture_errors, reliability
+from posekit.evaluation.truth import truth_of
+from posekit.geometry import Array, Ints, Record, dot, mean_known, unit
+from posekit.motion import Motion
+from posekit.recovery import Recovery
+from posekit.skeleton import PARENTS, TREE_SEGMENTS
+
+if TYPE_CHECKING:
+    import pandas
+
+EVALUATION_SCHEMA: Final = "posekit.evaluation/2"
+
+#: Postures whose errors are measured: the best survivor by each measure, the most probable one, one drawn at random,
+#: the answer, and the first followed path.
+ROLES: Final = ("best", "first", "random", "answer", "path")
+
+#: Mean joint errors of the best survivor within which the truth counts as retained: exact points, noisy points.
+RETAINED_METRES: Final = (0.010, 0.035)
+
+#: Distance within which `Recovery.answer.sure` claims every joint, and depth difference of `nearer`, metres.
+SURE_METRES: Final = 0.05
+
+#: Columns that name a condition, if the frames have any.
+KEYS: Final = ("clip", "yaw", "height", "noise")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Evaluation(Record):
+    """Measurements of F frames, a column each; errors in metres.
+
+    Parameters
+    ----------
+    columns : mapping of str to array (F,)
+        ``frame``, ``time``, ``survivors``; ``{role}_{measure}`` of `ROLES` and `MEASURES`; ``branch`` (1 if a survivor
+        has the near-far code of the truth, NaN if not known); ``probability`` of the first survivor; ``sure`` and
+        ``sure_true`` (whether every joint of the answer is within 5 cm of the truth); ``regions`` (share of joints of
+        the best survivor inside their 95 % radius); ``nearer_true`` (share of segments whose near-far answer is right);
+        ``reason``; and any of `KEYS`.
+    nearer_sure, nearer_true : array (F, 13)
+        Stated probability of each segment's near-far answer, and whether it is right; NaN if not known.
+    settings : mapping
+        Everything that decided the numbers.
+
+    Examples
+    --------
+    >>> import posekit
+    >>> from posekit.evaluation import evaluate
+    >>> view = posekit.builtin_view("seq1")
+    >>> found = evaluate(posekit.recover(view), view.truth)
+    >>> found.summary()["retained"]["10 mm"]
+    1.0
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    nearer_sure: Array
+    nearer_true: Array
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.columns["frame"])
+
+    def with_keys(self, **keys: Any) -> Evaluation:
+        """Return the evaluation with constant columns, such as the level of noise."""
+        columns = {name: np.full(len(self), value) for name, value in keys.items()} | dict(self.columns)
+        return replace(self, columns=columns)
+
+    @staticmethod
+    def joined(parts: Sequence[Evaluation], settings: Mapping[str, Any]) -> Evaluation:
+        """Put evaluations with the same columns one after another."""
+        return Evaluation(
+            columns={name: np.concatenate([one.columns[name] for one in parts]) for name in parts[0].columns},
+            nearer_sure=np.concatenate([one.nearer_sure for one in parts]),
+            nearer_true=np.concatenate([one.nearer_true for one in parts]),
+            settings=settings,
+        )
+
+    def conditions(self, keys: Sequence[str]) -> Iterator[tuple[dict[str, Any], Ints]]:
+        """Yield each combination of some key columns, and its rows."""
+        values = list(zip(*(self.columns[key].tolist() for key in keys), strict=True)) or [()] * len(self)
+        for one in sorted(set(values)):
+            rows = np.flatnonzero([each == one for each in values])
+            yield dict(zip(keys, one, strict=True)), rows
+
+    def summary(self, rows: Ints | None = None) -> dict[str, Any]:
+        """Return the numbers of some frames, all by default: shares from 0 to 1, errors in millimetres.
+
+        Shares count all frames, those without survivors included. Errors are means, medians and 95th percentiles over
+        frames that have survivors.
+        """
+        chosen = np.arange(len(self)) if rows is None else rows
+        table = {name: values[chosen] for name, values in self.columns.items()}
+        survivors, best = table["survivors"], table["best_mpjpe"]
+        roles = [role for role in ROLES if np.isfinite(table[f"{role}_mpjpe"]).any()]
+        near = np.where(np.isfinite(table["first_mpjpe"]), table["first_mpjpe"] <= RETAINED_METRES[1], np.nan)
+        stated = {
+            "first within 35 mm": (table["probability"], near),
+            "sure": (table["sure"], table["sure_true"]),
+            "nearer": (self.nearer_sure[chosen].ravel(), self.nearer_true[chosen].ravel()),
+        }
+        return {
+            "frames": len(chosen),
+            "without_survivor": int((survivors == 0).sum()),
+            "retained": {f"{1000 * most:g} mm": float((best <= most).mean()) for most in RETAINED_METRES}
+            | {"branch": _mean(table["branch"])},
+            "survivors": {"median": float(np.median(survivors)), "p95": float(np.quantile(survivors, 0.95))},
+            "error_mm": {
+                role: {
+                    measure: _spread(1000 * table[f"{role}_{measure}"])
+                    for measure in MEASURES
+                    if np.isfinite(table[f"{role}_{measure}"]).any()
+                }
+                for role in roles
+            },
+            "cps_mm": {role: correct_poses_score(table[f"{role}_worst_pa"]) for role in roles},
+            "regions": _mean(table["regions"]),
+            "nearer_true": _mean(table["nearer_true"]),
+            "calibration": {name: reliability(*pair) for name, pair in stated.items()},
+        }
+
+    def table(self) -> str:
+        """Return a short table in Markdown: a line for each level of noise and each clip."""
+        head = "|frames|empty|within 10 mm|within 35 mm|N|PA best|PA first|PA answer".split("|")
+        head += ["MPJPE answer", "sure, ECE", "in 95 % regions"]
+        rows = []
+        keys = [key for key in ("noise", "clip") if key in self.columns]
+        for key in keys or [""]:
+            for named, chosen in self.conditions([key] if key else []):
+                label = ", ".join(f"{v:g} px" if name == "noise" else str(v) for name, v in named.items())
+                rows.append([label or "all", *_cells(self.summary(chosen))])
+        return "\n".join([_line(head), _line(["---"] * len(head)), *map(_line, rows)])
+
+    def document(self) -> dict[str, Any]:
+        """Return the JSON document: settings, the summary of all frames and of each condition, and every frame."""
+        keys = [key for key in KEYS if key in self.columns]
+        conditions = [{**name, **self.summary(rows)} for one in keys for name, rows in self.conditions([one])]
+        rows = zip(*(values.tolist() for values in self.columns.values()), strict=True)
+        frames = [dict(zip(self.columns, row, strict=True)) for row in rows]
+        head = {"schema": EVALUATION_SCHEMA, "settings": dict(self.settings), "all": self.summary()}
+        return {**head, "conditions": conditions, "frames": frames}
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write ``.json`` (everything), ``.csv`` (a row a frame, errors in metres) or ``.md`` (the table).
+
+        Raises
+        ------
+        InputError
+            If the name ends otherwise, or the file cannot be written.
+        """
+        from posekit.formats.files import write_bytes
+        from posekit.formats.result_file import plain
+        from posekit.formats.tables import csv_text
+
+        target = Path(path)
+        if target.suffix == ".json":
+            text = json.dumps(plain(self.document()), indent=1)
+        elif target.suffix == ".md":
+            text = self.table()
+        elif target.suffix == ".csv":
+            text = csv_text(dict(self.columns)).rstrip()
+        else:
+            raise refusal(target, "", shown(target.suffix), "a name in .json, .csv or .md", "rename it")
+        write_bytes(target, f"{text}\n".encode())
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the columns as a table."""
+        import pandas
+
+        return pandas.DataFrame(dict(self.columns))
+
+
+def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -> Evaluation:
+    """Compare every frame of a result with the truth.
+
+    Parameters
+    ----------
+    result : Recovery
+        A result of F frames.
+    truth : array (F, 14, 3), View or Motion
+        True joints, camera frame, metres, NaN if not known; a view with truth; or motion capture of the same seconds
+        (`truth_of`). Joints that the image does not show are left out.
+    seed : int
+        Seed of the survivor that is drawn at random.
+
+    Raises
+    ------
+    InputError
+        If the truth is of other frames, or none is known.
+    """
+    count, rng = len(result), np.random.default_rng(seed)
+    truth, note = truth_of(result, truth)
+    found = result.survivors
+    frame = np.asarray(found.frame)
+    true = np.where(np.asarray(found.inferred)[..., None], np.nan, truth[frame])
+    errors = _errors(result, found.joints, true)
+    measured = {role: np.full((count, len(MEASURES)), np.nan) for role in ROLES}
+    nearest, probability = np.full(count, -1), np.full(count, np.nan)
+    survivors = np.bincount(frame, minlength=count)
+    for k in np.flatnonzero(survivors).tolist():
+        own = result.rows(k)
+        measured["best"][k] = np.fmin.reduce(errors[own], axis=0)
+        measured["first"][k] = errors[own.start]
+        measured["random"][k] = errors[own.start + rng.integers(survivors[k])]
+        probability[k] = np.asarray(found.probability)[own.start]
+        if np.isfinite(errors[own, 0]).any():
+            nearest[k] = own.start + np.nanargmin(errors[own, 0])
+    measured["answer"] = _errors(result, result.answer.joints, truth)
+    if result.path is not None and len(result.path):
+        measured["path"] = _errors(result, result.path.joints[0], truth)
+    nearer_sure, nearer_true = _nearer(result, truth)
+    columns: dict[str, NDArray[Any]] = {
+        "frame": np.arange(count),
+        "time": np.asarray(result.frames.time),
+        "survivors": survivors,
+        **{f"{role}_{measure}": measured[role][:, k] for role in ROLES for k, measure in enumerate(MEASURES)},
+        "branch": _branch_retained(result, truth),
+        "probability": probability,
+        "sure": np.asarray(result.answer.sure, dtype=np.float64),
+        "sure_true": _sure_true(result, truth),
+        "regions": _regions(result, truth, nearest),
+        "nearer_true": mean_known(nearer_true),
+        "reason": np.array(result.frames.reason, dtype=object),
+    }
+    settings = {**result.settings, **({"truth": note} if note else {})}
+    return Evaluation(columns=columns, nearer_sure=nearer_sure, nearer_true=nearer_true, settings=settings)
+
+
+def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
+    """Return `posture_errors`; a scaled orthographic camera gives no place in space, so joints are centred first."""
+    errors = posture_errors(joints, truth)
+    if result.camera.get("model") == "scaled-orthographic":
+        errors[:, MEASURES.index("mpjpe")] = errors[:, MEASURES.index("centred")]
+        errors[:, MEASURES.index("worst")] = np.nan
+    return errors
+
+
+def true_branch(truth: Array) -> list[str]:
+    """Return the near-far code of true postures (N, 14, 3), camera frame of a perspective camera.
+
+    A joint is the far one (``1``) of the two ends of its segment if it lies beyond the foot of the perpendicular from
+    its parent on its own ray. The code is empty if a joint is not known.
+    """
+    rays = unit(truth)
+    far = dot(truth[:, 1:] - truth[:, PARENTS[1:]], rays[:, 1:]) > 0
+    known = np.asarray(np.isfinite(truth).all(axis=(1, 2)))
+    return ["".join("01"[int(bit)] for bit in row) if ok else "" for row, ok in zip(far, known, strict=True)]
+
+
+def _branch_retained(result: Recovery, truth: Array) -> Array:
+    """Return whether a survivor has the truth's code (F,): NaN unless the frame was judged as exact."""
+    codes = np.asarray(result.survivors.branch)
+    exact = np.array([bool(levels) for levels in result.frames.levels], dtype=bool)
+    if not exact.any() or result.camera.get("model") == "scaled-orthographic":
+        return np.full(len(result), np.nan)
+    found = np.full(len(result), np.nan)
+    for k, code in enumerate(true_branch(truth)):
+        if code and exact[k]:
+            found[k] = (codes[result.rows(k)] == code).any()
+    return found
+
+
+def _sure_true(result: Recovery, truth: Array) -> Array:
+    """Return whether every joint of the answer is where `sure` claims it (F,): NaN if not known."""
+    away = result.answer.joints - truth
+    relative = np.array(["relative" in of for of in result.answer.sure_of], dtype=bool)
+    away[relative] -= away[relative, :1]
+    distance = np.linalg.norm(away, axis=-1)
+    known = np.isfinite(distance)
+    inside = (np.where(known, distance, 0.0) <= SURE_METRES).all(axis=1)
+    return np.where(known.any(axis=1), inside, np.nan)
+
+
+def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
+    """Return the share of joints of the nearest survivor inside their 95 % radius (F,): NaN without a region."""
+    found = np.full(len(result), np.nan)
+    chosen = np.flatnonzero(nearest >= 0)
+    joints = result.survivors.joints[nearest[chosen]]
+    radius = np.asarray(result.survivors.radius)[nearest[chosen]]
+    away = joints - truth[chosen]
+    if result.camera.get("model") == "scaled-orthographic":  # the camera gives no place in space
+        away -= np.nanmean(away, axis=1, keepdims=True)
+    distance = np.linalg.norm(away, axis=-1)
+    inside = np.where(np.isfinite(distance) & (radius > 0), distance <= radius, np.nan)
+    found[chosen] = mean_known(inside)
+    return found
+
+
+def _nearer(result: Recovery, truth: Array) -> tuple[Array, Array]:
+    """Return the stated probability (F, 13) of each segment's near-far answer, and whether it is right."""
+    start, end = np.array(TREE_SEGMENTS).T
+    deeper = truth[:, end, 2] - truth[:, start, 2]
+    true = np.where(deeper > SURE_METRES, -1, np.where(deeper < -SURE_METRES, 1, 0))
+    sure = np.asarray(result.answer.nearer_sure, dtype=np.float64)
+    known = np.isfinite(deeper) & np.isfinite(sure)
+    right = np.where(known, np.asarray(result.answer.nearer) == true, np.nan)
+    return sure, right
+
+
+def _mean(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
+def _spread(values: Array) -> dict[str, float]:
+    known = values[np.isfinite(values)]
+    median, most = np.quantile(known, (0.5, 0.95))
+    return {"mean": float(known.mean()), "median": float(median), "p95": float(most)}
+
+
+def _cells(found: Mapping[str, Any]) -> list[str]:
+    """Write the cells of a line of the table."""
+    errors = found["error_mm"]
+    pa = [errors.get(role, {}).get("pa", {}).get("median") for role in ("best", "first", "answer")]
+    sure = found["calibration"]["sure"]
+    return [
+        str(found["frames"]),
+        f"{found['without_survivor'] / found['frames']:.1%}",
+        *(f"{found['retained'][key]:.1%}" for key in ("10 mm", "35 mm")),
+        f"{found['survivors']['median']:g}",
+        *(_short(value) for value in pa),
+        _short(errors.get("answer", {}).get("mpjpe", {}).get("median")),
+        "-" if sure is None else f"{sure['ece']:.2f}",
+        "-" if found["regions"] is None else f"{found['regions']:.1%}",
+    ]
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}" if abs(value) < 10 else f"{value:.0f}"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

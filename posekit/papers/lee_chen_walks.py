@@ -1,0 +1,380 @@
+r"""Lee & Chen 1985: the tree (§3.1) and Tables 3 and 4 with §4, over the open settings of the walker.
+
+The paper prints neither the walker's speed nor its lean nor the phase of frame 1. The survivors are counted over a grid
+of settings; a printed count is compared with the setting closest to all cells, and with the spread over all settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import load_figure
+from posekit.cameras import LeeChenCamera, View
+from posekit.cameras.head import TABLE_A2, calibrate
+from posekit.geometry import Array
+from posekit.papers.lee_chen_camera import F
+from posekit.papers.lee_chen_constraints import body_of
+from posekit.papers.rows import Row, printed, row
+from posekit.settings import Tolerance
+from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENT_NAMES, SIDES
+from posekit.synthesis import Walker, builtin_view, random_postures, walker_view
+from posekit.synthesis.views import PAPER_STEP, SEQUENCES
+from posekit.tree import Trees, grow
+from posekit.validators.check import Check, Judgement
+from posekit.validators.collision import Collision
+from posekit.validators.joint_range import JointRange
+from posekit.validators.rigid_parts import RigidParts
+from posekit.validators.walking import WalkingRules
+
+#: Settings of the walker: speeds (leg lengths/s) of mid gait, additional leans (degrees) as large as the gait's own,
+#: and the number of phases of frame 1.
+GRIDS: Final = {
+    "quick": (np.linspace(0.5, 1.3, 5), np.linspace(-4.0, 4.0, 5), 20),
+    "fine": (np.linspace(0.5, 1.3, 9), np.linspace(-4.0, 4.0, 9), 100),
+}
+
+#: Allowed error of distances inside the torso. The paper compares them and prints no number; with 1 cm, near-frontal
+#: torsos stay ambiguous, as they do in the paper.
+RIGID_METRES: Final = 0.01
+
+TANGENT_METRES: Final = 0.001
+#: Distance by which a segment may be too short for its image, in the tables and in the comparison of the shoulders.
+LOOSE_TANGENT_METRES: Final = 0.01
+
+#: Distance of every joint from its group's representative (§3.4); not printed.
+GROUP_METRES: Final = 0.05
+
+#: Distance of every joint within which a survivor is the input.
+SAME_METRES: Final = 1e-6
+
+#: Distance of a body whose segments are all within reach from every wrong start.
+FAR_METRES: Final = 1e5
+
+#: Percentiles of all settings between which a printed count is usual.
+PERCENTILES: Final = (5.0, 95.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walks:
+    """One sequence at S settings of the walker, counted as the paper counts it.
+
+    Parameters
+    ----------
+    name : str
+        ``seq1`` or ``seq2``.
+    settings : array (S, 3)
+        Velocity (leg lengths/s), lean (degrees), phase of frame 1 (cycles).
+    levels : int array (S, 2, 3, 14)
+        Survivors after the physical checks, and after Rules 1 and 2 too; by frame 1, 3, 5 and level.
+    final : int array (S, 2)
+        Groups of frame 1 after Rules 1-2, and after Rules 1-5.
+    truth : bool array (S,)
+        Whether the input survives Rules 1-5.
+    """
+
+    name: str
+    settings: Array
+    levels: NDArray[np.int64]
+    final: NDArray[np.int64]
+    truth: NDArray[np.bool_]
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """All counts that the paper prints of the sequence (S, 86)."""
+        return np.concatenate([self.levels.reshape(len(self.levels), -1), self.final], axis=1)
+
+    @property
+    def theirs(self) -> NDArray[np.int64]:
+        """The printed counts (86,)."""
+        given = printed()["lee_chen"]
+        tables = [np.ravel(given[kind][self.name]) for kind in ("physical", "motion")]
+        return np.concatenate([*tables, given["final"][self.name][1:]])
+
+    @property
+    def distance(self) -> Array:
+        """Distance of each setting from the print (S,): sum of |log2(here / print)| over all cells."""
+        # A count of zero is replaced by half a survivor: its logarithm must be finite.
+        return np.asarray(np.abs(np.log2(np.maximum(self.cells, 0.5) / self.theirs)).sum(axis=1))
+
+
+def walk_rows(effort: str = "quick") -> Iterator[Row]:
+    """Yield the rows of the tree and of §4; ``fine`` effort counts over 18 times as many settings."""
+    walks = [count_walks(name, effort) for name in SEQUENCES]
+    chosen = closest(effort)
+    setting = walks[0].settings[chosen]
+    yield from _tree_rows(setting)
+    yield _shoulders_row(sequence("seq2", setting))
+    for one in walks:
+        yield from _table_rows(one, chosen)
+    yield from _remark_rows(walks, chosen, effort)
+    for one in walks:
+        yield _deciding_row(one.name, setting)
+
+
+def closest(effort: str = "quick") -> int:
+    """Return the row of the setting at which all printed cells of both sequences together are closest to ours."""
+    return int(np.argmin(np.sum([count_walks(name, effort).distance for name in SEQUENCES], axis=0)))
+
+
+@cache
+def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRES) -> Walks:
+    """Count a sequence at all settings of a grid.
+
+    Parameters
+    ----------
+    name : {"seq1", "seq2"}
+        The sequence, by its camera.
+    effort : {"quick", "fine"}
+        Key of `GRIDS`.
+    tangent : float
+        Distance by which a segment may be too short for its image, metres.
+    """
+    velocities, leans, phases = GRIDS[effort]
+    parts = [_counted(name, v, lean, phases, tangent) for v, lean in product(velocities, leans)]
+    settings, levels, final, truth = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Walks(name=name, settings=settings, levels=levels, final=final, truth=truth)
+
+
+def _counted(
+    name: str, velocity: float, lean: float, phases: int, tangent: float
+) -> tuple[NDArray[Any], ...]:
+    """Return settings, levels, final counts and whether the truth survives, for all phases of one walker."""
+    walker = Walker(velocity=velocity, lean=float(np.radians(lean)))
+    cycle = walker.cycle_duration
+    levels = np.zeros((phases, 2, 3, len(JOINTS)), dtype=np.int64)
+    final, truth = np.zeros((phases, 2), dtype=np.int64), np.zeros(phases, dtype=bool)
+    for k, frame in enumerate(printed()["lee_chen"]["frames"]):
+        # One view holds frame `frame` of the sequences of all phases.
+        start = (frame - 1) * PAPER_STEP / cycle
+        view = walker_view(walker, camera=SEQUENCES[name][0], frames=phases, dt=cycle / phases, phase0=start)
+        trees, head = grown(view, tangent)
+        kept = allowed(trees, head, (1, 2))
+        levels[:, 0, k] = _levels(trees.frame, trees.code, phases)
+        levels[:, 1, k] = _levels(trees.frame[kept], trees.code[kept], phases)
+        if frame == 1:
+            left = kept & allowed(trees, head, (3, 4, 5))
+            away = np.linalg.norm(trees.joints - view.truth[trees.frame], axis=-1).max(axis=1)
+            for phase in range(phases):
+                own = trees.frame == phase
+                final[phase] = [len(representatives(trees.joints[own & some])) for some in (kept, left)]
+                truth[phase] = (away[own & left] < SAME_METRES).any()
+    settings = np.array([(velocity, lean, phase / phases) for phase in range(phases)])
+    return settings, levels, final, truth
+
+
+def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -> tuple[Trees, Array]:
+    """Grow the trees of a walker's view as the paper does; return them, and the head points (F, 5, 3).
+
+    Torsos are compared by their distances alone, which do not distinguish them from their mirror images, and angles are
+    those of `table1-printed`.
+    """
+    image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
+    pose = calibrate(TABLE_A2, image)
+    trees = grow(
+        LeeChenCamera(f=pose.f),
+        view.image,
+        pose.points_cam[:, 0],
+        np.array([load_figure().lengths[name] for name in SEGMENT_NAMES]),
+        physical_checks() if pruned else [],
+        judge=_judged,
+        head=pose.points_cam[:, 1:],
+        tolerance=tangent,
+    )
+    return trees, pose.points_cam[:, 1:]
+
+
+@cache
+def physical_checks() -> Sequence[Check]:
+    """Return the checks of §3.2 in the parts that the tree can ask early."""
+    distances = [RigidParts(segments=(segment,), torso=False) for segment in RIGID_SEGMENTS]
+    return [*distances, *JointRange().parts(), *Collision().parts()]
+
+
+def _judged(check: Check, points: Array) -> Judgement:
+    tolerance = Tolerance(rigid=RIGID_METRES, tangent=TANGENT_METRES)
+    return check.judge(body_of(points, tolerance, ranges="table1-printed", walkers="paper-printed"))
+
+
+def allowed(trees: Trees, head: Array, rules: Sequence[int]) -> NDArray[np.bool_]:
+    """Return which survivors (N,) the rules of §3.3 allow, by the thresholds of `paper-printed`."""
+    points = np.concatenate([trees.joints, head[trees.frame]], axis=1)
+    return np.asarray(~_judged(WalkingRules(rules=tuple(rules)), points).violated.any(axis=1))
+
+
+def _levels(frame: NDArray[np.intp], code: NDArray[np.intp], count: int) -> NDArray[np.int64]:
+    """Return the number of distinct prefixes (F, 14) of the codes of each frame, up to each level."""
+    depth = len(JOINTS) - 1
+    columns = [np.unique(frame << depth | code >> (depth - level)) >> depth for level in range(depth + 1)]
+    return np.stack([np.bincount(each, minlength=count) for each in columns], axis=1)
+
+
+def representatives(joints: Array) -> list[int]:
+    """Return representatives of postures (N, 14, 3): each posture is near one of them in every joint (§3.4)."""
+    left, found = np.arange(len(joints)), []
+    while len(left):
+        found.append(int(left[0]))
+        left = left[np.linalg.norm(joints[left] - joints[left[0]], axis=-1).max(axis=1) > GROUP_METRES]
+    return found
+
+
+def sequence(name: str, setting: Array) -> View:
+    """Return the five frames of a sequence at one setting of the walker."""
+    velocity, lean, phase = setting.tolist()
+    walker = Walker(velocity=velocity, lean=float(np.radians(lean)))
+    return walker_view(walker, camera=SEQUENCES[name][0], phase0=phase)
+
+
+def _tree_rows(setting: Array) -> Iterator[Row]:
+    yield row("leaves", f"2^13 = {2**13}", False)
+    view = builtin_view("seq1").take([0])
+    trees, _ = grown(view, pruned=False)
+    truth, worst = view.truth[0], 0.0
+    rays = truth / truth[:, 2:]
+    for joint in range(1, len(JOINTS)):
+        ray, length = rays[joint], np.linalg.norm(truth[joint] - truth[PARENTS[joint]])
+        for parent, end in np.unique(trees.joints[:, [PARENTS[joint], joint]], axis=0):
+            roots = np.roots([ray @ ray, -2 * ray @ parent, parent @ parent - length**2]).real
+            worst = max(worst, float(np.abs(np.outer(roots, ray) - end).max(axis=1).min()))
+    yield row("spheres", f"{worst:.0e} m off at most", worst < SAME_METRES, n=len(trees.frame))
+    figure = load_figure()
+    points = figure.forward_kinematics(random_postures(figure, 1, np.random.default_rng(1985), "urdf"))
+    far = points[:, : len(JOINTS)] + [0.0, 0.0, FAR_METRES]
+    lengths = np.array([figure.lengths[name] for name in SEGMENT_NAMES])
+    camera = LeeChenCamera(f=F)
+    count = len(grow(camera, camera.project(far), far[:, 0], lengths, []).frame)
+    yield row("paths", f"{count} leaves at level 13", count == 2**13, far=FAR_METRES / 1000)
+    first = sequence("seq1", setting).take([0])
+    (pruned, _), (whole, head) = grown(first), grown(first, pruned=False)
+    every = np.concatenate([whole.joints, head[whole.frame]], axis=1)
+    broken = [_judged(check, every).violated.any(axis=1) for check in physical_checks()]
+    kept = ~np.any(broken, axis=0)
+    ours, brute = (
+        " ".join(map(str, _levels(frame, code, 1)[0]))
+        for frame, code in ((pruned.frame, pruned.code), (whole.frame[kept], whole.code[kept]))
+    )
+    yield row("pruning", f"{ours} nodes a level", ours == brute, n=len(kept), found=brute)
+
+
+def _shoulders_row(view: View) -> Row:
+    """Measure the distance between all pairs of shoulders of SEQ2's frame 1."""
+    truth, lengths = view.truth[0], printed()["lee_chen"]["lengths"]
+    places = []
+    for joint in (1, 2):
+        ray, length = truth[joint] / truth[joint, 2], lengths[f"neck-{JOINTS[joint]}"] / 100
+        roots = np.roots([ray @ ray, -2 * ray @ truth[0], truth[0] @ truth[0] - length**2]).real
+        places.append([root * ray for root in roots])
+    pairs = np.array(list(product(*places)))
+    apart = np.linalg.norm(pairs[:, 0] - pairs[:, 1], axis=1)
+    kept = pairs[np.abs(apart - lengths["right_shoulder-left_shoulder"] / 100) < RIGID_METRES]
+    true = bool((np.abs(kept - truth[1:3]).max(axis=(1, 2), initial=0) < SAME_METRES).any())
+    here = f"{len(kept)} of {len(pairs)} have it, {'the input' if true else 'not the input'} among them"
+    return row("shoulders", here, true and len(kept) < len(pairs), within=100 * RIGID_METRES)
+
+
+def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
+    """Yield a row for each level of a table, and for each step of §4.2."""
+    name, columns = walks.name.upper(), np.arange(2 * 3 * len(JOINTS)).reshape(6, -1)
+    table = f"Table {'3' if walks.name == 'seq1' else '4'} ({name})"
+    for level, joint in enumerate(JOINTS):
+        key = f"level-{walks.name}-shoulders" if level in (1, 2) else "level"
+        place = {"table": table, "level": level, "joint": joint.replace("_", " ")}
+        yield _count_row(key, walks, chosen, columns[:, level], place)
+    for step, column in (
+        ("Rules 1-2", columns[3, -1]),
+        ("grouped (Figs. 6 to 8)", columns.size),
+        ("Rules 3-5", columns.size + 1),
+    ):
+        yield _count_row("final", walks, chosen, np.array([column]), {"sequence": name, "step": step})
+
+
+def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], place: dict[str, Any]) -> Row:
+    """Put counts at the closest setting beside the print; a print that is rare among all settings differs."""
+    theirs, cells = walks.theirs[columns], walks.cells[:, columns]
+    ours = cells[chosen]
+    low, high = np.percentile(cells, PERCENTILES, axis=0, method="inverted_cdf")
+    usual = bool(((low <= theirs) & (theirs <= high)).all())
+    return row(
+        key,
+        _in_columns(ours.tolist()),
+        bool((ours == theirs).all()) or None if usual else False,
+        counts=_in_columns(theirs.tolist()),
+        below=_in_columns([f"{share:.0%}" for share in (cells < theirs).mean(axis=0)]),
+        equal=_in_columns([f"{share:.0%}" for share in (cells == theirs).mean(axis=0)]),
+        **place,
+    )
+
+
+def _in_columns(values: Sequence[Any]) -> str:
+    """Write frames 1, 3, 5 after the physical constraints; then after Rules 1 and 2."""
+    half = len(values) // 2
+    return "; ".join(" / ".join(map(str, part)) for part in (values[:half], values[half:]) if len(part))
+
+
+def _remark_rows(walks: Sequence[Walks], chosen: int, effort: str) -> Iterator[Row]:
+    """Compare the remarks of §4.1.B and §4.2 with all settings."""
+    pelvis, left, wrist = JOINT["pelvis"], JOINT["left_shoulder"], JOINT["right_wrist"]
+    given = printed()["lee_chen"]
+    for one in walks:
+        alone = one.levels[:, 0, :, pelvis] == one.levels[:, 0, :, left]
+        table = np.array(given["physical"][one.name])
+        theirs = (table[:, pelvis] == table[:, left]).mean()
+        here = f"in {alone.mean():.0%} of the frames of all settings"
+        yield row("pelvis", here, bool(alone.all()), sequence=one.name.upper(), theirs=theirs)
+    torsos = [float(one.levels[:, 0, :, pelvis].mean()) for one in walks]
+    yield row(
+        "torsos", f"{torsos[1]:.2f} torsos are left in SEQ2, {torsos[0]:.2f} in SEQ1", torsos[1] < torsos[0]
+    )
+    nodes = walks[0].levels[:, 0, 0]
+    part = nodes[:, wrist] / np.maximum(nodes[:, wrist - 1], 1)
+    share = ((part > 1) & (part < 2)).mean()
+    yield row("wrist", f"between one and two times in {share:.0%} of the settings", None)
+    for name, joint in (("elbows", JOINT["right_elbow"]), ("knees", JOINT["right_knee"])):
+        same = [(one.levels[:, 1, :, joint] == one.levels[:, 1, :, joint + 1]).mean(axis=0) for one in walks]
+        here = ", ".join("/".join(f"{share:.0%}" for share in each) for each in same) + " of the settings"
+        theirs = ", ".join(
+            "/".join(
+                "yes" if levels[joint] == levels[joint + 1] else "no" for levels in given["motion"][one.name]
+            )
+            for one in walks
+        )
+        yield row("pairs", here, None, name=name, theirs=theirs)
+    tight, loose = nodes[:, left], count_walks("seq1", effort, LOOSE_TANGENT_METRES).levels[:, 0, 0, left]
+    beyond = np.array([_beyond(setting) for setting in walks[0].settings])
+    shares = (tight == 4).mean(), (loose == 4).mean()
+    here = f"4 nodes in {shares[0]:.0%} of the settings with 1 mm allowed, in {shares[1]:.0%} with 1 cm"
+    most, over = 1000 * beyond.max(), (beyond > TANGENT_METRES).mean()
+    yield row("shoulder-nodes", here, bool((tight == 4).all()), most=most, share=over)
+    for one in walks:
+        here = f"{'yes' if one.truth[chosen] else 'no'} at the closest setting"
+        yield row("input", here, bool(one.truth[chosen]), sequence=one.name.upper(), share=one.truth.mean())
+
+
+def _beyond(setting: Array) -> Array:
+    r"""Return by how much the elbows' rays pass the wrong shoulders of SEQ1's frame 1 out of reach (2,), metres.
+
+    The elbow lies on its ray d, an upper arm l from the shoulder S; there is none if :math:`|S - (S \cdot d) d| > l`.
+    """
+    points, beyond = sequence("seq1", setting).truth[0], []
+    for side in SIDES:
+        shoulder, elbow = points[JOINT[f"{side}_shoulder"]], points[JOINT[f"{side}_elbow"]]
+        ray, line = (each / np.linalg.norm(each) for each in (shoulder, elbow))
+        # Both shoulders lie on one ray, symmetric about the foot of the neck's perpendicular.
+        other = (2 * (points[JOINT["neck"]] @ ray) - shoulder @ ray) * ray
+        beyond.append(np.linalg.norm(other - (other @ line) * line) - np.linalg.norm(elbow - shoulder))
+    return np.array(beyond)
+
+
+def _deciding_row(name: str, setting: Array) -> Row:
+    """Apply Rules 3 to 5, one by one, to the survivors of Rules 1 and 2 in frame 1 at the closest setting."""
+    trees, head = grown(sequence(name, setting).take([0]))
+    kept = allowed(trees, head, (1, 2))
+    rejected = [int((kept & ~allowed(trees, head, (rule,))).sum()) for rule in (3, 4, 5)]
+    here = f"of {int(kept.sum())} survivors Rules 3, 4 and 5 reject {', '.join(map(str, rejected))}"
+    return row(f"decides-{name}", here, None)

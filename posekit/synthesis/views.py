@@ -1,0 +1,475 @@
+"""Views with truth: a walker, random legal postures, motion capture; noise with seeds, and the built-in views.
+
+Each function returns a `posekit.cameras.View` whose `truth` holds the true joints in the camera's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.body import Figure, load_figure, segment_lengths, shoulders_are_behind
+from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCamera, View
+from posekit.cameras.head import TABLE_A2
+from posekit.errors import nearest, refusal, shown
+from posekit.geometry import Array, Ints
+from posekit.motion import Motion
+from posekit.settings import EXACT, ValidateSettings
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
+from posekit.synthesis.cameras import (
+    DISTANCE_RANGE,
+    default_camera,
+    in_picture,
+    look_at,
+    middle_of,
+    place_cameras,
+    to_camera,
+)
+from posekit.synthesis.walker import Walker
+
+#: Distance of the image plane from the centre of projection, metres (Lee & Chen 1985, Table 2: 5 cm).
+PAPER_F: Final = 0.05
+
+#: Frames of a sequence, and seconds between them (Lee & Chen 1985, Appendix).
+PAPER_FRAMES, PAPER_STEP = 5, 0.2
+
+#: Built-in sequences: camera position of the paper (origin of the image plane, head-centred frame, metres), and phase
+#: of the first frame, cycles. The paper does not print the phase.
+SEQUENCES: Final = {"seq1": ((4.0, 0.0, 0.0), 0.11), "seq2": ((3.0, 0.0, 3.0), 0.68)}
+
+#: Velocity of the built-in sequences, leg lengths per second. The paper does not print it.
+SEQUENCE_VELOCITY: Final = 0.7
+
+#: Up in the walker's head-centred frame, and in the world of random postures.
+UP_WALKER, UP_RANDOM = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+#: Fraction of random draws that must be legal and free of collision; below it the limits are refused.
+MIN_ACCEPTED: Final = 1e-3
+
+
+def builtin_view(name: str) -> View:
+    """Return a built-in view of the walker, in the manner of Lee & Chen 1985, §4.
+
+    Parameters
+    ----------
+    name : str
+        ``seq1`` (camera ahead of the walker) or ``seq2`` (ahead and to the right).
+
+    Raises
+    ------
+    InputError
+        If there is no view of that name.
+
+    Examples
+    --------
+    >>> len(builtin_view("seq1"))
+    5
+    """
+    if name not in SEQUENCES:
+        raise refusal("", "view", shown(name), "a built-in view", nearest(name, SEQUENCES))
+    camera, phase0 = SEQUENCES[name]
+    return walker_view(Walker(velocity=SEQUENCE_VELOCITY), camera=camera, phase0=phase0)
+
+
+def view_of(
+    figure: Figure, camera: PinholeCamera | LeeChenCamera, points_cam: Array, *, time: ArrayLike | None = None
+) -> View:
+    """Project a figure's points exactly, and return the view with the truth.
+
+    The view states the lengths and head points that differ from the built-in figure's. The neck is given as root in
+    frames whose head is not seen whole. A Lee-Chen camera's f is left open in the view, and its file unit is cm.
+
+    Parameters
+    ----------
+    figure : Figure
+        The person.
+    camera : PinholeCamera or LeeChenCamera
+        Intrinsics; f of a Lee-Chen camera must be given.
+    points_cam : array (F, 19, 3)
+        Joints and head points, camera frame (OpenCV's convention), metres; NaN if absent.
+    time : array (F,), optional
+        Seconds; frame numbers if not given.
+
+    Raises
+    ------
+    InputError
+        If there is no frame, or a point is not in front of the camera.
+    """
+    behind = np.argwhere(points_cam[..., 2] <= 0)
+    if len(behind):
+        frame, k = behind[0]
+        got = f"depth {points_cam[frame, k, 2]:.3g} m"
+        place = f"frames[{frame}].{POINTS[k]}"
+        raise refusal("", place, got, "a point in front of the camera", "move the camera away")
+    paper = isinstance(camera, LeeChenCamera)
+    image, split = camera.project(points_cam), len(JOINTS)
+    headless = np.asarray(np.isnan(image[:, split:]).any(axis=(1, 2)))
+    standard = load_figure()
+    lengths = {
+        name: length
+        for name, length in figure.lengths.items()
+        if not np.isclose(length, standard.lengths[name], rtol=0, atol=1e-12)
+    }
+    same_head = np.allclose(figure.head_points, standard.head_points, rtol=0, atol=1e-12)
+    head = figure.head_points + (TABLE_A2.points[0] if paper else 0.0)
+    side = figure.shoulder_side
+    return View(
+        camera=LeeChenCamera(f=None) if paper else camera,
+        time=np.asarray(np.arange(len(points_cam)) if time is None else time, dtype=np.float64),
+        image=image[:, :split],
+        head_image=image[:, split:],
+        root=np.where(headless[:, None], points_cam[:, 0], np.nan),
+        truth=points_cam[:, :split],
+        lengths=lengths,
+        shoulders=side if lengths and side != "undecided" else None,
+        head_points=dict(zip(("neck", *HEAD_POINTS), TABLE_A2.points if same_head else head, strict=True))
+        if paper or not same_head
+        else None,
+        unit="cm" if paper else "m",
+    )
+
+
+def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
+    """Add Gaussian noise to every image point; the truth stays, and the view states the deviation if it is in pixels.
+
+    Parameters
+    ----------
+    view : View
+        An exact view.
+    sigma : float
+        Standard deviation of each coordinate, in the image's unit: pixels, or metres on the paper's image plane.
+    rng : Generator
+        Seeded by the caller.
+
+    Raises
+    ------
+    InputError
+        If sigma is negative or not finite.
+    """
+    if not 0 <= sigma < np.inf:
+        raise refusal("", "noise", f"{sigma:g}", "a standard deviation of 0 or more")
+    noise = sigma * rng.standard_normal((len(view), len(POINTS), 2))
+    pixels = sigma > 0 and not isinstance(view.camera, LeeChenCamera)
+    return replace(
+        view,
+        image=view.image + noise[:, : len(JOINTS)],
+        head_image=view.head_image + noise[:, len(JOINTS) :],
+        deviation=sigma if pixels else view.deviation,
+    )
+
+
+def forget_camera(view: View) -> View:
+    """Return the same pictures as photographs by an unknown camera: scaled orthographic, without a scale."""
+    names = ("time", "image", "truth", "lengths", "shoulders", "stature", "unit", "deviation")
+    known = {name: getattr(view, name) for name in names}
+    return View(camera=ScaledOrthographicCamera(scale=None), **known)
+
+
+def walker_view(
+    walker: Walker,
+    *,
+    camera: ArrayLike = SEQUENCES["seq1"][0],
+    target: ArrayLike = (0.0, 0.0, 0.0),
+    f: float = PAPER_F,
+    frames: int = PAPER_FRAMES,
+    dt: float = PAPER_STEP,
+    phase0: float = 0.0,
+    carried: bool = True,
+) -> View:
+    """View a walker with the camera of Lee & Chen 1985.
+
+    Parameters
+    ----------
+    walker : Walker
+        The person and the gait.
+    camera : array (3,)
+        Camera position in the paper's sense: origin of the image plane, head-centred frame (x forward, y up, z right),
+        metres. The optical centre is f further back.
+    target : array (3,)
+        Point on the optical axis, head-centred frame, metres.
+    f : float
+        Distance from the centre of projection to the image plane, metres.
+    frames : int
+        Number of frames.
+    dt : float
+        Seconds between frames.
+    phase0 : float
+        Phase of the first frame, cycles; at 0 the right foot strikes.
+    carried : bool
+        Whether the camera moves with the walker's head, as on a treadmill and as in the paper. Otherwise the camera
+        stands, and the walker starts with the head at the place of Table A.2.
+
+    Raises
+    ------
+    InputError
+        If a number is impossible, or the walker passes the camera.
+    """
+    place, aim = np.asarray(camera, dtype=np.float64), np.asarray(target, dtype=np.float64)
+    if frames < 1 or not 0 < dt < np.inf or not np.isfinite(phase0):
+        got = f"frames {frames}, dt {dt:g} s, phase {phase0:g}"
+        raise refusal("", "walker", got, "1 or more frames, a positive dt and a finite phase", "correct them")
+    if place.shape != (3,) or aim.shape != (3,) or not np.isfinite([place, aim]).all():
+        got = f"position {place.tolist()} and target {aim.tolist()}"
+        raise refusal("", "camera", got, "three finite numbers each, metres", "correct them")
+    R = look_at(place, aim, UP_WALKER)
+    time = dt * np.arange(frames, dtype=np.float64)
+    q = walker.configurations(walker.phase(time, phase0))
+    if not carried:
+        q[:, :3] += walker.travel(time, phase0)
+    # The paper's camera position is the middle of the image plane, f in front of the optical centre.
+    points = to_camera(walker.figure.forward_kinematics(q), R, place - f * R[2])
+    return view_of(walker.figure, LeeChenCamera(f=f), points, time=time)
+
+
+def random_postures(figure: Figure, n: int, rng: np.random.Generator, ranges: str = "anatomical") -> Array:
+    """Draw configurations (n, nq), uniform inside the figure's limits, until legal and free of collision.
+
+    The torso is at the origin, upright, facing +x.
+
+    Parameters
+    ----------
+    figure : Figure
+        The person; its limits bound the draws.
+    n : int
+        Number of postures.
+    rng : Generator
+        The same seed gives the same postures.
+    ranges : str
+        Joint ranges that are kept besides the figure's limits; with ``urdf`` there are no others.
+
+    Raises
+    ------
+    InputError
+        If n is not positive, or hardly any draw is legal.
+    """
+    if n < 1:
+        raise refusal("", "frames", str(n), "1 or more", "ask for more")
+    from posekit.validators.body import Body
+    from posekit.validators.check import Check
+    from posekit.validators.collision import Collision
+    from posekit.validators.joint_range import JointRange
+
+    lower, upper = figure.limits.lower, figure.limits.upper
+    checks: list[Check] = [Collision()] if ranges == "urdf" else [JointRange(), Collision()]
+    settings, slack = ValidateSettings(ranges=ranges), replace(EXACT, angle=0.0)
+    kept: list[Array] = []
+    found = drawn = 0
+    while found < n:
+        rate = max(found / drawn, 0.1) if drawn else 1.0
+        count = int((n - found) / rate * 1.1) + 16
+        q = np.tile(figure.neutral, (count, 1))
+        q[:, figure.angle_index] = rng.uniform(lower, upper, (count, len(lower)))
+        points = figure.forward_kinematics(q)
+        joints, head = points[:, : len(JOINTS)], points[:, len(JOINTS) :]
+        body = Body(joints=joints, head=head, base=figure, settings=settings, tolerance=slack, motion=False)
+        broken = [check.judge(body).violated.any(axis=1) for check in checks]
+        kept.append(q[~np.any(broken, axis=0)])
+        found += len(kept[-1])
+        drawn += count
+        if found < MIN_ACCEPTED * drawn and drawn > 10 / MIN_ACCEPTED:
+            got = f"{found} of {drawn} random postures legal and free of collision"
+            remedy = "widen the limits or thin the capsules"
+            raise refusal("", "ranges", got, f"more than {MIN_ACCEPTED:g} of them", remedy)
+    return np.concatenate(kept)[:n]
+
+
+def random_views(
+    n: int,
+    rng: np.random.Generator,
+    *,
+    figure: Figure | None = None,
+    camera: PinholeCamera | None = None,
+    distance: tuple[float, float] = DISTANCE_RANGE,
+    ranges: str = "anatomical",
+) -> View:
+    """Draw random legal postures, each seen by a camera of its own; the frames are independent.
+
+    Parameters
+    ----------
+    n : int
+        Number of postures.
+    rng : Generator
+        The same seed gives the same views.
+    figure : Figure, optional
+        The person; the built-in figure if not given.
+    camera, distance
+        See `place_cameras`.
+    ranges : str
+        See `random_postures`.
+
+    Raises
+    ------
+    InputError
+        See `random_postures` and `place_cameras`.
+    """
+    figure, camera = figure or load_figure(), camera or default_camera()
+    points = figure.forward_kinematics(random_postures(figure, n, rng, ranges))
+    R, position = place_cameras(points, UP_RANDOM, rng, camera=camera, distance=distance)
+    return view_of(figure, camera, to_camera(points, R, position))
+
+
+def mocap_view(
+    motion: Motion,
+    rng: np.random.Generator,
+    *,
+    clip: str = "",
+    frames: int | None = None,
+    dt: float | None = None,
+    position: ArrayLike | None = None,
+    camera: PinholeCamera | None = None,
+    distance: tuple[float, float] = DISTANCE_RANGE,
+) -> View:
+    """View one clip with one camera that stands still; the person has the median lengths of the frames shown.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion capture with joints and a known up axis.
+    rng : Generator
+        Draws the camera if `position` is not given.
+    clip : str
+        Name of the clip; the first if not given.
+    frames : int, optional
+        Number of frames, of those with a neck: from the first, every `dt`; without `dt`, evenly over the clip. All of
+        them if neither is given or the clip is shorter.
+    dt : float, optional
+        Seconds between frames, rounded to a whole number of the clip's frames.
+    position : array (3,), optional
+        Optical centre in the motion's world, metres; the camera looks at the middle of the person's path.
+    camera, distance
+        See `place_cameras`.
+
+    Raises
+    ------
+    InputError
+        If there is no such clip or frame, up is not known, or the person does not fit into the picture.
+    FigureError
+        If no torso or hips have lengths near the medians.
+    """
+    camera, up = camera or default_camera(), motion.up_vector
+    if up is None:
+        raise refusal(motion.source or "motion", "up", "no axis", "+x to -z", "give it with --up")
+    index = _clip_index(motion, clip)
+    rows = _spread(motion, _frames_of(motion, index, JOINTS[:1]), frames, dt)
+    points = motion.points(POINTS)[rows]
+    path = points.reshape(1, -1, 3)
+    if position is None:
+        R, centre = (each[0] for each in place_cameras(path, up, rng, camera=camera, distance=distance))
+    else:
+        centre = np.asarray(position, dtype=np.float64)
+        if centre.shape != (3,) or not np.isfinite(centre).all():
+            raise refusal("", "camera", shown(centre.tolist()), "three finite numbers, metres")
+        R = look_at(centre, middle_of(path)[0], up)
+        if not in_picture(camera, to_camera(path, R, centre))[0]:
+            got = f"{shown(centre.tolist())}, from which the person leaves the picture"
+            remedy = "move the camera away, reduce the focal length or take fewer frames"
+            raise refusal("", "camera", got, "the whole path in view", remedy)
+    person = scaled_to(points)
+    view = view_of(person, camera, to_camera(points, R, centre), time=_seconds(motion, rows))
+    return replace(view, camera=replace(camera, R=R, t=-R @ centre, up=motion.up))
+
+
+def mocap_views(
+    motion: Motion,
+    n: int,
+    rng: np.random.Generator,
+    *,
+    camera: PinholeCamera | None = None,
+    distance: tuple[float, float] = DISTANCE_RANGE,
+) -> tuple[View, ...]:
+    """Draw n frames evenly over all clips, each seen by a camera of its own; one view a clip, named after it.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion capture of one or several clips, with a known up axis.
+    n : int
+        Number of frames with all 14 joints; clips give equal shares, and a shorter clip all it has.
+    rng : Generator
+        Draws the cameras.
+    camera, distance
+        See `place_cameras`. The person has the median lengths of each clip.
+
+    Raises
+    ------
+    InputError, FigureError
+        See `mocap_view`.
+    """
+    camera, up = camera or default_camera(), motion.up_vector
+    clips = [_frames_of(motion, int(index), JOINTS) for index in np.unique(np.asarray(motion.clip))]
+    available = sum(map(len, clips))
+    if up is None or not 1 <= n <= available:
+        expected = f"1 to {available} frames with all joints and a known up axis"
+        got = f"{n} frames, up {motion.up!r}"
+        raise refusal(motion.source or "motion", "", got, expected, "ask for fewer, or give --up")
+    views = []
+    points = motion.points(POINTS)
+    for frames, share in zip(clips, _shares(n, [len(frames) for frames in clips]), strict=True):
+        if share:
+            rows = _spread(motion, frames, share, None)
+            R, position = place_cameras(points[rows], up, rng, camera=camera, distance=distance)
+            seen = to_camera(points[rows], R, position)
+            view = view_of(scaled_to(points[frames]), camera, seen, time=_seconds(motion, rows))
+            clip = int(np.asarray(motion.clip)[rows[0]])
+            views.append(replace(view, source=(*motion.clips, motion.source)[min(clip, len(motion.clips))]))
+    return tuple(views)
+
+
+def scaled_to(points: Array) -> Figure:
+    """Scale the built-in figure to the median segment lengths of postures (N, 19, 3); unseen segments keep theirs.
+
+    Lengths do not distinguish a torso from its mirror image, so the side of the shoulders is taken from the points.
+    """
+    return load_figure().scaled(segment_lengths(points), behind=shoulders_are_behind(points))
+
+
+def _clip_index(motion: Motion, name: str) -> int:
+    if name and name not in motion.clips:
+        expected = f"one of its {len(motion.clips)} clips"
+        raise refusal(motion.source or "motion", "clip", shown(name), expected, nearest(name, motion.clips))
+    return list(motion.clips).index(name) if name else int(np.asarray(motion.clip)[0])
+
+
+def _frames_of(motion: Motion, clip: int, names: Sequence[str]) -> Ints:
+    """Return the rows of a clip in which the named joints are known."""
+    known = np.isfinite(motion.points(names)).all(axis=(1, 2)) & (motion.clip == clip)
+    return np.flatnonzero(known)
+
+
+def _seconds(motion: Motion, rows: Ints) -> Array:
+    """Return the times (F,) of rows, seconds; frame numbers if the motion has no times."""
+    time, frame = np.asarray(motion.time)[rows], np.asarray(motion.frame)[rows]
+    return np.asarray(time if np.isfinite(time).all() else frame, dtype=np.float64)
+
+
+def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -> Ints:
+    """Choose among a clip's rows: from the first, every dt, or evenly from the first to the last."""
+    if len(known) == 0:
+        raise refusal(motion.source or "motion", "clip", "no frame with a neck", "one", "choose another clip")
+    if (frames is not None and frames < 1) or (dt is not None and not 0 < dt < np.inf):
+        raise refusal("", "frames", f"{frames} frames, dt {dt} s", "1 or more, dt above 0", "correct them")
+    if dt is not None:
+        order, clip = np.asarray(motion.frame)[known], np.asarray(motion.clip)
+        rate = motion.take(clip == clip[known[0]]).rate or 1.0
+        stride = max(1, round(dt * rate))
+        return np.asarray(known[(order - order[0]) % stride == 0][:frames])
+    if frames is None or frames >= len(known):
+        return known
+    return np.asarray(known[np.round(np.linspace(0, len(known) - 1, frames)).astype(np.intp)])
+
+
+def _shares(n: int, available: Sequence[int]) -> list[int]:
+    """Share n out evenly; a clip gives at most what it has."""
+    shares, left = [0] * len(available), n
+    while left > 0:
+        open_clips = [k for k, have in enumerate(available) if shares[k] < have]
+        each, rest = divmod(left, len(open_clips))
+        for place, k in enumerate(open_clips):
+            take = min(each + (place < rest), available[k] - shares[k])
+            shares[k] += take
+            left -= take
+    return shares
