@@ -1,100 +1,105 @@
-"""Play the newcomer: from a clone to the first picture, and to the result of each tutorial, in a fresh environment.
+"""From a clone to the first picture, and to a result of one's own data for each of three jobs, in a new environment.
 
-    python benchmarks/newcomer.py [--keep DIR]
+    python -m benchmarks.newcomer [--here] [--folder DIR] [--only JOB]
 
-Everything that is typed is read from the blocks of README and docs: the clone's `make demo`, then each tutorial's
-commands in a folder of its own, with the environment that `make demo` made. pip keeps no cache: all packages are
-fetched. Prints what docs/install.md sums up: commands, seconds by the clock, and what there is to look at.
+Three jobs: an array of postures of one's own is judged; configurations of a robot are judged; key points of
+a detector become postures. Each step is typed as README has it, in the environment that `make demo` made.
+pip keeps no cache, so all packages are fetched. `--here` skips the clone and runs the jobs with this
+Python. Prints seconds by the clock.
 """
 
 from __future__ import annotations
 
-import argparse
+import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Final, NamedTuple
 
-ROOT: Final = Path(__file__).resolve().parents[1]
-MAY_FAIL: Final = "posekit validate "
-"""A command that ends with 1 where it finds something."""
-LOOKED_AT: Final = (".html", ".png", ".bvh", ".csv", ".json")
-"""Endings of what a newcomer opens, the first that is there."""
+import numpy as np
 
+import posekit
+from benchmarks.common import parser, table, walk
+from benchmarks.start_up import environment
+from posekit.synthesis import default_camera, look_at, to_camera
 
-class Journey(NamedTuple):
-    """What is typed where, and a name for it."""
-
-    name: str
-    commands: list[str]
-    folder: Path
-
-
-def typed(page: Path, heading: str = "") -> Iterator[str]:
-    """Yield the commands of a page's shell blocks, below a heading or all."""
-    text = (
-        page.read_text(encoding="utf-8").partition(heading)[2]
-        if heading
-        else page.read_text(encoding="utf-8")
-    )
-    for block in re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S):
-        for line in block.splitlines():
-            command = re.sub(r"\s+#\s.*$", "", line).strip()
-            if command:
-                yield command
-
-
-def journeys(clone: Path) -> Iterator[Journey]:
-    """Yield the README's way to the first picture, and each tutorial's."""
-    demo = next(
-        command for command in typed(clone / "README.md", "## Two commands") if command == "make demo"
-    )
-    yield Journey("README: first picture", [demo], clone)
-    for page in sorted((clone / "docs/tutorials").glob("*.md")):
-        folder = clone.parent / page.stem
-        folder.mkdir()
-        yield Journey(f"tutorial: {page.stem}", list(typed(page)), folder)
+ROOT = Path(__file__).resolve().parents[1]
+JUDGE_ARRAY = """
+import numpy as np, posekit
+report = posekit.validate(np.load("mine.npy"), rate=30)
+print(report.decision)
+report.save("mine.html")
+"""
+JUDGE_ROBOT = """
+import numpy as np, posekit
+g1 = posekit.Validator("g1")
+q = np.tile(g1.robot.neutral, (100, 1))
+q[:, -1] += np.linspace(0, 3, 100)
+report = g1.check(q)
+print(int(report.ok.sum()), report.worst.min())
+"""
+JOBS = {
+    "an array of one's own": [["-c", JUDGE_ARRAY]],
+    "configurations of a robot": [["-c", JUDGE_ROBOT]],
+    "key points of a detector": [
+        ["-m", "posekit", "recover", "mine.json", "-o", "mine.npz", "--stature", "175cm", "--rate", "30"],
+        ["-m", "posekit", "render", "mine.npz", "-o", "key points.html"],
+    ],
+}
 
 
-def travel(journey: Journey, clone: Path) -> str:
-    """Run a journey's commands, and return its row of the table."""
-    path = f"{clone / '.venv/bin'}{os.pathsep}{os.environ['PATH']}"
-    environment = {**os.environ, "PATH": path, "PIP_NO_CACHE_DIR": "1", "PIP_NO_INPUT": "1"}
-    environment.pop("PYTHONPATH", None)
-    before = set(journey.folder.rglob("*"))
+def write_own(folder: Path) -> None:
+    """Write what a newcomer would have: joints of a walk as an array, and COCO key points of it seen from the side."""
+    joints = walk(0.8, 60).figure_joints
+    np.save(folder / "mine.npy", joints)
+    centre = joints.mean(axis=(0, 1)) + np.array([0.0, 0.2, 5.0])
+    R = look_at(centre, joints.mean(axis=(0, 1)), np.array([0.0, 1.0, 0.0]))
+    seen = default_camera().project(to_camera(joints, R, centre))[::6]
+    order = {5: 2, 6: 1, 7: 7, 8: 6, 9: 9, 10: 8, 11: 5, 12: 4, 13: 11, 14: 10, 15: 13, 16: 12}
+    frames = []
+    for k, frame in enumerate(seen):
+        points = np.zeros((17, 3))
+        for coco, own in order.items():
+            points[coco] = [*frame[own], 0.9]
+        frames.append({"image_id": k, "category_id": 1, "keypoints": points.ravel().tolist(), "score": 0.9})
+    (folder / "mine.json").write_text(json.dumps(frames))
+
+
+def run(arguments: list[str], folder: Path, env: dict[str, str]) -> tuple[float, str]:
+    """Run a command; return seconds and the last line that it printed, or its error."""
     start = time.perf_counter()
-    for command in journey.commands:
-        done = subprocess.run(
-            command, shell=True, cwd=journey.folder, env=environment, check=False, text=True
-        )
-        if done.returncode not in ((0, 1) if command.startswith(MAY_FAIL) else (0,)):
-            sys.exit(f"{journey.name}: {command}: exit {done.returncode}")
-    seconds = time.perf_counter() - start
-    made = [path for path in journey.folder.rglob("*") if path not in before and ".venv" not in path.parts]
-    own = [path for path in made if "samples" not in path.parts]
-    seen = next((p.name for suffix in LOOKED_AT for p in sorted(own) if p.suffix == suffix), "nothing")
-    return f"| {journey.name} | {len(journey.commands)} | {seconds:.0f} | `{seen}` |"
+    done = subprocess.run(arguments, cwd=folder, env=env, capture_output=True, text=True, check=False)
+    said = (done.stdout if done.returncode in (0, 1) else done.stderr).strip().splitlines()
+    failed = "" if done.returncode in (0, 1) else f"exit {done.returncode}: "
+    return time.perf_counter() - start, failed + (said[-1] if said else "")
 
 
 def main() -> None:
-    """Clone, travel, print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--keep", type=Path, help="a folder to work in, which stays")
-    given = parser.parse_args()
+    made = parser(__doc__)
+    made.add_argument("--here", action="store_true")
+    made.add_argument("--folder", type=Path, help="folder to work in, which stays")
+    made.add_argument("--only", default="", help="part of the names of the jobs")
+    given = made.parse_args()
+    rows = []
     with tempfile.TemporaryDirectory() as spare:
-        folder = (given.keep or Path(spare)).resolve()
+        folder = (given.folder or Path(spare)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        clone = folder / "posekit"
-        subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
-        rows = [travel(journey, clone) for journey in journeys(clone)]
-    print("\n| way | commands | seconds | to look at |\n|---|---|---|---|", *rows, sep="\n")
+        python, env = sys.executable, environment()
+        if not given.here:
+            clone = folder / "posekit"
+            env = {**os.environ, "PIP_NO_CACHE_DIR": "1", "PIP_NO_INPUT": "1"}
+            env.pop("PYTHONPATH", None)
+            rows.append(("clone", *run(["git", "clone", "--quiet", str(ROOT), str(clone)], folder, env)))
+            rows.append(("make demo: first picture", *run(["make", "demo"], clone, env)))
+            python = str(clone / ".venv/bin/python")
+        write_own(folder)
+        for name, steps in ((name, steps) for name, steps in JOBS.items() if given.only in name):
+            done = [run([python, *step], folder, env) for step in steps]
+            rows.append((name, sum(seconds for seconds, _ in done), done[-1][1]))
+    print(table(("step", "s", "said"), [(name, f"{seconds:.1f}", said[:90]) for name, seconds, said in rows]))
+    print(f"with posekit {posekit.__version__}: {sum(row[1] for row in rows):.0f} s together")
 
 
 if __name__ == "__main__":

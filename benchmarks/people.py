@@ -1,159 +1,189 @@
-"""Motion of people beside one laboratory's: what files and packages hold, as captures.
+"""How good answers are on people: errors, representatives, how sure, and whether 95 % regions hold the joints.
 
-    python benchmarks/people.py FILE [FILE ...]
+    python -m benchmarks.people [--data DIR] [--views 96] [--noise 2] [--trial POSE2SIM_FOLDER] [--only NAME,NAME]
 
-A file is a wheel of `pybullet` (zlib licence; motions of DeepMimic, Peng et al. 2018, MIT licence: fifteen of several
-people, from the CMU and SFU databases, and five of a walker), one of its motions, or anything `posekit synth mocap`
-reads: NPZ, TRC, C3D, BVH. What is read stays where it is: nothing of it is part of posekit.
+Motion is what files have (`--data`), or a walker's. Frames are drawn evenly over its clips, each seen by a
+camera of its own 2.5 to 6 m away; lengths are the medians of each clip. Conditions:
 
-A frame of DeepMimic is its duration, the root's position (y up) and quaternion (w first), and quaternions of chest,
-neck, hip, ankle and shoulder with angles of knee and elbow between, the right ones first; offsets are those of
-`humanoid3d.txt`. It has hips where posekit has a pelvis above them: that is placed `PELVIS_ABOVE_HIPS` up the root.
+- neck: the neck is given exactly;
+- no neck: neither neck nor head points are given, depth comes from the lengths;
+- photograph: the camera is not known either, nor are the lengths;
+- a trial: key points of a detector, with the calibration (TOML) and the motion (TRC) of the same seconds.
+  The truth is the TRC's; the person is described by a stature alone, or by the lengths of the frames that
+  no picture shows.
+
+`60 mm` is the share of frames in which a representative is within 60 mm of the truth after alignment.
+`sure` is compared with how often every joint of the answer is within 5 cm of the truth (expected
+calibration error).
 """
 
 from __future__ import annotations
 
-import json
-import sys
-import zipfile
-from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path, PurePosixPath
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+import posekit
+from benchmarks.common import data_of, parser, recordings, table
+from posekit.body import segment_lengths
+from posekit.cameras import View
+from posekit.evaluation import Evaluation, evaluate, posture_errors, with_truth
+from posekit.evaluation.scores import MEASURES
 from posekit.geometry import Array
-from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
-from posekit.synthesis import Capture, clip_lengths, read_capture
+from posekit.motion import Motion
+from posekit.recovery import Recovery
+from posekit.synthesis import forget_camera, mocap_views, with_noise
 
-PELVIS_ABOVE_HIPS = 0.10
-"""Metres: as the built-in figure and CMU's skeletons have it."""
+NEAR_METRES = 0.06
+PA = MEASURES.index("pa")
+HEAD = (
+    "condition",
+    "frames",
+    "empty",
+    "best",
+    "first",
+    "answer",
+    "representatives",
+    "60 mm",
+    "sure, mean",
+    "true",
+    "ECE",
+    "regions",
+    "ms",
+)
 
-CHEST_OFFSET, NECK_OFFSET = (0.0, 0.236151, 0.0), (0.0, 0.223894, 0.0)
-SHOULDER_OFFSET, HIP_OFFSET = (-0.02405, 0.24350, 0.18311), (0.0, 0.0, 0.084887)
-UPPER_ARM_LENGTH, FOREARM_LENGTH, THIGH_LENGTH, SHANK_LENGTH = 0.274788, 0.258947, 0.421546, 0.409870
-"""Metres: offsets in the parent's frame (x forward, y up, z right; the left ones mirrored), and lengths."""
 
-N_NUMBERS = 44
-"""Of a frame of a humanoid."""
+@dataclass(frozen=True)
+class Found:
+    """One view's evaluation, number of representatives and distance of the nearest one (F,), metres; seconds."""
+
+    evaluation: Evaluation
+    representatives: Array
+    near: Array
+    seconds: float
 
 
-def people(path: str | Path) -> Capture:
-    """Read the motion of a file: a wheel or a motion of DeepMimic, or any capture that posekit reads.
+def measured(view: View) -> Found:
+    """Recover a view with truth and compare."""
+    start = time.process_time()
+    result = posekit.recover(view)
+    seconds = time.process_time() - start
+    return Found(evaluate(result, view.truth), *representatives(result, view.truth), seconds)
 
-    Raises
-    ------
-    ValueError
-        Where a wheel or a text holds no motion of a humanoid.
-    """
-    path = Path(path)
-    if path.suffix not in (".whl", ".txt"):
-        return read_capture(path)
-    clips = list(_deep_mimic(path))
-    if not clips:
-        raise ValueError(f"{path}: no motion of a humanoid, frames of {N_NUMBERS} numbers")
-    joints = np.concatenate([found for _, found, _ in clips])
-    names = tuple(name for name, _, _ in clips)
-    return Capture(
-        points=np.concatenate([joints, np.full((len(joints), len(HEAD_POINTS), 3), np.nan)], axis=1),
-        clip=np.repeat(np.arange(len(clips)), [len(found) for _, found, _ in clips]),
-        names=names,
-        actions=tuple(name.removeprefix("humanoid3d_").rstrip("0123456789") for name in names),
-        fps=np.array([fps for _, _, fps in clips]),
-        up=np.array([0.0, 1.0, 0.0]),
-        source=str(path),
-        derived=("pelvis",),
+
+def representatives(result: Recovery, truth: Array) -> tuple[Array, Array]:
+    """Return the number of representatives of each frame, and the distance of the one nearest to the truth (PA)."""
+    count, near = np.zeros(len(result)), np.full(len(result), np.nan)
+    for k, rows in enumerate(result.answer.representatives):
+        joints = result.survivors.joints[np.asarray(rows, dtype=np.intp)]
+        count[k] = len(rows)
+        if len(rows):
+            errors = posture_errors(joints, np.broadcast_to(truth[k], joints.shape))
+            near[k] = np.nanmin(errors[:, PA])
+    return count, near
+
+
+def neck_given(view: View) -> View:
+    neck = view.truth[:, 0]
+    image = view.image.copy()
+    image[:, 0] = view.camera.project(neck)
+    return replace(view, root=neck, image=image)
+
+
+def neck_unknown(view: View) -> View:
+    nothing = np.full((len(view), 3), np.nan)
+    return replace(view, root=nothing, head_image=np.full_like(view.head_image, np.nan))
+
+
+def photograph(view: View) -> View:
+    return replace(forget_camera(neck_unknown(view)), lengths={}, shoulders=None)
+
+
+CONDITIONS: dict[str, Callable[[View], View]] = {
+    "neck": neck_given,
+    "no neck": neck_unknown,
+    "photograph": photograph,
+}
+
+
+def views_of(motions: Iterable[Motion], count: int, noise: float, rng: np.random.Generator) -> list[View]:
+    """Draw views of clips in equal shares, with noise."""
+    clips = list(motions)
+    found: list[View] = []
+    for number, clip in enumerate(clips):
+        share = count // len(clips) + (number < count % len(clips))
+        whole = int(np.isfinite(clip.figure_joints).all(axis=(1, 2)).sum())
+        if min(share, whole):
+            drawn = mocap_views(clip, min(share, whole), rng)
+            found += [with_noise(one, noise, rng) if noise else one for one in drawn]
+    return found
+
+
+def trial_views(folder: Path, stature: float) -> Iterator[tuple[str, View]]:
+    """Yield the view of each camera of a trial, by stature and by the lengths of the same recording."""
+    calibration, truth = (next(folder.glob(f"*.{ending}")) for ending in ("toml", "trc"))
+    motion = posekit.open(truth)
+    for name, camera in posekit.open(calibration).items():
+        pictures = folder / "pose" / f"{name.replace('_', '')}_json"
+        if not pictures.is_dir():
+            continue
+        seen = posekit.open(pictures)
+        rest = motion.figure_joints[len(set(np.asarray(seen.frame).tolist())) :]
+        for how, lengths in ((f"stature {stature:g} m", {}), ("lengths", segment_lengths(rest))):
+            view = replace(seen.view(camera, rate=motion.rate, stature=None if lengths else stature))
+            view = replace(view, lengths=lengths) if lengths else view
+            yield f"{folder.name} {name}, {how}", with_truth(view, motion)[0]
+
+
+def row(name: str, parts: list[Found]) -> tuple[str, ...]:
+    """Sum up one condition."""
+    whole = Evaluation.joined([one.evaluation for one in parts], {})
+    said, near = whole.summary(), np.concatenate([one.near for one in parts])
+    count = np.concatenate([one.representatives for one in parts])
+    sure, true = whole.columns["sure"], whole.columns["sure_true"]
+    both = np.isfinite(sure) & np.isfinite(true)
+    stated = said["calibration"]["sure"]
+    error = said["error_mm"]
+    return (
+        name,
+        str(len(whole)),
+        f"{said['without_survivor'] / len(whole):.1%}",
+        *(
+            f"{error[role]['pa']['median']:.1f}" if role in error else "-"
+            for role in ("best", "first", "answer")
+        ),
+        f"{np.median(count[count > 0]):g}" if count.any() else "-",
+        f"{np.mean(near <= NEAR_METRES):.0%}",
+        f"{sure[both].mean():.2f}",
+        f"{true[both].mean():.2f}",
+        "-" if stated is None else f"{stated['ece']:.3f}",
+        "-" if said["regions"] is None else f"{said['regions']:.1%}",
+        f"{1000 * sum(one.seconds for one in parts) / len(whole):.0f}",
     )
-
-
-def clip_of(capture: Capture, *wanted: int) -> Capture:
-    """Return some clips of a capture alone, by number."""
-    rows = np.flatnonzero(np.isin(capture.clip, wanted))
-    return replace(
-        capture,
-        points=capture.points[rows],
-        clip=np.searchsorted(np.array(wanted), capture.clip[rows]),
-        names=tuple(capture.names[k] for k in wanted),
-        actions=tuple(capture.actions[k] for k in wanted),
-        fps=capture.fps[list(wanted)],
-    )
-
-
-def _deep_mimic(path: Path) -> Iterator[tuple[str, Array, float]]:
-    """Yield name, joints (T, 14, 3) and frames a second of every humanoid's motion."""
-    for name, text in _texts(path):
-        given = json.loads(text)
-        frames = given.get("Frames", [])
-        if frames and {len(frame) for frame in frames} == {N_NUMBERS}:
-            numbers = np.array(frames, dtype=np.float64)
-            yield name, deep_mimic_joints(numbers), float(1.0 / np.median(numbers[:, 0]))
-
-
-def _texts(path: Path) -> Iterator[tuple[str, str]]:
-    if path.suffix == ".txt":
-        yield path.stem, path.read_text()
-        return
-    with zipfile.ZipFile(path) as wheel:
-        for name in sorted(wheel.namelist()):
-            if "/motions/" in name and name.endswith(".txt"):
-                yield PurePosixPath(name).stem, wheel.read(name).decode()
-
-
-def deep_mimic_joints(frames: Array) -> Array:
-    """Return the 14 joints (T, 14, 3) of frames (T, 44) of a humanoid, metres, y up."""
-    joints = np.full((len(frames), len(JOINTS), 3), np.nan)
-    root, turned = frames[:, 1:4], _matrices(frames[:, 4:8])
-    chest_at, chest = root + turned @ np.array(CHEST_OFFSET), turned @ _matrices(frames[:, 8:12])
-    joints[:, JOINT["neck"]] = chest_at + chest @ np.array(NECK_OFFSET)
-    joints[:, JOINT["pelvis"]] = root + turned @ np.array([0.0, PELVIS_ABOVE_HIPS, 0.0])
-    for side, leg, arm, sign in (("right", 16, 25, 1.0), ("left", 30, 39, -1.0)):
-        mirror = np.array([1.0, 1.0, sign])
-        for names, start, at, frame, offset, lengths in (
-            (("hip", "knee", "ankle"), leg, root, turned, HIP_OFFSET, (THIGH_LENGTH, SHANK_LENGTH)),
-            (
-                ("shoulder", "elbow", "wrist"),
-                arm,
-                chest_at,
-                chest,
-                SHOULDER_OFFSET,
-                (UPPER_ARM_LENGTH, FOREARM_LENGTH),
-            ),
-        ):
-            first = at + frame @ (np.array(offset) * mirror)
-            upper = frame @ _matrices(frames[:, start : start + 4])
-            angle = frames[:, start + 4]
-            # The hinge turns about z: from straight down to forward.
-            lower = np.stack([np.sin(angle), -np.cos(angle), np.zeros(len(frames))], axis=1)
-            second = first - lengths[0] * upper[..., 1]
-            third = second + lengths[1] * np.einsum("tij,tj->ti", upper, lower)
-            for name, place in zip(names, (first, second, third), strict=True):
-                joints[:, JOINT[f"{side}_{name}"]] = place
-    return joints
-
-
-def _matrices(quaternions: NDArray[np.float64]) -> Array:
-    """Return rotations (T, 3, 3) of quaternions (T, 4), w first."""
-    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def main() -> None:
-    if len(sys.argv) < 2:
-        print("no file given: python benchmarks/people.py FILE [FILE ...]")
-        return
-    for path in sys.argv[1:]:
-        capture = people(path)
-        print(f"{path}: {len(capture.points)} frames, {len(capture.names)} clips")
-        for index, name in enumerate(capture.names):
-            points = capture.points[capture.clip == index]
-            print(f"  {name}: {len(points)} frames at {capture.fps[index]:.0f} Hz")
-        print({name: round(length, 3) for name, length in clip_lengths(capture.points).items()})
+    made = parser(__doc__)
+    made.add_argument("--views", type=int, default=96)
+    made.add_argument("--noise", type=float, default=2.0)
+    made.add_argument("--trial", type=Path)
+    made.add_argument("--stature", type=float, default=1.75)
+    made.add_argument("--only", default=",".join(CONDITIONS))
+    given = made.parse_args()
+    views = views_of(recordings(data_of(given)), given.views, given.noise, np.random.default_rng(given.seed))
+    rows = [
+        row(name, [measured(CONDITIONS[name](view)) for view in views])
+        for name in given.only.split(",")
+        if name
+    ]
+    for name, view in trial_views(given.trial, given.stature) if given.trial else ():
+        rows.append(row(name, [measured(view)]))
+        print(rows[-1], flush=True)
+    print(f"{given.noise:g} px; errors are medians after alignment (PA), mm; ms of processor time a frame")
+    print(table(HEAD, rows))
 
 
 if __name__ == "__main__":

@@ -1,109 +1,232 @@
-"""The pages of the API are those of the modules, and what Sphinx warned of it warns of again."""
-
-import importlib.util
-import subprocess
-import sys
-from pathlib import Path
-from types import ModuleType
-
-import pytest
-
-DOCS = Path(__file__).parents[1] / "docs"
-PACKAGE = DOCS.parent / "posekit"
-
-CONF = """import sys
-sys.path.insert(0, {docs!r})
-extensions = ["sphinx.ext.autodoc", "quick_build", "warned_again"]
-autodoc_default_options = {{"members": True}}
-"""
-PAGES = {
-    "index.rst": "Title\n=====\n\n.. toctree::\n\n   code\n\n:ref:`there`\n",
-    "code.rst": "Code\n====\n\n.. automodule:: code_of_a_test\n",
-}
-MODULE = '''"""A module."""
+"""The documentation runs: commands, Python blocks, examples; its tables are current and its links lead somewhere."""
 
 from __future__ import annotations
 
+import contextlib
+import doctest
+import importlib
+import inspect
+import io
+import json
+import os
+import pkgutil
+import re
+import runpy
+import shlex
+import shutil
+import signal
+import sys
+import tomllib
+import warnings
+from pathlib import Path
 
-def one(value: Given) -> Given:
-    """%s"""
+import click
+import pytest
+
+import posekit
+from posekit.cli.main import COMMANDS, main
+from posekit.samples import samples
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md") if "_" not in path.parent.name[:1])]
+NAMED = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+ELSEWHERE = (
+    *("pip ", "apt-get ", "make ", "git ", ". .venv", "detector "),  # other programs
+    *(
+        "dataset/",
+        "archive/",
+        "my_robot.urdf",
+        "results.json",
+        "--cluster",
+    ),  # the reader's own files and machines
+)
+"""Commands with one of these are not run."""
+
+HEAVY = (".png", ".gif", ".mp4", "posekit demo", "posekit reproduce", "posekit evaluate samples")
+"""Commands with one of these take more than five seconds, or need a browser; `POSEKIT_ALL_DOCS=1` runs them, too."""
+
+ARGUMENTS = {"live_camera.py": ["--keypoints", "samples/keypoints"]}
+"""Arguments of examples."""
+
+NEEDS_MORE = ("viser_viewer.py",)
+"""Examples that need a package of their own: they are compiled only."""
+
+READ = {"json": json.loads, "toml": tomllib.loads}
+"""Languages whose blocks must be well formed."""
 
 
-class Given:
-    """What is given."""
-'''
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """Return the language and the text of each fenced block."""
+    return re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+
+
+def call(line: str) -> tuple[int, str]:
+    """Run a command in this process; return its exit code and what it prints."""
+    out, handler, show = io.StringIO(), signal.getsignal(signal.SIGTERM), warnings.showwarning
+    arguments = sys.argv
+    sys.argv = shlex.split(line, comments=True)
+    try:
+        with (
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(out),
+            pytest.raises(SystemExit) as ended,
+        ):
+            main()
+    finally:
+        sys.argv, warnings.showwarning = arguments, show
+        signal.signal(signal.SIGTERM, handler)
+    return int(ended.value.code or 0), out.getvalue()
+
+
+def words(text: str) -> str:
+    """Return a text with a 0 for every number and one blank between words: numbers may move, words may not."""
+    return " ".join(re.sub(r"[-\u2212]?\b\d[\d.,e]*", "0", text).split())
 
 
 @pytest.fixture(scope="module")
-def page() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_api", DOCS / "make_api.py")
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
+def sample_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("docs") / "samples"
+    samples(folder)
+    return folder
+
+
+@pytest.fixture
+def desk(tmp_path: Path, sample_files: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with the samples, and the examples' checks."""
+    shutil.copytree(sample_files, tmp_path / "samples")
+    shutil.copy(ROOT / "examples" / "own_check.py", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def runs(line: str) -> bool:
+    skipped = ELSEWHERE if os.environ.get("POSEKIT_ALL_DOCS") else (*ELSEWHERE, *HEAVY)
+    return line.startswith("posekit ") and not any(part in line for part in skipped)
+
+
+@pytest.mark.parametrize("name", [name for name, page in NAMED.items() if blocks(page)])
+def test_blocks_run_and_print_what_the_page_shows(name: str, desk: Path) -> None:
+    printed, space = "", {"__name__": "page"}
+    for language, text in blocks(NAMED[name]):
+        if language == "sh":
+            printed = ""
+            for line in filter(runs, text.splitlines()):
+                if line.startswith("posekit samples"):
+                    shutil.rmtree(desk / "samples", ignore_errors=True)
+                code, out = call(line)
+                assert code in ((0, 1) if "validate" in line else (0,)), f"{line}\n{out}"
+                printed += out
+        elif language == "python":
+            shown = io.StringIO()
+            with contextlib.redirect_stdout(shown):
+                exec(compile(text, name, "exec"), space)
+            printed = shown.getvalue()
+        elif language in READ:
+            READ[language](text)
+        elif language == "text" and printed:
+            for line in text.splitlines():
+                assert words(line) in words(printed), f"{name}: {line}\nis not among\n{printed}"
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+def test_examples_run(example: Path, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if example.name in NEEDS_MORE:
+        compile(example.read_text(encoding="utf-8"), example.name, "exec")
+        return
+    monkeypatch.setattr(sys, "argv", [example.name, *ARGUMENTS.get(example.name, ())])
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        runpy.run_path(str(example), run_name="__main__")
+    assert printed.getvalue().strip()
+
+
+def test_tables_are_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    tables = importlib.import_module("tables")
+    made = {name: tables.with_tables(page.read_text(encoding="utf-8")) for name, page in NAMED.items()}
+    stale = [name for name, page in NAMED.items() if made[name] != page.read_text(encoding="utf-8")]
+    assert not stale, "run: python docs/tables.py"
+    assert sum(text.count("<!-- table:") for text in made.values()) >= 4
+
+
+def anchors(page: Path) -> set[str]:
+    heads = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_links_lead_somewhere(name: str) -> None:
+    page = NAMED[name]
+    text = re.sub(r"^```(?!\{).*?^```$", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith("http"):
+            continue
+        path, _, anchor = target.partition("#")
+        aim = (page.parent / path).resolve() if path else page
+        assert aim.exists(), target
+        assert not anchor or anchor in anchors(aim), target
+    for listed in re.findall(
+        r"^```\{toctree\}\n(.*?)^```$", page.read_text(encoding="utf-8"), flags=re.S | re.M
+    ):
+        for entry in filter(None, listed.splitlines()):
+            assert entry.startswith(":") or (page.parent / f"{entry}.md").exists(), entry
+
+
+def test_the_layout_page_names_files_and_functions_that_exist() -> None:
+    text = (DOCS / "reference" / "layout.md").read_text(encoding="utf-8")
+    places = set(re.findall(r"`([\w/]+\.(?:py|toml))`", text))
+    assert all(any((top / place).exists() for top in (ROOT / "posekit", ROOT)) for place in places), places
+    steps = re.findall(r"^\| \d\. [^|]+ \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M)
+    assert len(steps) == 8
+    for functions, files in steps:
+        code = "".join((ROOT / "posekit" / name).read_text() for name in re.findall(r"`([\w/.]+)`", files))
+        for function in re.findall(r"`(?:\w+\.)?(\w+)`", functions):
+            assert re.search(rf"def {function}\b", code), function
+
+
+def options() -> set[str]:
+    """Return every option of every command."""
+    found, waiting = {"--help", "--version"}, []
+    for name in COMMANDS:
+        waiting.append(getattr(importlib.import_module(f"posekit.cli.{name}"), name))
+    while waiting:
+        command: click.Command = waiting.pop()
+        waiting += getattr(command, "commands", {}).values()
+        for parameter in command.params:
+            found |= {*parameter.opts, *parameter.secondary_opts}
     return found
 
 
-def test_the_pages_are_written_anew_with_every_module(page: ModuleType) -> None:
-    made = page.pages()
-    written = {f"api/{path.name}" for path in (DOCS / "api").iterdir()} | {"api.md"}
-    assert written == set(made), "run: python docs/make_api.py"
-    for name, text in made.items():
-        assert (DOCS / name).read_text(encoding="utf-8") == text, "run: python docs/make_api.py"
-        assert name == "api.md" or f"\n{name.removesuffix('.rst')}\n" in made["api.md"]
+@pytest.mark.parametrize("name", NAMED)
+def test_options_that_a_page_names_exist(name: str) -> None:
+    text = NAMED[name].read_text(encoding="utf-8")
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)) <= options()
 
 
-def test_every_module_is_on_one_page(page: ModuleType) -> None:
-    lines = [line for text in page.pages().values() for line in text.splitlines()]
-    listed = [line.removeprefix(".. automodule:: ") for line in lines if line.startswith(".. automodule")]
-    expected = set()
-    for top in PACKAGE.iterdir():
-        for file in sorted(top.rglob("*.py")) if top.is_dir() else [top]:
-            parts = ("posekit", *([top.name] if top.is_dir() else []))
-            inside = file.relative_to(top).with_suffix("").parts if top.is_dir() else (top.stem,)
-            expected.add(".".join(part for part in (*parts, *inside) if part != "__init__"))
-    data = {name for name in expected if name.startswith("posekit.urdf")}
-    assert sorted(listed) == sorted(expected - data - {"posekit.py.typed"} - {"posekit.py"})
+def test_every_page_is_listed() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = {f"docs/{entry}.md" for entry in re.findall(r"^([\w/-]+)$", index, flags=re.M)}
+    assert {name for name in NAMED if name.startswith("docs/")} - {"docs/index.md"} <= listed
 
 
-def test_a_package_on_no_page_is_named(page: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(page, "SECTIONS", page.SECTIONS[:-1])
-    with pytest.raises(ValueError, match=r"^posekit\.__main__: on no page"):
-        page.pages()
+@pytest.mark.parametrize("name", posekit.__all__)
+def test_public_names_have_an_example(name: str) -> None:
+    thing = getattr(posekit, name)
+    assert doctest.DocTestParser().get_examples(inspect.getdoc(thing) or ""), "no example in the docstring"
 
 
-def test_what_was_warned_of_is_warned_of_again_until_it_is_mended(tmp_path: Path) -> None:
-    pytest.importorskip("sphinx")
-    source = tmp_path / "docs"
-    source.mkdir()
-    (source / "conf.py").write_text(CONF.format(docs=str(DOCS)))
-    for name, text in PAGES.items():
-        (source / name).write_text(text)
-    module = tmp_path / "code_of_a_test.py"
-    module.write_text(MODULE % "Say *one.")
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(posekit.__path__, "posekit.")
+    if not module.name.endswith("__main__") and not module.name.rpartition(".")[2].startswith("_")
+)
 
-    def build() -> tuple[int, str]:
-        done = subprocess.run(
-            [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-b", "html", "docs", "html"],
-            cwd=tmp_path,
-            env={"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1", "PATH": ""},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        return done.returncode, done.stdout + done.stderr
 
-    for _ in range(2):
-        status, said = build()
-        assert status == 1, said
-        assert "code_of_a_test.one" in said, said
-        assert "undefined label: 'there'" in said
-    module.write_text(MODULE % "Say one.")
-    (source / "index.rst").write_text(PAGES["index.rst"].replace(":ref:`there`", ""))
-    status, said = build()
-    assert status == 0, said
-    html = (tmp_path / "html" / "code.html").read_text()
-    assert html.count('href="#code_of_a_test.Given" title="code_of_a_test.Given"') == 2
-    status, said = build()
-    assert status == 0
-    assert "0 added, 0 changed" in said
+@pytest.mark.parametrize("name", [name for name in MODULES if ".cli" not in name])
+def test_docstring_examples_run(name: str, desk: Path) -> None:
+    module = importlib.import_module(name)
+    found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert not found.failed

@@ -1,0 +1,147 @@
+"""Every door takes a path, an array or an object, and refuses what it cannot use in one line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.samples import samples
+from posekit.settings import RecoverSettings, ValidateSettings, number
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made: Path = tmp_path_factory.mktemp("doors")
+    samples(made)
+    return made
+
+
+def test_importing_posekit_loads_no_library() -> None:
+    code = "import sys, posekit; print([m for m in ('numpy', 'pinocchio', 'scipy', 'click') if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_public_names_are_few_and_all_load() -> None:
+    assert len(posekit.__all__) <= 28
+    for name in posekit.__all__:
+        assert getattr(posekit, name).__doc__, name
+    assert set(posekit.__all__) <= set(dir(posekit))
+
+
+def test_recover_takes_a_path_and_an_opened_view(folder: Path) -> None:
+    by_path = posekit.recover(folder / "walk.json")
+    by_view = posekit.recover(posekit.open(folder / "walk.json"))
+    assert len(by_path) == len(by_view) == 5
+    assert np.array_equal(by_path.survivors.joints, by_view.survivors.joints)
+    assert len(by_path[-1].joints) > 0
+
+
+def test_recover_takes_statures_and_tolerances_as_text_or_numbers(folder: Path) -> None:
+    camera = f"{folder / 'calibration.toml'}:cam_01"
+    view = posekit.open(folder / "keypoints")
+    text = posekit.recover(view, camera=camera, stature="175cm", deviation="2px", rate=10)
+    numbers = posekit.recover(view, camera=camera, stature=1.75, deviation=2, rate=10)
+    assert np.array_equal(text.survivors.joints, numbers.survivors.joints)
+
+
+@pytest.mark.parametrize("name", ["jump.bvh", "walk.npz"])
+def test_validate_gives_the_same_verdicts_for_a_path_an_object_and_an_array(folder: Path, name: str) -> None:
+    motion = posekit.open(folder / name)
+    by_path = posekit.validate(folder / name)
+    by_motion = posekit.validate(motion)
+    assert np.array_equal(by_path.ok, by_motion.ok)
+    both = np.concatenate([motion.figure_joints, motion.head], axis=1)
+    by_array = posekit.validate(both, rate=motion.rate, up=motion.up, checks="joint-range")
+    by_check = posekit.validate(motion, checks="joint-range")
+    assert np.array_equal(by_array.ok, by_check.ok)
+
+
+def test_a_view_that_is_drawn_or_recovered_must_be_one(folder: Path) -> None:
+    with pytest.raises(posekit.InputError, match=r"walk\.npz.*motion; expected a view or key points"):
+        posekit.recover(folder / "walk.npz")
+    with pytest.raises(posekit.InputError, match="cameras"):
+        posekit.render(folder / "calibration.toml", folder / "x.png")
+    with pytest.raises(posekit.InputError, match=r"cam_2.*cam_01"):
+        posekit.recover(folder / "keypoints", camera=f"{folder / 'calibration.toml'}:cam_2")
+
+
+@pytest.mark.parametrize(
+    "target", ["walk.trc", "walk.c3d", "walk.csv", "walk.bvh", "walk.json", "walk.parquet"]
+)
+def test_convert_keeps_the_joints(folder: Path, tmp_path: Path, target: str) -> None:
+    source = posekit.open(folder / "walk.npz")
+    posekit.convert(folder / "walk.npz", tmp_path / target)
+    found = posekit.open(tmp_path / target)
+    if source.up != found.up and found.up:
+        source = source.rotated(found.up)
+    assert np.allclose(found.figure_joints, source.figure_joints, atol=2e-3, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("175cm", 1.75), ("1750mm", 1.75), ("1.75m", 1.75), (1.75, 1.75), ("2px", 2.0), ("3%", 0.03)],
+)
+def test_quantities_may_carry_their_unit(text: Any, value: float) -> None:
+    assert number(text, "stature") == value
+
+
+@pytest.mark.parametrize("text", ["", "tall", "nan", "inf", "1,75", "5ft9"])
+def test_what_is_no_quantity_is_refused(text: str) -> None:
+    with pytest.raises(posekit.InputError, match="stature"):
+        number(text, "stature")
+
+
+@pytest.mark.parametrize("kind", [RecoverSettings, ValidateSettings])
+def test_settings_survive_json_and_refuse_unknown_fields(kind: Any) -> None:
+    settings = kind(checks="joint-range,collision", ranges="table1", contact_margin="-2cm")
+    assert settings.checks == ("joint-range", "collision")
+    assert settings.contact_margin == -0.02
+    assert kind.from_json(settings.to_json()).to_json() == settings.to_json()
+    with pytest.raises(posekit.InputError, match="did you mean ranges"):
+        settings.changed(range="table1")
+
+
+def test_settings_are_read_from_toml(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('coverage = 1.0\nstature = "180cm"\n', encoding="utf-8")
+    assert RecoverSettings.from_toml(path).stature == 1.8
+    path.write_text("coverage = 2.0\n", encoding="utf-8")
+    with pytest.raises(posekit.InputError, match="coverage"):
+        RecoverSettings.from_toml(path)
+
+
+class BentElbow:
+    """The right elbow is bent by less than 40 degrees."""
+
+    name, unit, reads = "bent-elbow", "deg", ("joints",)
+
+    def angle(self, joints: Any) -> Any:
+        upper, fore = joints[:, 6] - joints[:, 1], joints[:, 8] - joints[:, 6]
+        cosine = (upper * fore).sum(axis=1) / np.linalg.norm(upper, axis=1) / np.linalg.norm(fore, axis=1)
+        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))[:, None]
+
+    def judge(self, body: Any) -> posekit.Judgement:
+        return posekit.Judgement(("right_elbow",), self.angle(body.joints))
+
+    def residuals(self, joints: Any) -> Any:
+        return np.maximum(40.0 - self.angle(joints), 0.0) / 0.5
+
+
+def test_an_own_check_with_residuals_pulls_noisy_postures(folder: Path) -> None:
+    from posekit.synthesis import mocap_view, with_noise
+
+    rng = np.random.default_rng(3)
+    view = with_noise(mocap_view(posekit.open(folder / "walk.npz"), rng, frames=4), 2.0, rng)
+    usual = ["rigid-parts", "joint-range"]
+    free = posekit.recover(view, checks=usual).survivors.joints
+    pulled = posekit.recover(view, checks=[*usual, BentElbow()]).survivors.joints
+    assert np.median(BentElbow().angle(free)) < 35
+    assert len(pulled)
+    assert BentElbow().angle(pulled).min() > 38

@@ -1,0 +1,188 @@
+"""Both papers, row by row: numbers that agree with the print, and reasons for those that do not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from posekit.body import load_figure
+from posekit.cameras import LeeChenCamera
+from posekit.errors import InputError
+from posekit.geometry import Array
+from posekit.papers import lee_chen_walks, reproduce, taylor_objects
+from posekit.papers.figures import draw_lee_chen, draw_taylor
+from posekit.papers.lee_chen_walks import count_walks, grown
+from posekit.papers.rows import Row, Rows, printed, row, write_rows
+from posekit.papers.taylor import taylor_figure
+from posekit.skeleton import JOINTS, PARENTS
+from posekit.synthesis import builtin_view
+
+N_ROWS = 127
+"""Statements of both papers that have a row."""
+
+MISPRINTS = {
+    "§3.1, number of interpretations",
+    "Table A.2(a), right eye, x",
+    "§3.2.A(ii): flexion of the knee",
+    "§3.2.A: abduction as the angle of a projection",
+    "§2.1: the camera by the linear solution",
+    "§3.3: the body plane from the normal of the head",
+    "eq. (3): bound of the scale",
+}
+"""Statements that the errata contradict: their rows differ."""
+
+
+@pytest.fixture(scope="module")
+def rows() -> Rows:
+    with pytest.MonkeyPatch.context() as small:
+        small.setattr(taylor_objects, "N_VIEWS", 40)
+        small.setattr(taylor_objects, "N_PICTURES", 40)
+        small.setitem(lee_chen_walks.GRIDS, "quick", (np.array([0.7, 1.0]), np.array([0.0]), 4))
+        count_walks.cache_clear()
+        found = reproduce("all")
+        count_walks.cache_clear()
+    return found
+
+
+def test_every_statement_has_its_row(rows: Rows) -> None:
+    assert len(rows) == N_ROWS
+    assert rows.passed and len(rows.lines()) > N_ROWS
+    assert len({(one.paper, one.place) for one in rows}) == N_ROWS
+    for one in rows:
+        assert (one.why == "") == (one.verdict == "agrees"), one.place
+        assert one.why != "not explained", one.place
+
+
+def of(rows: Rows, *starts: str) -> Iterator[Row]:
+    return (one for one in rows if one.place.startswith(starts))
+
+
+def test_what_does_not_depend_on_the_walk_agrees_but_for_the_errata(rows: Rows) -> None:
+    walk = ("Table 3", "Table 4", "§4")
+    for one in rows:
+        if one.place.startswith(walk) or one.verdict == "open":
+            continue
+        assert one.verdict == ("differs" if one.place in MISPRINTS else "agrees"), one
+
+
+def test_tables_3_and_4_have_all_their_cells(rows: Rows) -> None:
+    for table, name in (("Table 3 (SEQ1)", "seq1"), ("Table 4 (SEQ2)", "seq2")):
+        levels = list(of(rows, table))
+        assert len(levels) == len(JOINTS)
+        given = printed()["lee_chen"]
+        for level, one in enumerate(levels):
+            physical, motion = (
+                " / ".join(str(frame[level]) for frame in given[kind][name])
+                for kind in ("physical", "motion")
+            )
+            assert one.printed == f"{physical}; {motion}"
+
+
+def test_counts_never_decrease_and_rules_only_remove() -> None:
+    with pytest.MonkeyPatch.context() as small:
+        small.setitem(lee_chen_walks.GRIDS, "tiny", (np.array([0.9]), np.array([1.0]), 6))
+        walks = count_walks("seq2", "tiny")
+    assert (np.diff(walks.levels, axis=-1) >= 0).all()
+    assert (walks.levels[:, 1] <= walks.levels[:, 0]).all()
+    assert (walks.levels[..., 0] == 1).all()
+    assert (walks.final[:, 1] <= walks.final[:, 0]).all() and walks.cells.shape == (6, 86)
+
+
+def test_levels_are_those_of_all_8192_leaves() -> None:
+    """Lift every leaf of SEQ2's frame 1 on its own, with the roots of the quadratic equation."""
+    view = builtin_view("seq2").take([0])
+    trees, _ = grown(view, pruned=False)
+    camera, lengths = LeeChenCamera(f=0.05), load_figure().lengths
+    leaves: dict[tuple[int, ...], Array] = {(): view.truth[0, :1]}
+    for joint in range(1, len(JOINTS)):
+        name = "-".join(sorted((JOINTS[PARENTS[joint]], JOINTS[joint]), key=JOINTS.index))
+        grown_leaves: dict[tuple[int, ...], Array] = {}
+        for code, places in leaves.items():
+            lift = camera.lift(
+                places[PARENTS[joint]], view.image[0, joint], np.asarray(lengths[name]), tolerance=1e-3
+            )
+            for bit in range(2):
+                if lift.valid[bit]:
+                    grown_leaves[(*code, bit)] = np.vstack([places, lift.points[bit]])
+        leaves = grown_leaves
+    codes = [int("".join(map(str, code)), 2) for code in leaves]
+    order = np.argsort(codes)
+    assert np.array_equal(np.array(codes)[order], trees.code)
+    assert np.allclose(np.array(list(leaves.values()))[order], trees.joints, atol=1e-9)
+
+
+def test_errata_of_table_a2_and_of_the_camera(rows: Rows) -> None:
+    (eye,) = of(rows, "Table A.2(a)")
+    assert "right eye" in eye.check and eye.here == "-31.168 cm"
+    (null_space,) = of(rows, "§2.1, eqs. (4)")
+    assert null_space.here == "5.000000 and (400.000000, 0.000000, 0.000000) cm"
+
+
+def test_taylors_figure_has_his_proportions_at_any_height() -> None:
+    for stature in (1.5, 1.9):
+        lengths = taylor_figure(stature).lengths
+        assert lengths["right_hip-right_knee"] == pytest.approx(19 / 70 * stature)
+        assert lengths["right_shoulder-left_shoulder"] == pytest.approx(18 / 70 * stature)
+
+
+def test_constraints_that_fix_the_scale_find_it(rows: Rows) -> None:
+    for figure in ("Fig. 7", "Fig. 8"):
+        (zero,) = of(rows, f"{figure}b")
+        assert zero.here == "zero at 1 times the true s"
+    within = [one for one in rows if "views are solvable" in one.here]
+    assert len(within) == 4
+
+
+def test_sensitivity_predicts_the_spread_of_noisy_pictures() -> None:
+    one = taylor_objects.constrained_objects()[0]
+    s, rng = 600 / float(np.linalg.norm(np.ptp(one.points[:, :2], axis=0))), np.random.default_rng(1)
+    noise = 0.05
+    expected = np.linalg.norm(noise * taylor_objects.sensitivity(one, one.points, s), axis=1)
+    true = taylor_objects.joint_angles(one.points, one.triples)
+    off = []
+    for _ in range(150):
+        image = one.points[:, :2] * s + noise * rng.normal(size=(4, 2))
+        found = one.recovered(one.points, s, image)
+        assert found is not None
+        off.append(taylor_objects.joint_angles(found, one.triples) - true)
+    assert np.std(off, axis=0) == pytest.approx(expected, rel=0.25)
+
+
+def test_rows_are_written_for_people_and_programs(rows: Rows, tmp_path: Path) -> None:
+    write_rows(tmp_path, rows)
+    document = json.loads((tmp_path / "papers.json").read_text())
+    assert [one["place"] for one in document["rows"]] == [one.place for one in rows]
+    assert "Taylor 2000" in (tmp_path / "papers.html").read_text()
+    text = (tmp_path / "papers.md").read_text()
+    assert all(one.place in text for one in rows) and f"{len(rows)} rows" in text
+
+
+def test_a_row_that_agrees_needs_no_reason() -> None:
+    assert row("leaves", "2^13 = 8196", True).why == ""
+    assert row("leaves", "2^13 = 8192", False).why == "misprint"
+
+
+@pytest.mark.parametrize(("paper", "effort"), [("cutting", "quick"), ("all", "slow")])
+def test_unknown_papers_are_refused(paper: str, effort: str) -> None:
+    with pytest.raises(InputError, match="expected one of"):
+        reproduce(paper, effort=effort)
+
+
+def test_figures_are_drawn_again(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with pytest.MonkeyPatch.context() as small:
+        small.setitem(lee_chen_walks.GRIDS, "quick", (np.array([0.9]), np.array([0.0]), 2))
+        count_walks.cache_clear()
+        paths = [*draw_lee_chen(tmp_path), *draw_taylor(tmp_path)]
+        count_walks.cache_clear()
+    assert [path.name for path in paths] == [
+        "lee-chen.seq1.png",
+        "lee-chen.seq2.png",
+        "taylor.fig7.png",
+        "taylor.fig8.png",
+    ]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
