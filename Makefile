@@ -5,7 +5,6 @@ BIN := $(VENV)/bin
 PYTHON ?= python3
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 DEMO_RESULTS := demo-results
-BENCH_RESULTS := bench-results
 WORKERS := 2
 
 .DEFAULT_GOAL := help
@@ -27,6 +26,11 @@ apt_install() {
     as_root apt-get update -qq </dev/null
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "$$@" </dev/null >/dev/null
 }
+apt_try() {
+    command -v apt-get >/dev/null || return 1
+    if [ "$$(id -u)" != 0 ]; then sudo -n true 2>/dev/null || return 1; fi
+    ( apt_install "$$@" )
+}
 command -v $(PYTHON) >/dev/null || apt_install $(PYTHON) $(PYTHON)-venv
 $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
     echo "make: posekit needs Python 3.11 or newer, $(PYTHON) is $$($(PYTHON) -c 'import platform; print(platform.python_version())'): install one and name it, as in: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2
@@ -36,6 +40,8 @@ $(PYTHON) -m venv --clear $(VENV) >/dev/null 2>&1 || {
     apt_install "$$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
     $(PYTHON) -m venv --clear $(VENV)
 }
+# The solver is compiled where a compiler is found or may be installed; without one its NumPy reference is used.
+command -v g++ >/dev/null || command -v c++ >/dev/null || apt_try g++ $$(dpkg -s python3 >/dev/null 2>&1 && echo python3-dev) || echo "make: no C++ compiler was found and none could be installed: the slower reference solver is used" >&2
 # Pinocchio's wheel links to GNU's OpenMP and does not bring it; a minimal Debian has none.
 $(PYTHON) -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || apt_install libgomp1
 endef
@@ -44,16 +50,16 @@ export CREATE_VENV
 $(BIN)/python:
 	@bash -c "$$CREATE_VENV"
 
-# setuptools comes from constraints.txt as well, hence no build isolation.
+# setuptools and pybind11 come from constraints.txt as well, hence no build isolation.
 $(VENV)/runtime.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing posekit into $(VENV)"
-	@$(PIP_INSTALL) -c constraints.txt --upgrade setuptools
+	@$(PIP_INSTALL) -c constraints.txt --upgrade setuptools pybind11
 	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[pictures]'
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/runtime.stamp
 	@echo "Installing the tools for tests and docs into $(VENV)"
-	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[dev,docs,witnesses]'
+	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[dev,docs]'
 	@touch $@
 
 .PHONY: venv
@@ -71,10 +77,10 @@ set -euo pipefail
 fresh=$$(mktemp -d)
 trap 'rm -rf "$$fresh"' EXIT
 $(LOCK_PYTHON) -m venv "$$fresh"
-"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --upgrade pip setuptools
+"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --upgrade pip setuptools pybind11
 "$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --dry-run --ignore-installed \
     --python-version 3.11.0 --only-binary :all: --no-build-isolation --report "$$fresh/report.json" \
-    setuptools '.[dev,docs]'
+    setuptools pybind11 '.[dev,docs]'
 "$$fresh/bin/python" - "$$fresh/report.json" >constraints.txt.new <<'SCRIPT'
 import json, pathlib, sys
 found = [entry["metadata"] for entry in json.loads(pathlib.Path(sys.argv[1]).read_text())["install"]]
@@ -121,12 +127,8 @@ dist: $(VENV)/dev.stamp ## build wheel and sdist into dist/
 	$(BIN)/python -m build --no-isolation --outdir dist .
 
 .PHONY: newcomer
-newcomer: ## clone to first picture and to each tutorial's result, by the docs' own commands
-	$(PYTHON) benchmarks/newcomer.py
-
-.PHONY: pictures
-pictures: $(VENV)/runtime.stamp browser ## make the pictures of README and docs anew
-	$(BIN)/python docs/make_pictures.py docs/pictures
+newcomer: $(VENV)/dev.stamp ## clone to first picture and to each tutorial's result, by the docs' own commands
+	$(BIN)/python -m benchmarks.newcomer
 
 # --- checks ---------------------------------------------------------------------------------------------
 
@@ -146,7 +148,7 @@ lint: $(VENV)/dev.stamp ## ruff: format and rules
 
 .PHONY: types
 types: $(VENV)/dev.stamp ## mypy --strict
-	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/*/*.py benchmarks/*/*/*.py examples/*.py examples/*/*.py)
+	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py examples/*.py)
 
 .PHONY: layers
 layers: $(VENV)/dev.stamp ## import-linter: who may import whom
@@ -157,31 +159,24 @@ docs: $(VENV)/dev.stamp browser ## build the documentation, warnings are errors
 	$(BIN)/sphinx-build -j $(WORKERS) -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
+.PHONY: count
+count: ## print the number of lines of code, files, tests and documentation
+	@$(PYTHON) benchmarks/count.py
+
 .PHONY: check
-check: lint types layers docs test ## all of the above, as CI does
+check: lint types layers docs test count ## all of the above, as CI does
 
+BENCHMARKS := clean_clips defects formats people peers repair robots solver start_up tree
 .PHONY: bench
-bench: $(VENV)/dev.stamp ## compare with other ways: one report with charts, in bench-results/
-	$(BIN)/python -m benchmarks -o $(BENCH_RESULTS)
-
-.PHONY: bench-gate
-bench-gate: $(VENV)/dev.stamp ## the same, quickly: warn where a ratio fell below benchmarks/baseline.json
-	$(BIN)/python -m benchmarks --quick --gate -o $(BENCH_RESULTS)
-
-.PHONY: bench-all
-bench-all: $(VENV)/dev.stamp ## run every file of benchmarks/
-	@for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python "$$file" || exit 1; done
-
-.PHONY: mutants
-mutants: $(VENV)/dev.stamp ## plant small faults in tree, cameras, validators, closed forms and schemas: do tests find them?
-	$(BIN)/python -m benchmarks.mutants
+bench: $(VENV)/dev.stamp ## measure quality and speed
+	@for name in $(BENCHMARKS); do echo "== $$name"; $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 .PHONY: fuzz
 fuzz: $(VENV)/dev.stamp ## attack every reader, command and option for an hour
-	$(BIN)/python -m benchmarks.fuzz -o fuzz-results
+	$(BIN)/python -m benchmarks.fuzz -o fuzz-results --seconds 3600
 
 .PHONY: clean
 clean: ## remove everything that make made
-	rm -rf $(VENV) build dist *.egg-info docs/_build docs/gallery docs/sg_execution_times.rst $(DEMO_RESULTS) $(BENCH_RESULTS)
+	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS)
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find posekit validators urdf viewer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

@@ -1,41 +1,33 @@
 """Follow a person before a camera: key points of MediaPipe, a posture a picture.
 
-python examples/live_camera.py --stature 1.75 --record seen.jsonl
-python examples/live_camera.py --stature 1.75 --replay seen.jsonl     # without a camera, MediaPipe or OpenCV
+python examples/live_camera.py --stature 1.75
+python examples/live_camera.py --keypoints samples/keypoints    # recorded key points in place of a camera
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import posekit
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, POINTS
 
-Picture = tuple[float, tuple[int, int], NDArray[np.float64]]
-"""Seconds, width and height, and points (33, 3): pixels and how visible each is."""
+Picture = tuple[float, tuple[int, int], Any]
+"""Seconds, width and height in pixels, and points (P, 3): pixels and confidence, NaN where unseen."""
 
 
 def from_camera(number: int) -> Iterator[Picture]:
-    """Yield what MediaPipe finds in the pictures of a camera."""
-    try:
-        import cv2
-        import mediapipe
-    except ImportError as missing:
-        raise SystemExit(
-            f"{missing.name} is not installed; expected OpenCV and MediaPipe, which find the key points: "
-            "pip install opencv-python mediapipe, or give --replay FILE"
-        ) from None
+    """Yield the 33 points that MediaPipe finds in the pictures of a camera."""
+    import cv2
+    import mediapipe  # type: ignore[import-not-found]
+
     capture = cv2.VideoCapture(number)
     if not capture.isOpened():
-        raise SystemExit(f"camera {number} does not open; give another number, or --replay FILE")
+        raise SystemExit(f"camera {number} does not open; give another number, or --keypoints FOLDER")
     with mediapipe.solutions.pose.Pose() as detector:
         start = time.monotonic()
         while True:
@@ -50,60 +42,43 @@ def from_camera(number: int) -> Iterator[Picture]:
             yield now, (width, height), points
 
 
-def from_file(path: Path) -> Iterator[Picture]:
-    """Yield what was recorded."""
-    with path.open(encoding="utf-8") as lines:
-        for line in lines:
-            one = json.loads(line)
-            width, height = one["size"]
-            points = [point or [np.nan] * 3 for point in one["points"]]
-            yield one["time"], (width, height), np.array(points, dtype=np.float64)
+def from_files(path: str, rate: float = 10.0) -> Iterator[Picture]:
+    """Yield the 19 points of joints and head that a detector wrote."""
+    detections = posekit.open(path)
+    columns = [detections.names.index(name) for name in POINTS]
+    for frame, points, confidence in zip(
+        detections.frame, detections.points, detections.confidence, strict=True
+    ):
+        seen = np.column_stack([points[columns], confidence[columns]])
+        yield frame / rate, detections.size or (1280, 720), seen
 
 
-def recorded(picture: Picture) -> str:
-    """Write a picture's points as a line."""
-    seconds, size, points = picture
-    known = [None if np.isnan(point).any() else point.round(3).tolist() for point in points]
-    return json.dumps({"time": seconds, "size": size, "points": known}) + "\n"
-
-
-def say(told: posekit.TrackedPosture, rate: float) -> str:
-    """Say in a line how far before the shoulders the hands are."""
-    if told.reason:
-        return f"{told.time:7.2f} s  {told.reason}"
+def line_of(found: Any) -> str:
+    """Say how far before the shoulders the hands are."""
+    if found.reason:
+        return f"{found.time:6.2f} s  {found.reason}"
     hands = []
     for side in ("right", "left"):
-        shoulder, wrist = (told.joints[JOINT[f"{side}_{joint}"]] for joint in ("shoulder", "wrist"))
-        off = told.deviation[JOINT[f"{side}_wrist"]]
-        hands.append(f"{side} hand {100 * (shoulder[2] - wrist[2]):4.0f} ± {100 * off:.0f} cm")
-    return (
-        f"{told.time:7.2f} s  {told.survivors} postures, the likeliest {told.probability:.0%}; "
-        f"towards the camera: {', '.join(hands)}  ({rate:.0f} pictures/s)"
-    )
+        shoulder, wrist = (found.joints[JOINT[f"{side}_{joint}"]] for joint in ("shoulder", "wrist"))
+        hands.append(f"{side} hand {100 * (shoulder[2] - wrist[2]):4.0f} cm")
+    return f"{found.time:6.2f} s  toward the camera: {', '.join(hands)}; {found.survivors} postures"
 
 
 def main() -> None:
-    """Follow until the camera ends, the file does, or Ctrl-C."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--camera", type=int, default=0, help="which camera, from 0")
-    parser.add_argument("--stature", type=float, default=1.75, help="the person's height, metres")
-    parser.add_argument("--record", type=Path, help="write what is seen, for --replay")
-    parser.add_argument("--replay", type=Path, help="what was recorded, instead of a camera")
+    """Follow until the camera ends, the files do, or Ctrl-C."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--camera", type=int, default=0, help="number of the camera, from 0")
+    parser.add_argument("--stature", type=float, default=1.75, help="height of the person, metres")
+    parser.add_argument("--keypoints", default="", help="key points in place of a camera")
     asked = parser.parse_args()
-
-    with asked.record.open("w", encoding="utf-8") if asked.record else nullcontext() as record:
-        tracker = None
-        for picture in from_file(asked.replay) if asked.replay else from_camera(asked.camera):
-            seconds, size, points = picture
-            if tracker is None:
-                tracker = posekit.Tracker(size=size, stature=asked.stature, layout="mediapipe_33")
-            if record is not None:
-                record.write(recorded(picture))
-            start = time.perf_counter()
-            told = tracker.update(points, seconds)
-            print(say(told, 1 / (time.perf_counter() - start)), flush=True)
+    tracker = None
+    for seconds, size, points in (
+        from_files(asked.keypoints) if asked.keypoints else from_camera(asked.camera)
+    ):
+        if tracker is None:
+            layout = "" if asked.keypoints else "mediapipe_33"
+            tracker = posekit.Tracker(size=size, stature=asked.stature, layout=layout)
+        print(line_of(tracker.update(points, seconds)), flush=True)
 
 
 if __name__ == "__main__":

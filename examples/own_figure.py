@@ -1,4 +1,4 @@
-"""Make the figure of another person, draw random legal postures of it, and validate them.
+"""Make the figure of another person, draw random legal postures of it, and judge them.
 
 python examples/own_figure.py
 """
@@ -8,16 +8,22 @@ import numpy as np
 import posekit
 from posekit.synthesis import random_postures
 
-figure = posekit.load_figure().from_stature(1.82).scaled({"right_hip-right_knee": 0.45})
-print(f"upper arm {figure.lengths['right_shoulder-right_elbow'] * 100:.1f} cm")
 
-q = random_postures(figure, 100, np.random.default_rng(0))
-joints = figure.forward_kinematics(q)[:, :14]
-report = posekit.Validator(figure).check(joints)
-print(f"{report.valid.sum()} of {len(joints)} postures are valid")
+def main() -> None:
+    """Judge sound postures, and one whose wrist was torn away."""
+    figure = posekit.load_figure().scaled({"right_hip-right_knee": 0.45}, stature=1.82)
+    print(f"upper arm {figure.lengths['right_shoulder-right_elbow'] * 100:.1f} cm")
 
-joints[0, 8] += [0.0, 0.0, 0.4]  # tear the right wrist away
-report = posekit.Validator(figure).check(joints[:1])
-worst = report.judgements[0]
-where = worst.where[np.nanargmin(worst.margin[0])]
-print(f"{report.verdicts[0]}: {where} is {-worst.worst[0]:.2f} m beyond the tolerance")
+    q = random_postures(figure, 20, np.random.default_rng(0))
+    joints = figure.points(q)
+    report = posekit.Validator(figure, strict=True).check(joints)
+    print(f"{report.ok.sum()} of {len(joints)} postures are valid")
+
+    torn = joints[:1].copy()
+    torn[0, 8] += [0.0, 0.0, 0.4]  # the right wrist, metres
+    report = posekit.Validator(figure, strict=True).check(torn)
+    print(report.verdicts[0], *map(str, report.spans), sep="\n  ")
+
+
+if __name__ == "__main__":
+    main()

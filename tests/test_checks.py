@@ -351,3 +351,13 @@ def test_every_check_has_a_message_and_one_spelling() -> None:
     for name, check in KNOWN.items():
         assert name == check.name and "_" not in name
         assert posekit.Validator(checks=[name.replace("-", "_")]) is not None
+
+
+def test_joint_angles_alone_have_their_root_at_neutral_and_a_zero_quaternion_is_unknown() -> None:
+    validator = posekit.Validator("g1", bodies="capsules")
+    q = np.tile(validator.robot.neutral, (3, 1))
+    assert validator.check(q[:, 7:]).ok.all()
+    q[1, 3:7] = 0.0
+    report = validator.check(q)
+    assert report.ok.tolist() == [True, False, True]
+    assert report.undecided.tolist() == [False, True, False]

@@ -402,7 +402,8 @@ class Validator:
         ----------
         given : array or Motion
             Joints (14, 3) or (N, 14, 3), with head points (N, 19, 3), metres, NaN where unknown; or configurations
-            (nq,) or (N, nq). One posture is a batch of one. Postures are taken as those of one person.
+            (nq,) or (N, nq), or (N, nq - 7) without a free root, which is then at neutral. One posture is a batch of
+            one. Postures are taken as those of one person.
         head : array (N, 5, 3), optional
             Nose, eyes and ears.
         tolerance : Tolerance, optional
@@ -455,9 +456,15 @@ class Validator:
                 raise refusal("postures", "", "a coordinate of kilometres", "metres", "scale them")
             points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
             return Motion(joints=points, joint_names=POINTS, **still)
+        body: Any = self.figure or self.robot
+        if body.free_flyer and values.shape[1:] == (count - 7,):  # angles alone: the root is at neutral
+            root = np.broadcast_to(body.neutral[:7], (len(values), 7))
+            values = np.concatenate([root, values], axis=1)
         if values.shape[1:] == (count,):
-            body: Any = self.figure or self.robot
-            known, values = np.isfinite(values).all(axis=1), values.copy()
+            values = values.copy()
+            if body.free_flyer:  # a quaternion of zeros is no rotation: such a row is unknown
+                values[np.abs(values[:, 3:7]).max(axis=1) == 0.0] = np.nan
+            known = np.isfinite(values).all(axis=1)
             values[known] = body.checked(values[known])
             name = "figure" if self.figure is not None else body.name
             return Motion(q=values, q_names=self.configuration_names, robot=name, **still)
