@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +35,6 @@ def recover(
     group: str | float | None = None,
     follow: int | None = None,
     figure: Figure | None = None,
-    progress: Callable[[int], None] | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
 
@@ -61,8 +59,6 @@ def recover(
         As the fields of `RecoverSettings`.
     figure : Figure, optional
         Body; the built-in figure by default.
-    progress : callable, optional
-        Called with the number of frames done since the last call.
 
     Returns
     -------
@@ -96,7 +92,7 @@ def recover(
         **{name: one for name, one in given.items() if one is not None}
     )
     view = view_of(source, camera=camera, person=person, layout=layout, rate=rate)
-    return recover_view(view, asked, figure=figure, progress=progress)
+    return recover_view(view, asked, figure=figure)
 
 
 def view_of(

@@ -133,6 +133,9 @@ def nearest(name: str, names: Iterable[str]) -> str:
     flipped = "-".join(reversed(name[:MAX_SHOWN_CHARACTERS].split("-")))
     if "-" in name and flipped in valid:
         return f"did you mean {flipped}?"
-    if near := difflib.get_close_matches(name[:MAX_SHOWN_CHARACTERS], valid):
+    parts = name.replace("-", "_").split("_")
+    if near := [one for one in valid if one in parts] or difflib.get_close_matches(
+        name[:MAX_SHOWN_CHARACTERS], valid
+    ):
         return f"did you mean {' or '.join(near)}?"
     return f"valid names are {', '.join(valid)}"

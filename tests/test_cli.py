@@ -170,3 +170,24 @@ def test_inspect_convert_settings_and_samples(run: Any, tmp_path: Path) -> None:
     assert code == 0
     assert "coverage = 0.99" in out
     assert run("samples", str(tmp_path / "again"))[0] == 0
+
+
+def test_long_work_shows_its_progress(folder: Path) -> None:
+    """Loops pass through what shows progress: the outermost one, and all of its items."""
+    from posekit.progress import show_with
+
+    seen: list[tuple[str, int]] = []
+
+    def bar(items: Any, label: str) -> Any:
+        held = list(items)
+        seen.append((label, len(held)))
+        yield from held
+
+    show_with(bar)
+    try:
+        posekit.validate([folder / "jump.bvh", folder / "walk.npz"])
+        posekit.recover(posekit.builtin_view("seq1"), follow=1)
+    finally:
+        show_with(None)
+    posekit.validate(folder / "jump.bvh")
+    assert seen == [("judging", 2), ("recovering", 1), ("following", 5)]

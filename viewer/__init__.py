@@ -9,10 +9,11 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras import View
-from posekit.errors import refusal
+from posekit.errors import refusal, shown
+from posekit.motion import Motion
 from posekit.recovery import Recovery
 from posekit.validators import Report
-from posekit.viewer.subjects import as_motion, frame_with_postures, subjects_of
+from posekit.viewer.subjects import USUAL_AZIMUTH, as_motion, frame_with_postures, subjects_of
 
 PICTURES: Final = (".png", ".gif", ".mp4")
 PLOTS: Final = (".png", ".svg", ".pdf")
@@ -98,6 +99,11 @@ def draw(
         if suffix not in PLOTS:
             raise refusal(path, "", f"the format {suffix}", ", ".join(PLOTS), "name a plot so")
         return write_whole(path, plotted(source, kind, suffix, frame=frame, view=view))
+    if which and isinstance(source, Motion):
+        expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture a frame"
+        raise refusal(
+            path, "--posture", shown(which), expected, "leave it out, or choose frames with --frame"
+        )
     from posekit.viewer.scene import camera_lines, pictures
 
     seen = view if isinstance(view, View) else None
@@ -105,6 +111,7 @@ def draw(
     subjects, captions, rate = subjects_of(
         source, which=which, frame=frame, urdf=urdf, view=seen, azimuth=azimuth, moving=moving
     )
+    place = _place_of_eye(azimuth, of_camera=isinstance(source, Recovery))
     camera = image = None
     if isinstance(source, Recovery) and seen is not None and not moving:
         number = frame_with_postures(source, frame)
@@ -115,6 +122,21 @@ def draw(
             camera = camera_lines(seen, number, joints, turned, subjects[0].offset)
     step = stride(suffix, rate) if frame is None else 1
     made = pictures(
-        subjects, captions=captions, size=size, elevation=elevation, camera=camera, image=image, step=step
+        subjects,
+        captions=captions,
+        size=size,
+        elevation=elevation,
+        camera=camera,
+        image=image,
+        seen_from=place,
+        step=step,
     )
     write_whole(path, encoded(made, suffix, None if rate is None else rate / step))
+
+
+def _place_of_eye(azimuth: float | None, of_camera: bool) -> str:
+    """Say from where a picture is seen: an eye turned to the person's left is to the right of their camera."""
+    degrees = USUAL_AZIMUTH if azimuth is None else azimuth
+    origin = "the camera" if of_camera else "the person's front"
+    side = "right" if (degrees > 0) == of_camera else "left"
+    return f"{abs(degrees):g} degrees {side} of {origin}" if degrees else origin

@@ -21,6 +21,7 @@ from posekit.body import Figure
 from posekit.cameras import View
 from posekit.errors import ViewerError, refusal
 from posekit.geometry import Array, rotation_between
+from posekit.progress import watched
 from posekit.skeleton import HEAD, POINT, POINTS, SEGMENTS, TREE_SEGMENTS
 from posekit.viewer.browser import Browser
 from posekit.viewer.files import Pixels, pillow
@@ -275,6 +276,7 @@ def pictures(
     elevation: float | None = None,
     camera: tuple[Array, Array] | None = None,
     image: Array | None = None,
+    seen_from: str = "",
     step: int = 1,
 ) -> Iterator[Pixels]:
     """Draw bodies frame by frame.
@@ -292,6 +294,8 @@ def pictures(
         Lines and colours of a camera, see `camera_lines`.
     image : array (P, 2), optional
         Image points that stand in the upper left corner: what the camera saw.
+    seen_from : str
+        Where the eye is, for the last line under the picture.
     step : int
         Draw each frame whose number is a multiple of it.
 
@@ -323,7 +327,7 @@ def pictures(
         browser.evaluate(
             "const viewer = new MeshCat.Viewer(document.getElementById('meshcat-pane'), false); 0"
         )
-        for frame in range(0, len(subjects[0].q), step):
+        for frame in watched(range(0, len(subjects[0].q), step), "drawing"):
             commands = stage.show(frame)
             for start in range(0, len(commands), BATCH):
                 browser.evaluate(f"posekit.apply({json.dumps(commands[start : start + BATCH])})")
@@ -334,11 +338,11 @@ def pictures(
             if frame == 0 or np.isfinite(subjects[0].q[frame]).all():
                 _check_drawn(np.asarray(picture))
             line = captions[frame] if frame < len(captions) else ""
-            yield _captioned(picture, stage, clip @ np.linalg.inv(world), line, image, inset)
+            yield _captioned(picture, stage, clip @ np.linalg.inv(world), line, seen_from, image, inset)
 
 
 def _captioned(
-    picture: Any, stage: Stage, projection: Array, line: str, image: Array | None, inset: int
+    picture: Any, stage: Stage, projection: Array, line: str, seen_from: str, image: Array | None, inset: int
 ) -> Pixels:
     """Add a strip with the caption or the label of each body under its place, and a column with the image."""
     from PIL import Image, ImageDraw, ImageFont
@@ -359,7 +363,7 @@ def _captioned(
         pen.text((place, height + 12), label, font=large, **middle)
     pen.text((inset + width / 2, height + 12), line, font=large, **middle)
     key = "right side orange, left side blue; " if isinstance(stage.subjects[0].robot, Figure) else ""
-    key += f"grid of {stage.grid:g} m"
+    key += f"grid of {stage.grid:g} m" + (f"; seen from {seen_from}" if seen_from else "")
     pen.text((inset + width / 2, height + 33), key, font=small, **{**middle, "fill": (110, 110, 110)})
     if image is not None:
         _draw_image(pen, image, (8, 8, inset - 4, 8 + height // 3), small)

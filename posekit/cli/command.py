@@ -280,13 +280,7 @@ def _refuse_overwriting(given: Mapping[str, Any]) -> None:
             )
 
 
-def progress(items: Iterable[Any], label: str, length: int | None = None) -> Any:
-    """Return a progress bar over items on a terminal, and the items themselves elsewhere."""
-    if not sys.stderr.isatty():
-        return items
-    return _bar(items, label, length)
-
-
-def _bar(items: Iterable[Any], label: str, length: int | None) -> Iterable[Any]:
-    with click.progressbar(items, label=label, length=length, file=sys.stderr) as bar:
+def progress_bar(items: Iterable[Any], label: str) -> Iterable[Any]:
+    """Go through items with a progress bar on the terminal."""
+    with click.progressbar(items, label=label, file=sys.stderr) as bar:
         yield from bar

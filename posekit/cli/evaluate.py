@@ -32,6 +32,7 @@ def evaluate(
     source: Path, output: Path | None, truth: str | None, noise: str, views: int, seed: int, **given: Any
 ) -> None:
     """Compare a result with the truth; or see a motion through virtual cameras, recover it, and compare."""
+    from posekit.errors import refusal, shown
     from posekit.evaluation import evaluate as compare
     from posekit.evaluation import evaluate_method
     from posekit.formats import open as open_file
@@ -41,9 +42,15 @@ def evaluate(
     layout = given.pop("layout")
     held = open_file(source, layout, **given)
     if isinstance(held, Recovery):
-        found = compare(held, open_file(truth or source))
+        if truth is None:
+            expected = "the true joints of a result: a view with truth, or motion"
+            raise refusal(source, "--truth", "none", expected, "give --truth FILE")
+        found = compare(held, open_file(truth))
     else:
-        levels = [float(level) for level in noise.split(",")]
+        try:
+            levels = [float(level) for level in noise.split(",")]
+        except ValueError:
+            raise refusal("", "--noise", shown(noise), "numbers of pixels", "write it as 0,2") from None
         found = evaluate_method(held, settings, noise=levels, views=views, seed=seed)
     if output is not None:
         found.save(output)

@@ -12,8 +12,9 @@ from typing import Any, Final
 
 import click
 
-from posekit.cli.command import say
+from posekit.cli.command import progress_bar, say
 from posekit.errors import PosekitError, refusal
+from posekit.progress import show_with
 
 BAD_INPUT: Final = 2
 INTERRUPTED: Final = 130
@@ -85,6 +86,7 @@ def main() -> None:
     """Run the command line: 0 done, 1 something is not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
     signal.signal(signal.SIGTERM, _terminate)
+    show_with(progress_bar if sys.stderr.isatty() else None)
     try:
         code = posekit.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
@@ -99,7 +101,8 @@ def main() -> None:
         click.echo(error.format_message())
         code = 0
     except click.UsageError as error:
-        where = f"; see posekit {error.ctx.info_name} --help" if error.ctx and error.ctx.parent else ""
+        words = error.ctx.command_path.split()[1:] if error.ctx else []
+        where = f"; see posekit {' '.join(words)} --help" if words else ""
         said = error.format_message().rstrip(".")
         if said.startswith("Got unexpected extra") and "recover" in where:
             said += "; give the files of several pictures as their folder"

@@ -68,8 +68,7 @@ def recover(source: Path, output: Path, explain: bool, linkage: str, **given: An
         fov=given["fov"],
         min_confidence=given["min_confidence"],
     )
-    with counted(len(view), "recovering") as progress:
-        recovery = recover_view(view, settings, progress=progress)
+    recovery = recover_view(view, settings)
     if output.suffix == ".html":
         from posekit.viewer import draw
 
@@ -114,22 +113,6 @@ def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: 
     return lines + [
         f"frame {k}: {about['reason']}" for k, about in enumerate(found.frames) if about["reason"]
     ]
-
-
-def counted(length: int, label: str) -> Any:
-    """Return a context whose value advances a progress bar on a terminal."""
-    import contextlib
-    import sys
-
-    if not sys.stderr.isatty():
-        return contextlib.nullcontext(None)
-
-    @contextlib.contextmanager
-    def shown() -> Any:
-        with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
-            yield bar.update
-
-    return shown()
 
 
 def picture_size(text: str | None) -> tuple[int, int] | None:

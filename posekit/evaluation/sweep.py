@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from posekit.errors import PosekitError, refusal, shown
 from posekit.evaluation.evaluate import Evaluation, evaluate
 from posekit.geometry import Array
 from posekit.motion import Motion
+from posekit.progress import watched
 from posekit.recovery import Answer, Frames, Recovery, Survivors
 from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINTS, POINTS
@@ -26,7 +27,6 @@ def evaluate_method(
     noise: Sequence[float] = (0.0,),
     views: int = 24,
     seed: int = 0,
-    progress: Callable[[int], None] | None = None,
 ) -> Evaluation:
     """Recover views whose truth is known, at levels of noise, and measure every frame.
 
@@ -46,8 +46,6 @@ def evaluate_method(
         Number of frames of a motion.
     seed : int
         Seed of the noise and of the cameras.
-    progress : callable, optional
-        Called with the number of frames after each view.
 
     Raises
     ------
@@ -64,7 +62,8 @@ def evaluate_method(
         complete = int(np.isfinite(source.figure_joints).all(axis=(1, 2)).sum())
         drawn = mocap_views(source, min(views, max(complete, 1)), np.random.default_rng(seed))
         source = [({"clip": each.source}, each) for each in drawn]
-    for number, (keys, view) in enumerate([({}, source)] if isinstance(source, View) else source):
+    given = [({}, source)] if isinstance(source, View) else source
+    for number, (keys, view) in enumerate(watched(given, "evaluating")):
         draw = np.random.default_rng((seed, number)).standard_normal((len(view), len(POINTS), 2))
         for level in noise:
             part = noisy(view, level, draw)
@@ -73,8 +72,6 @@ def evaluate_method(
             except PosekitError as error:
                 result = _empty(part, str(error))
             parts.append(evaluate(result, part.truth, seed=seed).with_keys(**keys, noise=level))
-            if progress:
-                progress(len(part))
     if not parts:
         raise refusal("", "views", "none", "views with truth", "take more frames, or a larger distance")
     about = {"noise_px": list(noise), "seed": seed}

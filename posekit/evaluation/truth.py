@@ -76,7 +76,11 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
                 if len(result[k]):
                     image[k] = camera.project(result[k].joints[0])
         return _placed(camera, image, np.asarray(result.frames.time), given)
-    truth = np.asarray(given.truth if isinstance(given, View) else given, dtype=np.float64)
+    given = given.truth if isinstance(given, View) else given
+    if not isinstance(given, np.ndarray | list | tuple):
+        expected = "a view with truth, or motion of the same seconds"
+        raise refusal(result.source, "truth", f"a {type(given).__name__}", expected, "give another file")
+    truth = np.asarray(given, dtype=np.float64)
     if truth.shape != (len(result), len(JOINTS), 3) or not np.isfinite(truth).any():
         expected = f"known joints of shape ({len(result)}, {len(JOINTS)}, 3)"
         raise refusal(result.source, "truth", f"shape {truth.shape}", expected, "give these frames' truth")

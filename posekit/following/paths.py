@@ -9,7 +9,7 @@ all paths give the probability of each survivor given all frames (Rabiner 1989, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -20,6 +20,7 @@ from scipy.special import digamma, logsumexp
 from posekit.errors import refusal
 from posekit.following.kalman import DENSITY, Moving, smooth
 from posekit.geometry import Array
+from posekit.progress import watched
 from posekit.recovery.answer import lay
 from posekit.recovery.recovery import Paths, Recovery
 from posekit.skeleton import SEGMENT_NAMES
@@ -224,7 +225,7 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
     return np.where((both & (moved > reach * (1 + 1e-12) + 1e-12)).any(axis=2), np.inf, cost)
 
 
-def follow(recovery: Recovery, *, paths: int = 2, progress: Callable[[int], None] | None = None) -> Recovery:
+def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
     The first path is what is expected of each frame given all frames, smoothed and laid onto the person's lengths.
@@ -236,8 +237,6 @@ def follow(recovery: Recovery, *, paths: int = 2, progress: Callable[[int], None
     recovery : Recovery
     paths : int
         Number of paths; fewer are found if there are not so many.
-    progress : callable, optional
-        Called with the number of frames done since the last call.
 
     Returns
     -------
@@ -267,10 +266,8 @@ def follow(recovery: Recovery, *, paths: int = 2, progress: Callable[[int], None
         )
     frames = [candidates(recovery, k) for k in range(len(recovery))]
     trellis = Trellis()
-    for frame in frames:
+    for frame in watched(frames, "following"):
         trellis.push(frame)
-        if progress is not None:
-            progress(1)
     ends = [stage.survivor for stage in trellis.stages]
     marginals = trellis.marginals()
     lengths = np.array([recovery.lengths[name] for name in SEGMENT_NAMES])

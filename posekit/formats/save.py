@@ -65,6 +65,10 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
         followed = thing.path
         thing = thing.motion(which or ("path" if followed is not None and len(followed) else "answer"))
         kind = "Motion"
+    elif which:
+        raise refusal(
+            path, "--posture", shown(which), "no choice: a motion has one posture a frame", "leave it out"
+        )
     known = WRITERS.get(kind, {})
     if suffix not in known:
         expected = ", ".join(known) or "a motion, view, result or report"

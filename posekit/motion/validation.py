@@ -6,7 +6,7 @@ import csv
 import io
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.errors import InputError, refusal, shown
 from posekit.motion.motion import Motion
+from posekit.progress import watched
 from posekit.settings import EXACT, Tolerance, ValidateSettings, number
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.judge import Validator, validate_motion
@@ -63,7 +64,6 @@ def validate(
     person: int | None = None,
     keep: str | Path | None = None,
     keep_spans: float | None = None,
-    progress: Callable[[str], None] | None = None,
     **changes: Any,
 ) -> Report:
     """Judge whatever holds postures: files, folders and patterns, arrays, motions, results.
@@ -85,8 +85,6 @@ def validate(
         New folder for the clips that pass: see `keep_clips`.
     keep_spans : float, optional
         Least duration of the longest valid span, seconds, that is kept of other clips.
-    progress : callable, optional
-        Called with the name of each file when it is judged.
     **changes
         Single fields of the settings.
 
@@ -122,7 +120,7 @@ def validate(
             given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
         return judge.report(given, up=up, rate=rate)
     facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
-    report = _files(list(files_of(given)), judge, facts, progress)
+    report = _files(list(files_of(given)), judge, facts)
     if keep is not None:
         report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=keep_spans)))
     return report
@@ -295,16 +293,14 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
     return replace(motion, q=q, q_names=names, notes=(*motion.notes, *notes))
 
 
-def _files(
-    paths: Sequence[Path], judge: _Judge, facts: Mapping[str, Any], progress: Callable[[str], None] | None
-) -> Report:
+def _files(paths: Sequence[Path], judge: _Judge, facts: Mapping[str, Any]) -> Report:
     """Judge files one after the other; of several, those that cannot be read are listed."""
     import posekit
 
     reports: list[Report] = []
     refused: list[str] = []
     skipped: list[str] = []
-    for path in paths:
+    for path in watched(paths, "judging"):
         try:
             held: Any = posekit.open(
                 path,
@@ -325,8 +321,6 @@ def _files(
             if len(paths) == 1:
                 raise
             (skipped if _is_view(path) else refused).append(path.name if _is_view(path) else str(error))
-        if progress is not None:
-            progress(str(path))
     if not reports:
         raise InputError(
             f"none of {plural(len(paths), 'file')} can be judged; the first: {[*refused, *skipped][0]}"

@@ -16,6 +16,7 @@ from posekit.body import Figure, LengthUncertainty
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
 from posekit.geometry import Array
+from posekit.progress import watched
 from posekit.ranking import Up, deviation_of_tolerance, log_terms, softmax
 from posekit.recovery.answer import answer_of, joint_radius
 from posekit.recovery.certify import (
@@ -75,7 +76,6 @@ def recover(
     settings: RecoverSettings | None = None,
     *,
     figure: Figure | None = None,
-    progress: Callable[[int], None] | None = None,
     **changes: Any,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
@@ -89,8 +89,6 @@ def recover(
     settings : RecoverSettings, optional
     figure : Figure, optional
         The built-in one by default; the view's own lengths, stature and head points are applied to it.
-    progress : callable, optional
-        Called with the number of frames done since the last call.
     **changes
         Fields of `RecoverSettings` that differ from `settings`.
 
@@ -112,11 +110,9 @@ def recover(
     conductor = _Conductor(view, settings, person, lengths)
     found: list[Found] = []
     block = EXACT_FRAMES_AT_ONCE if conductor.sight.may_be_exact else FRAMES_AT_ONCE
-    for start in range(0, len(view), block):
+    for start in watched(range(0, len(view), block), "recovering"):
         part = np.arange(start, min(start + block, len(view)))
         found += conductor.frames(part)
-        if progress is not None:
-            progress(len(part))
     recovery = gathered(view, conductor.sight, person, found, conductor.document(), conductor.tolerances())
     if settings.clip_lengths and len(recovery.survivors):
         measured = _clip_lengths(recovery)

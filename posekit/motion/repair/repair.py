@@ -19,6 +19,7 @@ from posekit.motion.repair.clip import Clip, RobotClip
 from posekit.motion.repair.files import in_bvh, in_table
 from posekit.motion.repair.time import mended
 from posekit.motion.validation import files_of, in_order, names_below
+from posekit.progress import watched
 from posekit.settings import ValidateSettings
 from posekit.validators.judge import Validator
 from posekit.validators.report import Report, joined, plural
@@ -93,7 +94,6 @@ def repair(
     up: str | None = None,
     rate: float | None = None,
     person: int | None = None,
-    progress: Callable[[str], None] | None = None,
     **changes: Any,
 ) -> Repaired:
     """Find the nearest motion that passes all checks.
@@ -112,8 +112,6 @@ def repair(
         copied unchanged.
     urdf, settings, layout, unit, up, rate, person, **changes
         As in `posekit.validate`.
-    progress : callable, optional
-        Called with the name of each file when it is done.
 
     Returns
     -------
@@ -149,7 +147,7 @@ def repair(
     else:
         files = list(files_of(source))
         if len(files) > 1 or not Path(files[0]).samefile(str(source)):
-            return _folder(files, target, judge, facts, urdf, progress)
+            return _folder(files, target, judge, facts, urdf)
         done = _file(files[0], judge, facts, urdf)
     if target is not None:
         done.save(target)
@@ -184,7 +182,6 @@ def _folder(
     judge: Callable[[str], Validator],
     facts: dict[str, Any],
     urdf: Any,
-    progress: Callable[[str], None] | None,
 ) -> Repaired:
     """Repair files into a new folder; a file that cannot be read or written is named."""
     folder = None if target is None else Path(target)
@@ -194,7 +191,7 @@ def _folder(
     done: list[Repaired] = []
     notes: list[str] = []
     refused: list[str] = []
-    for path in files:
+    for path in watched(files, "repairing"):
         try:
             one = _file(path, judge, facts, urdf)
             if folder is not None:
@@ -206,8 +203,6 @@ def _folder(
                 notes.append(f"{names[str(path)]}: {'; '.join(one.notes)}")
         except InputError as error:
             refused.append(str(error))
-        if progress is not None:
-            progress(str(path))
     if not done:
         raise InputError(f"none of {plural(len(files), 'file')} can be repaired; the first: {refused[0]}")
     valid = sum(bool(one.report.ok.all()) for one in done)
