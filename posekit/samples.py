@@ -129,8 +129,8 @@ def samples(folder: str | Path) -> list[str]:
 def _write_key_points(folder: Path, points: Array) -> None:
     """Write the key points of a walk (T, 19, 3), one file per picture, and the camera that saw them."""
     from posekit.cameras import PinholeCamera
+    from posekit.files import write_bytes
     from posekit.formats import save
-    from posekit.formats.files import write_bytes
     from posekit.skeleton import POINTS
     from posekit.synthesis import look_at, to_camera
 
@@ -160,7 +160,7 @@ def _write_robots(folder: Path) -> None:
     """Write a view of a Panda robot, and a squatting G1 as arrays that simulators exchange."""
     import pinocchio as pin
 
-    from posekit.formats.files import write_bytes
+    from posekit.files import write_bytes
     from posekit.formats.npz_file import packed
     from posekit.recovery.objects import load_linkage
     from posekit.robots import load_robot

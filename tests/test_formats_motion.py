@@ -683,7 +683,7 @@ def test_what_is_no_file_of_ours_is_refused_in_one_line(tmp_path: Path, name: st
 
 
 def test_a_gzip_file_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr("posekit.formats.files.MAX_BYTES", 1_000_000)
+    monkeypatch.setattr("posekit.files.MAX_BYTES", 1_000_000)
     (tmp_path / "big.csv.gz").write_bytes(gzip.compress(b"0" * 5_000_000))
     with pytest.raises(posekit.InputError, match="more than 1,000,000 bytes"):
         posekit.open(tmp_path / "big.csv.gz")

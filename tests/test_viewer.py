@@ -15,7 +15,7 @@ from PIL import Image
 import posekit
 from posekit.cameras import PinholeCamera
 from posekit.errors import InputError, ViewerError
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINTS, TREE_SEGMENTS
 from posekit.viewer.browser import Browser, find_browser
 
 ARM = """<robot name="arm"><link name="base"/>
@@ -126,6 +126,23 @@ def test_a_motion_page_has_the_findings_of_its_report(folder: Path, motion: pose
     assert elbow["joints"] == [JOINTS.index("right_elbow")]
     spans = data["clips"][0]["spans"]
     assert all(data["frames"][span["index"]]["number"] == span["worst"] for span in spans)
+
+
+def test_a_page_holds_a_person_and_a_robot(folder: Path, motion: posekit.Motion) -> None:
+    """Bodies of several kinds are shown by the 14 joints that they have in common."""
+    robot = posekit.load_robot("g1")
+    walk = posekit.Motion(q=np.tile(robot.neutral, (4, 1)), robot="g1", q_names=robot.configuration_names)
+    posekit.save(walk, folder / "g1.npz")
+    posekit.save(motion, folder / "person.npz")
+    files = [folder / "g1.npz", folder / "person.npz"]
+    report = posekit.validate(files)
+    posekit.render(report, folder / "mixed.html", view=[posekit.open(file) for file in files])
+    data = data_of(folder / "mixed.html")
+    assert data["points"][: len(JOINTS)] == list(JOINTS) and len(data["frames"]) == len(report)
+    standing, points = robot.points(robot.neutral[None])[0], points_of(data)[0][0, : len(JOINTS)]
+    for a, b in TREE_SEGMENTS:
+        shown, true = (np.linalg.norm(one[a] - one[b]) for one in (points, standing))
+        assert shown == pytest.approx(true, abs=2e-3, nan_ok=True)
 
 
 def test_texts_of_files_stay_texts(folder: Path, motion: posekit.Motion) -> None:

@@ -74,7 +74,8 @@ def draw(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     posekit.render(standing, f"{folder}/standing.html")
     """
-    from posekit.viewer.files import encoded, stride, write_whole
+    from posekit.files import write_bytes
+    from posekit.viewer.files import encoded, stride
 
     path = Path(target)
     suffix = path.suffix.lower()
@@ -86,7 +87,7 @@ def draw(
 
         moving, drawn = suffix != ".png", source if isinstance(source, View) else as_motion(source)
         frames, rate = overlaid(drawn, Path(over), view=view, frame=frame, which=which, moving=moving)
-        return write_whole(path, encoded(frames, suffix, rate))
+        return write_bytes(path, encoded(frames, suffix, rate))
     source = as_motion(source)
     if suffix == ".html":
         from posekit.viewer.page import write_page
@@ -98,7 +99,7 @@ def draw(
         kind = which if which in PLOT_NAMES else "timeline" if isinstance(source, Report) else "angles"
         if suffix not in PLOTS:
             raise refusal(path, "", f"the format {suffix}", ", ".join(PLOTS), "name a plot so")
-        return write_whole(path, plotted(source, kind, suffix, frame=frame, view=view))
+        return write_bytes(path, plotted(source, kind, suffix, frame=frame, view=view))
     if which and isinstance(source, Motion):
         expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture a frame"
         raise refusal(
@@ -131,7 +132,7 @@ def draw(
         seen_from=place,
         step=step,
     )
-    write_whole(path, encoded(made, suffix, None if rate is None else rate / step))
+    write_bytes(path, encoded(made, suffix, None if rate is None else rate / step))
 
 
 def _place_of_eye(azimuth: float | None, of_camera: bool) -> str:

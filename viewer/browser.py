@@ -54,16 +54,13 @@ def find_browser() -> str:
         If there is none, or the variable names none.
     """
     named = os.environ.get(VARIABLE)
-    if named:
-        found = shutil.which(named)
-        if found is None:
-            raise ViewerError(f"{VARIABLE}: got {named!r}; expected a program that can be run; {REMEDY}")
-        return found
-    for name in NAMES:
-        found = shutil.which(name)
-        if found is not None:
-            return found
-    raise ViewerError(f"browser: got none of {', '.join(NAMES)} on PATH; expected one to draw with; {REMEDY}")
+    names = [named] if named else NAMES
+    found = next(filter(None, map(shutil.which, names)), None)
+    if found is None:
+        raise ViewerError(
+            f"browser: got none of {', '.join(names)} on PATH; expected one to draw with; {REMEDY}"
+        )
+    return found
 
 
 class Browser:

@@ -1,20 +1,18 @@
-"""Files of pictures: PNG, GIF and MP4 as bytes, and a file that is written whole or not at all."""
+"""Files of pictures: PNG, GIF and MP4 as bytes."""
 
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from importlib import import_module
 from itertools import chain
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import InputError, refusal
+from posekit.errors import InputError
 
 Pixels = NDArray[np.uint8]
 
@@ -23,25 +21,6 @@ FASTEST: Final = {".gif": 20.0, ".mp4": 60.0}
 
 #: Pictures a second of an animation whose rate is not known.
 USUAL_RATE: Final = 10.0
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If the folder does not exist or cannot be written.
-    """
-    if not path.parent.is_dir():
-        raise refusal(path, "", f"no folder {path.parent}", "a folder that exists", "make it first")
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise refusal(path, "", str(error.strerror), "a file that can be written", "give another") from None
 
 
 def stride(suffix: str, rate: float | None) -> int:

@@ -84,7 +84,7 @@ def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: 
     """Recover another articulated object than a person from an uncalibrated view, and say what was found."""
     import json
 
-    from posekit.formats.files import write_bytes
+    from posekit.files import write_bytes
     from posekit.formats.open import parsed
     from posekit.formats.view_file import read_object
     from posekit.recovery.objects import load_linkage, recover_object

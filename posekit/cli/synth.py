@@ -157,7 +157,7 @@ def object_command(robot: str, output: Path, frames: int, noise: float, seed: in
 
     import numpy as np
 
-    from posekit.formats.files import write_bytes
+    from posekit.files import write_bytes
     from posekit.recovery.objects import load_linkage
     from posekit.robots import load_robot
     from posekit.synthesis import object_document, object_view

@@ -163,7 +163,7 @@ class Evaluation(Record):
         InputError
             If the name ends otherwise, or the file cannot be written.
         """
-        from posekit.formats.files import write_bytes
+        from posekit.files import write_bytes
         from posekit.formats.result_file import plain
         from posekit.formats.tables import csv_text
 

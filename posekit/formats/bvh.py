@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from posekit.errors import refusal, shown
+from posekit.files import text
 from posekit.formats.body_checks import METRES, points_motion
-from posekit.formats.files import text
 from posekit.formats.options import Options
 from posekit.geometry import Array, coordinate_rotation
 

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal, shown
+from posekit.files import write_bytes
 from posekit.formats.body_checks import UNIT_WORDS, points_motion
-from posekit.formats.files import write_bytes
 from posekit.formats.options import Options
 from posekit.formats.trc import one_recording, seconds
 from posekit.geometry import UP_AXES, Array

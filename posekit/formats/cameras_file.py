@@ -21,8 +21,8 @@ import numpy as np
 
 from posekit.cameras import PinholeCamera
 from posekit.errors import CameraError, InputError, cut, one_line, refusal, shown
+from posekit.files import text, write_bytes
 from posekit.formats import json_file
-from posekit.formats.files import text, write_bytes
 from posekit.formats.node import Node, as_numbers
 from posekit.formats.options import Options
 from posekit.geometry import UP_AXES, Array, rotation_from_vector, vector_from_rotation

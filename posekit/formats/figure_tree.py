@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from posekit.errors import refusal
+from posekit.files import write_bytes
 from posekit.formats.body_checks import METRES
 from posekit.formats.bvh import Bvh, holds
-from posekit.formats.files import write_bytes
 from posekit.formats.trc import one_recording, seconds
 from posekit.geometry import Array, rotation_from_quaternion, up_vector
 from posekit.geometry.rotations import coordinate_rotation, rotation_between, turned_near

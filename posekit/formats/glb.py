@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import refusal
+from posekit.files import write_bytes
 from posekit.formats.figure_tree import NODES, TO_Y_UP, euler_rotation, figure_of, offsets, placed, rest_place
-from posekit.formats.files import write_bytes
 from posekit.formats.trc import seconds
 from posekit.geometry import Array, Ints, cross, quaternion_from_rotation
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import refusal, shown
+from posekit.files import write_bytes
 from posekit.formats.body_checks import UNIT_WORDS, points_motion
-from posekit.formats.files import write_bytes
 from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options

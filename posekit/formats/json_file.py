@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, cut, refusal, shown
-from posekit.formats.files import text, write_bytes
+from posekit.files import text, write_bytes
 
 #: Bytes of JSON that are parsed or written: in memory a parsed document takes about ten times as many.
 MAX_JSON_BYTES: Final = 500_000_000

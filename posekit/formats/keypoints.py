@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras.detections import Detections
+from posekit.files import read_bytes
 from posekit.formats import json_file
 from posekit.formats.detection_rows import Rows, detections_of
-from posekit.formats.files import read_bytes
 from posekit.formats.node import Node
 from posekit.formats.options import Options
 from posekit.formats.tables import Table

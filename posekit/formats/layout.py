@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import nearest, refusal, shown
-from posekit.formats.files import read_bytes, text
+from posekit.files import read_bytes, text
 from posekit.geometry import Array, cross, dot, unit
 from posekit.motion.motion import NAMES
 from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, TooLargeError, one_line, refusal, shown
-from posekit.formats.files import MAX_BYTES
+from posekit.files import MAX_BYTES
 
 #: Names that a pickle may use, by module and name.
 Named = dict[tuple[str, str], Any]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.errors import refusal, shown
-from posekit.formats.files import read_bytes
+from posekit.files import read_bytes
 from posekit.formats.node import undamaged
 from posekit.formats.options import Options
 from posekit.geometry import UP_AXES

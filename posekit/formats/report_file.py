@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from posekit.errors import refusal, shown
+from posekit.files import write_bytes
 from posekit.formats import json_file
-from posekit.formats.files import write_bytes
 from posekit.formats.json_file import nullable
 from posekit.formats.node import Node, schema_of, undamaged
 from posekit.formats.options import Options

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import refusal, shown
+from posekit.files import write_bytes
 from posekit.formats import json_file
-from posekit.formats.files import write_bytes
 from posekit.formats.json_file import nullable
 from posekit.formats.node import Node, schema_of, undamaged
 from posekit.formats.options import Options

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import refusal, shown
-from posekit.formats.files import text
+from posekit.files import text
 from posekit.geometry import Array
 
 #: Rows of names before the numbers: DeepLabCut has 4.

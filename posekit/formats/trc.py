@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from posekit.errors import refusal, shown
+from posekit.files import write_bytes
 from posekit.formats.body_checks import UNIT_WORDS, points_motion, times
-from posekit.formats.files import write_bytes
 from posekit.formats.options import Options
 from posekit.formats.tables import MISSING, Table, numbers
 from posekit.geometry import Array

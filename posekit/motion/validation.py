@@ -507,7 +507,7 @@ def save_clips(report: Report, path: str | Path) -> None:
     if name.endswith(".csv"):
         _write_table(Path(path), rows)
     elif name.endswith(".parquet"):
-        from posekit.formats.files import write_bytes
+        from posekit.files import write_bytes
         from posekit.formats.parquet import packed_table
 
         columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}

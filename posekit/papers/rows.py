@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from posekit.formats.files import write_bytes
+from posekit.files import write_bytes
 
 Verdict = Literal["agrees", "differs", "open"]
 

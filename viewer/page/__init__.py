@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from posekit.viewer.files import write_whole
+from posekit.files import write_bytes
 from posekit.viewer.page.data import page_data
 from posekit.viewer.subjects import as_motion
 
@@ -51,7 +51,7 @@ def write_page(
     """
     path = Path(path)
     data = page_data(as_motion(source), path.stem, view=view, frame=frame, urdf=urdf)
-    write_whole(path, page_html(data).encode())
+    write_bytes(path, page_html(data).encode())
 
 
 def page_html(data: Mapping[str, Any]) -> str:

@@ -98,11 +98,17 @@ def _judged(motion: Motion, urdf: str) -> Report:
     robot, q = drawn.configured(motion, urdf)
     if isinstance(robot, Figure):
         return Validator().check(motion)
-    try:
-        _ = robot.joint_map
-    except InputError:
+    if not _is_humanoid(robot):
         return Validator(robot).check(q)
     return Validator(robot).check(replace(motion, q=q, q_names=robot.configuration_names))
+
+
+def _is_humanoid(robot: Robot) -> bool:
+    """Tell whether a robot has a joint map."""
+    try:
+        return bool(len(robot.joint_map.columns))
+    except InputError:
+        return False
 
 
 def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str) -> Json:
@@ -110,15 +116,16 @@ def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str
     summary = _summary(report)
     if not motions:
         return {"kind": "report", "title": title, "frames": [], **summary}
+    bodies = [drawn.configured(motion, urdf) for motion in motions]
+    robot = bodies[0][0]
+    alike = len({tuple(one.model.names) for one, _ in bodies}) == 1
     parts: list[Array] = []
-    for motion in motions:
-        robot, q = drawn.configured(motion, urdf)
-        R = drawn.facing(robot, q, drawn.upright(motion))
+    for motion, (one, q) in zip(motions, bodies, strict=True):
+        R = drawn.facing(one, q, drawn.upright(motion))
         order = np.argsort(np.asarray(motion.clip), kind="stable")
-        parts.append(_points(motion, robot, q)[order] @ R.T)
-    if len({part.shape[1] for part in parts}) > 1:  # bodies of several kinds have no skeleton in common
-        return {"kind": "report", "title": title, "frames": [], **summary}
-    points, skeleton = np.concatenate(parts), _skeleton(robot)
+        # Bodies of several kinds have the 14 joints in common.
+        parts.append((_points(motion, one, q) if alike else _joints(one, q))[order] @ R.T)
+    points, skeleton = np.concatenate(parts), _skeleton(robot if alike else load_figure())
     rows = _kept(report)
     # Alternative postures of a frame follow each other.
     changes = (np.diff(report.clip[rows]) != 0) | (np.diff(report.frame[rows]) != 0)
@@ -168,6 +175,14 @@ def _points(motion: Motion, robot: Robot, q: Array) -> Array:
     places = np.full((len(q), len(drawn.link_frames(robot)), 3), np.nan)
     places[known] = drawn.link_places(robot, q[known])
     return places
+
+
+def _joints(robot: Robot, q: Array) -> Array:
+    """Return the 14 joints (T, 19, 3) of any body, without a head; NaN where it has none."""
+    known = np.isfinite(q).all(axis=1) & _is_humanoid(robot)
+    joints = np.full((len(q), len(JOINTS), 3), np.nan)
+    joints[known] = robot.points(q[known])[:, : len(JOINTS)]
+    return _with_head(joints)
 
 
 def _skeleton(robot: Robot) -> Json:

@@ -268,7 +268,7 @@ def in_table(clip: Clip, given: Array, path: str | Path, layout: str) -> str:
     """
     from scipy.spatial.transform import Rotation
 
-    from posekit.formats.files import read_bytes
+    from posekit.files import read_bytes
     from posekit.formats.layout import load_layout
     from posekit.formats.tables import parse
 

@@ -76,7 +76,7 @@ class Repaired(Record):
         if same and bool(self.before.ok.all()):
             shutil.copyfile(source, path)
         elif self.text and path.suffix.lower() in TABLES:
-            from posekit.formats.files import write_bytes
+            from posekit.files import write_bytes
 
             write_bytes(path, self.text.encode())
         else:
