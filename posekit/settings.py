@@ -26,6 +26,7 @@ MAX_LENGTH_DEVIATION: Final = 0.3
 MAX_DEVIATION: Final = 1000.0
 
 Root = Literal["auto", "given", "head", "torso", "search"]
+Proportions = Literal["auto", "figure", "people", "taylor"]
 Bodies = Literal["auto", "meshes", "capsules", "none"]
 Walkers = Literal["paper", "people", "paper-printed"]
 
@@ -229,8 +230,9 @@ class RecoverSettings(Settings):
         Height of the person, metres.
     root : {"auto", "given", "head", "torso", "search"}
         How the neck is placed: as the view gives it, from six head points, or from the body. ``search`` is ``auto``.
-    proportions : {"figure", "taylor"}
-        Relative lengths of an uncalibrated view: the figure's, or Taylor's Table 1.
+    proportions : {"auto", "figure", "people", "taylor"}
+        Relative lengths of a person whose lengths are not given: the figure's; those between the joints of people, by
+        default behind key points and photographs; or, without a camera, Taylor's Table 1.
     scale : str, optional
         Scale of an uncalibrated view: ``min``, ``likely``, a number in pixels a metre, ``stature:PX`` or constraints
         such as ``closure:1,coplanar:0.5``.
@@ -260,7 +262,7 @@ class RecoverSettings(Settings):
     length_deviation: float | None = None
     stature: float | None = None
     root: Root = "auto"
-    proportions: Literal["figure", "taylor"] = "figure"
+    proportions: Proportions = "auto"
     scale: str | None = None
     nearer: Any = None
     infer: bool = True
@@ -275,7 +277,7 @@ class RecoverSettings(Settings):
         self._one_of("root", get_args(Root))
         if self.root == "search":  # the solver searches all depths anyway
             self._set("root", "auto")
-        self._one_of("proportions", ("figure", "taylor"))
+        self._one_of("proportions", get_args(Proportions))
         self._number("tangent_tolerance", 0.0, remedy="give metres, or write the unit as in 2cm")
         self._number("deviation", 0.0, MAX_DEVIATION)
         self._number("length_deviation", 0.0, MAX_LENGTH_DEVIATION)

@@ -13,6 +13,7 @@ from posekit.recovery import Answer, Frames, Recovery, Survivors
 from posekit.recovery.answer import NARROWED, answer_of, joint_radius, lay, representatives
 from posekit.recovery.conductor import recover
 from posekit.recovery.scales import likely_scale
+from posekit.samples import samples
 from posekit.settings import EXACT
 from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
 from posekit.synthesis import random_views
@@ -169,7 +170,7 @@ def test_a_photograph_is_recovered_up_to_its_scale(random_frames):
         time=random_frames.time,
         image=random_frames.truth[..., :2] * s,
     )
-    recovery = recover(view)
+    recovery = recover(view, proportions="figure")
     table = recovery.survivors
     image = table.joints[..., :2] * table.scale[:, None, None]
     off = np.linalg.norm(image - view.image[table.frame], axis=2)
@@ -178,6 +179,32 @@ def test_a_photograph_is_recovered_up_to_its_scale(random_frames):
         assert frame.sure_of == "relative to the neck"
         assert pa_mpjpe(frame.joints, truth).min() < 0.12
         assert (np.abs(np.log(frame.scale / s)) < 0.5).all()
+
+
+def test_a_photograph_of_a_stranger_has_the_proportions_of_people(tmp_path):
+    """A walker with the segment lengths of Winter 2009, seen from all around, 1 px off."""
+    limbs = {"shoulder-elbow": 0.186, "elbow-wrist": 0.146, "hip-knee": 0.245, "knee-ankle": 0.246}
+    lengths = {"neck-pelvis": 0.40, "right_shoulder-left_shoulder": 0.34, "right_hip-left_hip": 0.19}
+    for side in ("right", "left"):
+        lengths |= {f"neck-{side}_shoulder": 0.18, f"pelvis-{side}_hip": 0.13}
+        for name, share in limbs.items():
+            lengths["-".join(f"{side}_{joint}" for joint in name.split("-"))] = 1.75 * share
+    person = FIGURE.scaled(lengths)
+    samples(tmp_path)
+    walk = posekit.open(tmp_path / "walk.npz")
+    q = FIGURE.configurations(walk.figure_joints[::8]).q
+    x, y, z = np.moveaxis(person.forward_kinematics(q)[:, :14] - q[:, None, :3], -1, 0)  # y is up
+    turn = np.linspace(0, 2 * np.pi, len(q))[:, None]
+    truth = np.stack([x * np.cos(turn) + z * np.sin(turn), -y, 4 - z * np.cos(turn) + x * np.sin(turn)], -1)
+    image = truth[..., :2] / truth[..., 2:] * 900
+    image += np.random.default_rng(1).normal(size=image.shape)
+    camera = ScaledOrthographicCamera(scale=None)
+    view = posekit.View(camera=camera, time=np.arange(len(q)) / 4, image=image, deviation=1.0)
+    error = {
+        proportions: np.nanmedian(pa_mpjpe(recover(view, proportions=proportions).answer.joints, truth))
+        for proportions in ("auto", "people", "figure")
+    }
+    assert error["auto"] == error["people"] < 0.9 * error["figure"]
 
 
 def test_an_exact_photograph_has_an_exact_tree():

@@ -12,7 +12,7 @@ import numpy as np
 from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.body.lengths import stature_from_lengths
 from posekit.body.uncertainty import KNOWN_STATURE, STATED_LENGTHS, UNKNOWN_ADULT
-from posekit.cameras import View
+from posekit.cameras import ScaledOrthographicCamera, View
 from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
@@ -52,8 +52,8 @@ def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> F
     stature = settings.stature or view.stature
     base = figure or load_figure()
     lengths = dict(view.lengths)
-    if view.derived and figure is None and not lengths and settings.proportions == "figure":
-        # A detector's points are no joints: another body lies between them.
+    if _of_people(view, settings) and figure is None:
+        # Another body than the figure's lies between a detector's points, and in a stranger's photograph.
         lengths = {
             name: share * (stature or KEY_POINTS["stature"]) for name, share in KEY_POINTS["shares"].items()
         }
@@ -65,6 +65,14 @@ def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> F
             if found := TAYLOR_LENGTHS.get(name, TAYLOR_LENGTHS.get(sideless)):
                 lengths[name] = found * unit
     return _person(base, stature, tuple(lengths.items()), view.shoulders, tuple(head.items()))
+
+
+def _of_people(view: View, settings: RecoverSettings) -> bool:
+    """Tell whether the person has the proportions of people: those of key points, and of photographs by default."""
+    if settings.proportions != "auto":
+        return settings.proportions == "people"
+    unscaled = isinstance(view.camera, ScaledOrthographicCamera) and view.camera.scale is None
+    return not view.lengths and (bool(view.derived) or (unscaled and settings.scale in (None, "likely")))
 
 
 @lru_cache(maxsize=32)
@@ -95,7 +103,7 @@ def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -
         return LengthUncertainty.uniform(stated)
     if own_figure:
         return STATED_LENGTHS
-    if view.derived and not view.lengths and settings.proportions == "figure":
+    if _of_people(view, settings):
         size = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
         return LengthUncertainty(common=size.common, own=KEY_POINTS["deviations"])
     other = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE

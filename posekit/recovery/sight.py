@@ -117,9 +117,9 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
         if settings.root != "auto":
             raise refusal("", "root", settings.root, "no root: the view has no depth", "leave it out")
         return _photograph(view, person, settings, lengths, pixels, may_be_exact, reasons)
-    for name in ("scale", "proportions"):
-        if getattr(settings, name) not in (None, "figure"):
-            raise refusal("", name, str(getattr(settings, name)), "an uncalibrated view", "leave it out")
+    for name, asked in (("scale", settings.scale), ("proportions", settings.proportions)):
+        if asked not in (None, "auto", "figure", "people"):
+            raise refusal("", name, str(asked), "an uncalibrated view", "leave it out")
     return _calibrated(view, person, settings, lengths, pixels, may_be_exact, reasons)
 
 
