@@ -85,6 +85,11 @@ LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2],
 N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 
 
+def both(name: str) -> list[int]:
+    """Return the indices of the right and the left joint of a name as "hip"."""
+    return [JOINT[f"{side}_{name}"] for side in SIDES]
+
+
 def segment_name(segment: tuple[int, int]) -> str:
     """Return the name of a segment in files: `a-b`, with a before b in tree order."""
     start, end = sorted(segment)

@@ -115,6 +115,11 @@ def _stature(body: Body) -> float:
     return stature if stature > 0 else USUAL_STATURE
 
 
+def up_of(body: Body) -> Array:
+    """Return the unit vector against gravity (3,) of a body whose direction up is known."""
+    return np.zeros(3) if body.up is None else body.up
+
+
 def soles(body: Body) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
     ankles = body.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]

@@ -2,23 +2,23 @@
 
 PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and its code) judges parts of four seconds that overlap by half a
 second, by vertices of SMPL-X's feet; here a contact is a point of the foot as near the ground. ProtoMotions (Tessler et
-al. 2024, its data filters) and HoloMotion (2025, its curation) bound single frames. Skating measures are those of
-Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV), WHAM (Shin et al. 2024, CVPR) and PhysDiff (Yuan et al.
-2023, ICCV); all three call much of what real feet do skating, `sliding` is the check that does not.
+al. 2024, its data filters) and HoloMotion (2025, its curation) bound single frames. The measure of skating is that of
+Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV); it calls much of what real feet do skating, `sliding` does
+not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from posekit.geometry import Array, runs
-from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
+from posekit.geometry import Array, mean_known, perpendicular, runs
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
-from posekit.validators.motion.ground import ground_of, soles
+from posekit.validators.motion.ground import ground_of, soles, up_of
 from posekit.validators.motion.standing import beyond_support
 from posekit.validators.motion.timeline import norm, timeline_of
 
@@ -31,18 +31,10 @@ BUTTERWORTH_ORDER: Final = 4
 #: Time by which the way of the root is mirrored at its ends before it is filtered, seconds.
 PADDED_SECONDS: Final = 2.0
 
-HIPS: Final = [JOINT[f"{side}_hip"] for side in SIDES]
-
 
 @check("skating", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
 def skating(
-    body: Body,
-    *,
-    height: float = 0.05,
-    way: float = 0.025,
-    rate: float = 20.0,
-    smoothed: int = 5,
-    level: bool = True,
+    body: Body, *, height: float = 0.05, way: float = 0.025, rate: float = 20.0, smoothed: int = 5
 ) -> Judgement:
     """Feet near the ground go along it too far in a frame.
 
@@ -51,31 +43,24 @@ def skating(
     height : float
         Height over the ground up to which a foot touches it, in two frames, metres.
     way : float
-        Way that it may go in a frame of the measure, metres.
+        Way along the ground that it may go in a frame of the measure, metres.
     rate : float
-        Frames per second of the measure; 0 for those of the clip.
+        Frames per second of the measure.
     smoothed : int
-        Frames whose mean way counts.
-    level : bool
-        Whether the way along the ground alone counts.
+        Odd number of frames whose mean way counts.
     """
     points, over = soles(body)
     known = np.asarray(np.isfinite(points).any(axis=(0, 2)))
-    which = [side if known[side] else side + 4 for side in range(2)]
-    line, up = timeline_of(body), np.zeros(3) if body.up is None else body.up
+    which = [side if known[side] else side + len(FEET_POINTS) for side in range(len(SIDES))]
+    line, up = timeline_of(body), up_of(body)
     placed = line.spread(points[:, which])
-    moved = np.diff(placed, axis=0)
-    if level:
-        moved = moved - (moved @ up)[..., None] * up
-    stated = body.settings.ground
-    over_ground = np.asarray(placed @ up - over[which]) - (ground_of(body).low if stated is None else stated)
-    ways = norm(moved) / (rate * body.dt if rate else 1.0)
-    half = smoothed // 2
-    padded = np.pad(ways, ((half, half), (0, 0)))
-    ways = np.mean([padded[k : k + len(ways)] for k in range(2 * half + 1)], axis=0)
-    value = np.where(np.maximum(over_ground[1:], over_ground[:-1]) < height, ways, 0.0)
-    found = np.concatenate([np.full((1, len(SIDES)), np.nan), value])
-    return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(found), upper=way)
+    ways = norm(perpendicular(np.diff(placed, axis=0), up)) / (rate * body.dt)
+    padded = np.pad(ways, ((smoothed // 2, smoothed // 2), (0, 0)))
+    mean = sliding_window_view(padded, smoothed, axis=0).mean(axis=-1)
+    over_ground = placed @ up - over[which] - _level(body)
+    value = np.full(over_ground.shape, np.nan)
+    value[1:] = np.where(np.maximum(over_ground[1:], over_ground[:-1]) < height, mean, 0.0)
+    return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(value), upper=way)
 
 
 @check("contact-share", unit="1", reads=("joints", "up", "time", "ground"), over_time=True)
@@ -105,7 +90,7 @@ def root_height(body: Body, *, least: float = 0.6, most: float = 1.5, window: fl
     window : float
         As in `ContactShare`.
     """
-    value = body.height[:, HIPS].mean(axis=1) - _voted(body, window)
+    value = body.height[:, both("hip")].mean(axis=1) - _voted(body, window)
     return Judgement(("root",), value, least, most)
 
 
@@ -120,10 +105,9 @@ def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) ->
     pelvis : float
         The same of the pelvis joint, some 10 cm above (SMPL's first joint of the spine), metres.
     """
-    up = np.zeros(3) if body.up is None else body.up
     feet, _ = soles(body)
-    points = body.joints[:, HIPS].mean(axis=1), body.joints[:, JOINT["pelvis"]]
-    away = np.stack([np.maximum(beyond_support(one, feet, up), 0.0) for one in points], axis=1)
+    points = _hips(body), body.joints[:, JOINT["pelvis"]]
+    away = np.stack([np.maximum(beyond_support(one, feet, up_of(body)), 0.0) for one in points], axis=1)
     value = _of_parts(body, away, worst=np.fmax)
     return Judgement(("root", "pelvis"), value, upper=np.array([root, pelvis]))
 
@@ -141,13 +125,17 @@ def root_jerk(body: Body, *, most: float = 50.0, cutoff: float = 3.0) -> Judgeme
     """
     if body.rate <= 2.0 * cutoff:
         raise NotAskedError(f"it needs more than {2.0 * cutoff:g} frames per second")
+    from scipy.signal import butter, sosfiltfilt
+
     line = timeline_of(body)
-    root = line.spread(body.joints[:, HIPS].mean(axis=1))
+    root = line.spread(_hips(body))
     jerk = np.full((len(root), 1), np.nan)
     slots, known = np.arange(len(root)), np.isfinite(root[:, 0])
     if len(root) > 3 and known.any():
         filled = np.stack([np.interp(slots, slots[known], column[known]) for column in root.T], axis=1)
-        smooth = low_pass(filled, body.dt, cutoff)
+        sections = butter(BUTTERWORTH_ORDER, cutoff, fs=body.rate, output="sos")
+        pad = min(round(PADDED_SECONDS / body.dt), len(root) - 1)
+        smooth = sosfiltfilt(sections, filled, axis=0, padlen=pad)
         jerk[:-3, 0] = norm(np.diff(smooth, n=3, axis=0)) / body.dt**3
     value = _of_parts(body, line.of_frames(jerk), worst=np.fmax, inside=3)
     return Judgement(("root",), value, upper=most)
@@ -168,8 +156,7 @@ def above_ground(
     lasting : float
         Seconds.
     """
-    stated = body.settings.ground
-    height = ground_of(body).height - (ground_of(body).low if stated is None else stated)
+    height = ground_of(body).height - _level(body)
     upper = np.full(len(body), np.inf)
     for start, stop in runs(height > highest):
         if (stop - start) * body.dt > lasting:
@@ -186,11 +173,7 @@ def root_speed(body: Body, *, most: float = 10.0) -> Judgement:
     most : float
         Speed of the middle of the hips, metres a second.
     """
-    line = timeline_of(body)
-    root = line.spread(body.joints[:, HIPS].mean(axis=1))
-    speed = np.full(len(root), np.nan)
-    speed[1:] = norm(np.diff(root, axis=0)) / body.dt
-    return Judgement(("root",), line.of_frames(speed), upper=most)
+    return Judgement(("root",), _speeds(body, _hips(body)[:, None]), upper=most)
 
 
 @check("body-speed", unit="m/s", reads=("joints", "time"), over_time=True)
@@ -202,32 +185,24 @@ def body_speed(body: Body, *, most: float = 15.0) -> Judgement:
     most : float
         Speed of any joint, metres a second.
     """
+    return Judgement(JOINTS, _speeds(body, body.joints), upper=most)
+
+
+def _hips(body: Body) -> Array:
+    """Return the middle of the hips (T, 3)."""
+    return np.asarray(body.joints[:, both("hip")].mean(axis=1))
+
+
+def _level(body: Body) -> float:
+    """Return the height of the stated ground, or of the lowest level of the estimated one."""
+    return ground_of(body).low if body.settings.ground is None else body.settings.ground
+
+
+def _speeds(body: Body, points: Array) -> Array:
+    """Return speeds since the frame before (T, P) of points (T, P, 3), metres a second."""
     line = timeline_of(body)
-    joints = line.spread(body.joints)
-    speed = np.full(joints.shape[:2], np.nan)
-    speed[1:] = norm(np.diff(joints, axis=0)) / body.dt
-    return Judgement(JOINTS, line.of_frames(speed), upper=most)
-
-
-def low_pass(way: Array, step: float, cutoff: float) -> Array:
-    """Filter the columns of (S, K) without delay: a Butterworth filter, forward and backward."""
-    from scipy.signal import butter, sosfiltfilt
-
-    pad = min(round(PADDED_SECONDS / step), len(way) - 1)
-    sections = butter(BUTTERWORTH_ORDER, cutoff, fs=1.0 / step, output="sos")
-    return np.asarray(sosfiltfilt(sections, way, axis=0, padlen=pad))
-
-
-def _parts(count: int, step: float) -> Iterator[slice]:
-    """Go through the parts of so many slots."""
-    size, overlap, least = (
-        round(seconds / step) for seconds in (CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS)
-    )
-    start = 0
-    while count - start >= max(least, 4):
-        end = count if start + size + least - overlap > count else start + size
-        yield slice(start, end)
-        start += size - overlap
+    placed = line.spread(points)
+    return line.of_frames(norm(np.diff(placed, axis=0, prepend=np.nan)) / body.dt)
 
 
 def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) -> Array:
@@ -240,19 +215,21 @@ def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) ->
     line = timeline_of(body)
     placed = line.spread(values)
     found = np.full(placed.shape, np.nan)
-    for part in _parts(len(placed), body.dt):
-        values = placed[part.start : max(part.stop - inside, part.start + 1)]
-        known = np.isfinite(values)
-        count = known.sum(axis=0)
-        mean = np.where(known, values, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
-        found[part] = worst(found[part], mean)
+    size, overlap, least = (
+        round(seconds / body.dt) for seconds in (CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS)
+    )
+    start = 0
+    while len(placed) - start >= max(least, 4):
+        stop = start + size if start + size + least - overlap <= len(placed) else len(placed)
+        found[start:stop] = worst(found[start:stop], mean_known(placed[start : stop - inside].T))
+        start += size - overlap
     return line.of_frames(found)
 
 
 def _soles(body: Body) -> Array:
     """Return the heights of soles (T, P) along up, by toes and heels, or by ankles where there are none."""
     feet, over = soles(body)
-    height = np.asarray(feet @ (np.zeros(3) if body.up is None else body.up)) - over
+    height = np.asarray(feet @ up_of(body)) - over
     toes = height[:, : len(FEET_POINTS)]
     return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
 

@@ -12,120 +12,37 @@ body whose hips rest does not walk, and a limb that hardly moves does not swing;
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.errors import refusal
 from posekit.geometry import Array, cross, dot, perpendicular, unit
-from posekit.skeleton import JOINT, SIDES
+from posekit.skeleton import JOINT, SIDES, both
 from posekit.validators.body import Body
-from posekit.validators.check import Judgement, check
+from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.timeline import norm, timeline_of
 
 #: Rules that speak of motion; Rules 3 and 5 are of an instant.
 RULES_OVER_STRIDES: Final = (1, 2, 4)
 
-LIMB_PARTS: Final = (("arm", "shoulder", "elbow", "wrist"), ("leg", "hip", "knee", "ankle"))
+#: Two joints that swing in turn (Rules 1 and 2), and girdle and end of limbs that swing forward (Rule 4), by place.
+SWING_IN_TURN: Final = {
+    "rule1.arms": ("right_elbow", "left_elbow"),
+    "rule1.legs": ("right_knee", "left_knee"),
+    **{f"rule2.{side}": (f"{side}_elbow", f"{side}_knee") for side in SIDES},
+}
+SWING_FORWARD: Final = {
+    f"rule4.{side}_{limb}": (f"{side}_{girdle}", f"{side}_{end}")
+    for limb, girdle, end in (("arm", "shoulder", "wrist"), ("leg", "hip", "ankle"))
+    for side in SIDES
+}
 
 #: Speed of the hips below which nobody walks, metres a second: half of a slow walk, several times a standing sway.
 SLOWEST_WALK: Final = 0.3
 
 #: Share of a stride whose frames must be known.
 LEAST_PART: Final = 0.5
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Strides:
-    """A body's joints around each frame, half a stride before it and half after it.
-
-    Parameters
-    ----------
-    joints : array (S, 14, 3)
-        Metres, at even times; NaN where unknown.
-    step : float
-        Seconds from one to the next.
-    half : int
-        Frames of half a stride.
-    """
-
-    joints: Array
-    step: float
-    half: int
-
-    def mean(self, values: Array) -> Array:
-        """Return the mean over the stride around each frame (S, ...); NaN where too few are known."""
-        known = np.isfinite(values)
-        sums = [np.cumsum(part, axis=0) for part in (np.where(known, values, 0.0), known.astype(np.float64))]
-        last = len(values) - 1
-        ends = np.minimum(np.arange(len(values)) + self.half, last)
-        starts = np.arange(len(values)) - self.half - 1
-        total, count = (
-            each[ends] - np.where(_column(starts >= 0, each), each[np.maximum(starts, 0)], 0.0)
-            for each in sums
-        )
-        enough = count >= LEAST_PART * (2 * self.half + 1)
-        return np.asarray(np.where(enough, total / np.where(enough, count, 1.0), np.nan))
-
-    def rate(self, values: Array) -> Array:
-        """Return how fast values (S, ...) change, per second."""
-        if len(values) < 2:
-            return np.full(values.shape, np.nan)
-        return np.asarray(np.gradient(values, self.step, axis=0))
-
-    def joint(self, name: str) -> Array:
-        """Return the positions of a joint (S, 3)."""
-        return self.joints[:, JOINT[name]]
-
-    @cached_property
-    def velocity(self) -> Array:
-        """Velocity of the middle of the hips (S, 3), metres a second."""
-        return self.mean(self.rate((self.joint("right_hip") + self.joint("left_hip")) / 2))
-
-    @cached_property
-    def speed(self) -> Array:
-        """Speed of the hips across the trunk's own axis (S,)."""
-        return norm(perpendicular(self.velocity, self._down))
-
-    @cached_property
-    def _down(self) -> Array:
-        return unit(self.mean(self.joint("pelvis") - self.joint("neck")))
-
-    @cached_property
-    def _forward(self) -> Array:
-        return unit(perpendicular(self.velocity, self._down))
-
-    def swing(self, name: str) -> Array:
-        """Return how far a joint is out of the body plane (S,), metres, from the middle of its swing."""
-        out = dot(self.joint(name) - self.joint("neck"), self._forward)
-        return np.asarray(out - self.mean(out))
-
-    def in_step(self, one: str, other: str, least: float) -> Array:
-        """Return the correlation of the speeds of two swings (S,); NaN where either swings by less than `least`."""
-        a, b = self.swing(one), self.swing(other)
-        swings = (self.mean(a * a) >= least**2) & (self.mean(b * b) >= least**2)
-        a, b = self.rate(a), self.rate(b)
-        both = np.sqrt(self.mean(a * a) * self.mean(b * b))
-        return np.where(swings, self.mean(a * b) / np.where(swings, both, 1.0), np.nan)
-
-    def across(self, girdle: str, end: str, least: float) -> Array:
-        """Return the part of the speed of a limb's end that is across the moving direction (S,)."""
-        limb = self.joint(end) - self.joint(girdle)
-        along, over = (
-            self.rate(dot(limb, axis)) for axis in (self._forward, cross(self._forward, self._down))
-        )
-        swings = self.mean(self.swing(end) ** 2) >= least**2
-        square = self.mean(over * over)
-        both = square + self.mean(along * along)
-        return np.where(swings, np.sqrt(square / np.where(swings, both, 1.0)), np.nan)
-
-
-def _column(flags: NDArray[np.bool_], like: Array) -> NDArray[np.bool_]:
-    return flags.reshape(-1, *[1] * (like.ndim - 1))
 
 
 @check("walking-phases", unit="1", reads=("joints", "time"), over_time=True)
@@ -162,24 +79,55 @@ def walking_phases(
     known = {str(rule) for rule in RULES_OVER_STRIDES}
     if not set(rules.split(",")) <= known:
         raise refusal("walking-phases", "rules", repr(rules), f"some of {', '.join(sorted(known))}")
+    if len(body) < 2:
+        raise NotAskedError("it needs two frames")
     line = timeline_of(body)
-    half = max(round(stride / 2 / body.dt), 1)
-    strides = Strides(joints=line.spread(body.joints), step=body.dt, half=half)
-    walks = strides.speed >= slowest
-    found = [one for one in _found(strides, swing, in_step, across) if one[0][len("rule")] in rules]
-    value = np.stack([np.where(walks, one, np.nan) for _, one, _ in found], axis=-1)
-    places = tuple(place for place, _, _ in found)
-    return Judgement(places, line.of_frames(value), upper=np.array([most for _, _, most in found]))
+    joints, size = line.spread(body.joints), 2 * max(round(stride / 2 / body.dt), 1) + 1
+
+    def change(values: Array) -> Array:
+        return np.asarray(np.gradient(values, body.dt, axis=0))
+
+    down = unit(_mean(joints[:, JOINT["pelvis"]] - joints[:, JOINT["neck"]], size))
+    velocity = perpendicular(_mean(change(joints[:, both("hip")].mean(axis=1)), size), down)
+    walks = np.asarray(norm(velocity) >= slowest)[:, None]
+    # Hips at rest have no direction; rounding must not give them one.
+    forward = unit(np.where(norm(velocity)[:, None] > 1e-9, velocity, np.nan))[:, None]
+    # How far each joint is out of the body plane, from the middle of its swing.
+    out = dot(joints - joints[:, JOINT["neck"], None], forward)
+    out = out - _mean(out, size)
+    swings, speeds = _mean(out**2, size) >= swing**2, change(out)
+
+    first, second = (
+        [JOINT[name] for name in names] for names in zip(*SWING_IN_TURN.values(), strict=True)
+    )
+    squares = _mean(speeds**2, size)
+    product = _mean(speeds[:, first] * speeds[:, second], size)
+    turns = swings[:, first] & swings[:, second] & walks
+    girdles, ends = (
+        [JOINT[name] for name in names] for names in zip(*SWING_FORWARD.values(), strict=True)
+    )
+    limbs = joints[:, ends] - joints[:, girdles]
+    along, over = (
+        _mean(change(dot(limbs, axis)) ** 2, size) for axis in (forward, cross(forward, down[:, None]))
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        phase = np.where(turns, product / np.sqrt(squares[:, first] * squares[:, second]), np.nan)
+        part = np.where(swings[:, ends] & walks, np.sqrt(over / (over + along)), np.nan)
+    places = (*SWING_IN_TURN, *SWING_FORWARD)
+    asked = [k for k, place in enumerate(places) if place[len("rule")] in rules]
+    bounds = np.array([in_step] * len(SWING_IN_TURN) + [across] * len(SWING_FORWARD))
+    value = line.of_frames(np.concatenate([phase, part], axis=1))
+    return Judgement([places[k] for k in asked], value[:, asked], upper=bounds[asked])
 
 
-def _found(strides: Strides, swing: float, in_step: float, most: float) -> Iterator[tuple[str, Array, float]]:
-    """Yield each place, its value (S,) and its bound."""
-    for limb, girdle, middle, end in LIMB_PARTS:
-        value = strides.in_step(f"right_{middle}", f"left_{middle}", swing)
-        yield f"rule1.{limb}s", value, in_step
-        for side in SIDES:
-            value = strides.across(f"{side}_{girdle}", f"{side}_{end}", swing)
-            yield f"rule4.{side}_{limb}", value, most
-    for side in SIDES:
-        value = strides.in_step(f"{side}_elbow", f"{side}_knee", swing)
-        yield f"rule2.{side}", value, in_step
+def _mean(values: Array, size: int) -> Array:
+    """Return the mean of `size` frames around each (S, ...); NaN where too few are known."""
+    from scipy.ndimage import uniform_filter1d
+
+    known = np.isfinite(values)
+    total, share = (
+        uniform_filter1d(part, size, axis=0, mode="constant")
+        for part in (np.where(known, values, 0.0), known.astype(np.float64))
+    )
+    enough = share >= LEAST_PART - 1e-9
+    return np.asarray(np.where(enough, total / np.where(enough, share, 1.0), np.nan))
