@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, LIMB_SEGMENTS, segment_name
@@ -13,7 +12,7 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.sides import SIDE_PAIRS
-from posekit.validators.motion.timeline import norm
+from posekit.validators.motion.timeline import median_of_five, norm
 from posekit.validators.motion.trembling import trembling_frames
 
 #: Part of a step by which a time stamp is early that belongs to the frame before: a quarter of one is its own slot.
@@ -30,9 +29,6 @@ TREMBLING_RATE: Final = 25.0
 
 #: Standard deviations of measuring noise that are allowed.
 TELEPORT_DEVIATIONS, JITTER_DEVIATIONS, DRIFT_DEVIATIONS = 5.0, 2.0, 4.0
-
-#: Frames whose median length is judged: a single frame is no drift.
-DRIFT_FRAMES: Final = 5
 
 #: Share of the frames with another length from which either may be the usual one.
 LEAST_OTHER: Final = 0.2
@@ -175,7 +171,7 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
     allowed = DRIFT_DEVIATIONS * np.fmax(shaken, body.noise) / np.where(usual > 0, usual, 1.0)
     return Judgement(
         tuple(map(segment_name, LIMB_SEGMENTS)),
-        found.timeline.of_frames(_median_of_five(lengths) / usual - 1.0),
+        found.timeline.of_frames(np.where(np.isfinite(lengths), median_of_five(_held(lengths)), np.nan) / usual - 1.0),
         -share,
         share,
         found.timeline.of_frames(allowed),
@@ -199,12 +195,8 @@ def _usual(lengths: Array, share: float) -> Array:
     return usual
 
 
-def _median_of_five(lengths: Array) -> Array:
-    """Return medians over five slots (S, K): an unknown length is the last known one, edges stay where they are."""
-    half = DRIFT_FRAMES // 2
+def _held(lengths: Array) -> Array:
+    """Put the last known length where one is not known (S, K)."""
     slots = np.arange(len(lengths))[:, None]
     last = np.maximum.accumulate(np.where(np.isfinite(lengths), slots, 0), axis=0)
-    held = np.take_along_axis(lengths, last, axis=0)
-    padded = np.pad(held, ((half, half), (0, 0)), mode="edge")
-    smooth = np.partition(sliding_window_view(padded, DRIFT_FRAMES, axis=0), half, axis=-1)[..., half]
-    return np.where(np.isfinite(lengths), smooth, np.nan)
+    return np.take_along_axis(lengths, last, axis=0)

@@ -19,7 +19,7 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement, check
 from posekit.validators.motion.frames import needs_rate
 from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of
-from posekit.validators.motion.timeline import norm, timeline_of
+from posekit.validators.motion.timeline import median_of_five, norm, timeline_of
 
 #: Height above the highest level of the ground up to which a foot is down, metres: a swinging foot's toes clear 1 to 6
 #: cm, and are faster.
@@ -41,14 +41,11 @@ UPRIGHT_SHARE: Final = 0.6
 BEND_FRAMES: Final = 8
 
 VIDEO_RATE: Final = 29.0
-#: Factor of the least duration at fewer frames per second: medians over `USUAL_FRAMES` hide a foot's roll.
+#: Factor of the least duration at fewer frames per second: medians of five frames hide a foot's roll.
 SLOW_FACTOR: Final = 2.0
 
 #: Frames per second from which resting feet are visible.
 SLIDING_RATE: Final = 15.0
-
-#: Frames over which the median velocity is taken: trembling changes from frame to frame.
-USUAL_FRAMES: Final = 5
 
 
 #: Speeds of a drift of the whole body that are looked for, metres a second; real walks have up to 0.04 for a second.
@@ -133,9 +130,9 @@ def _slides(
     if not known.any():
         return none
     ways = np.diff(points[:, known], axis=0) / body.dt
-    if len(ways) < max(count, USUAL_FRAMES):
+    if len(ways) < max(count, 5):
         return none
-    velocity = _usual(ways)
+    velocity = median_of_five(ways)
     noise = 3 * np.sqrt(2) * body.noise / body.dt
     level = velocity - (velocity @ up)[..., None] * up
     mean = level.mean(axis=1)
@@ -229,14 +226,3 @@ def _bend(way: Array, start: int, stop: int, most: int) -> int:
         if np.vdot(left, left) < least:
             best, least = bend, float(np.vdot(left, left))
     return best
-
-
-def _usual(velocity: Array) -> Array:
-    """Return the median of each component over `USUAL_FRAMES` frames: edges stay, single frames do not count."""
-    room = USUAL_FRAMES // 2
-    padded = np.pad(velocity, ((room, room), (0, 0), (0, 0)), mode="reflect")
-    a, b, c, d, e = (padded[k : k + len(velocity)] for k in range(USUAL_FRAMES))
-    # The least and the greatest of two pairs are not the median of five; it is that of the two between and the fifth.
-    low = np.maximum(np.minimum(a, b), np.minimum(d, e))
-    high = np.minimum(np.maximum(a, b), np.maximum(d, e))
-    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
