@@ -11,14 +11,15 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, runs
-from posekit.skeleton import JOINT, SIDES
+from posekit.geometry import Array, perpendicular, runs
+from posekit.skeleton import SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, check
 from posekit.validators.motion.frames import needs_rate
-from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of
+from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of, up_of
 from posekit.validators.motion.timeline import median_of_five, norm, timeline_of
 
 #: Height above the highest level of the ground up to which a foot is down, metres: a swinging foot's toes clear 1 to 6
@@ -36,9 +37,6 @@ SWINGING_SPEED: Final = 1.0
 
 #: Height of the hips above a foot that stands, as a share of the legs' length: crawling bodies drag their feet.
 UPRIGHT_SHARE: Final = 0.6
-
-#: Frames by which the ends of a slide are moved to where they fit best, at most.
-BEND_FRAMES: Final = 8
 
 VIDEO_RATE: Final = 29.0
 #: Factor of the least duration at fewer frames per second: medians of five frames hide a foot's roll.
@@ -79,34 +77,31 @@ def sliding(
         Metres a second that a foot on the ground goes up or down at most.
     """
     needs_rate(body, SLIDING_RATE)
-    line, ground = timeline_of(body), ground_of(body)
+    line, ground, up = timeline_of(body), ground_of(body), up_of(body)
     feet, over = soles(body)
-    up = np.zeros(3) if body.up is None else body.up
     base = (ground.low + ground.high + ground.lifted)[:, None]
-    hips = body.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].min(axis=1)[:, None]
-    stands = ~(hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body))
-    down = line.spread((stands & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
-    spread = line.spread(feet)
+    hips = body.height[:, both("hip")].min(axis=1)[:, None]
+    crawls = hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body)
+    down = line.spread((~crawls & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
+    placed = line.spread(feet)
     count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
+    noise = 3 * np.sqrt(2) * body.noise / body.dt
     slides = [
-        _slides(body, spread[:, foot], down[:, foot], up, count, (fastest, uneven, rising))
+        _slides(body, placed[:, foot], down[:, foot], count, (fastest, uneven, rising), noise)
         for foot in FOOT_POINTS
     ]
-    value = np.zeros((len(spread), len(SIDES)))
+    value = np.zeros((len(placed), len(SIDES)))
     for start, stop in runs(np.any(slides, axis=0)):
         which = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
-        points = spread[:, [point for k in which for point in FOOT_POINTS[k]]]
+        points = placed[:, [point for k in which for point in FOOT_POINTS[k]]]
         points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
-        along = (points[stop - 1] - points[start]).mean(axis=0)
-        along = along - (along @ up) * up
-        way = points @ along / norm(along)
+        along = perpendicular((points[stop - 1] - points[start]).mean(axis=0), up)
         speed = float(norm(along)) / ((stop - 1 - start) * body.dt)
-        rough = _roughly(np.diff(way.mean(axis=1)) - speed * body.dt / 2, start, stop - 1, count)
-        first = _bend(way, *rough, count)
-        last = len(way) - 1 - _bend(way[::-1], len(way) - 1 - rough[1], len(way) - 1 - rough[0], count)
+        way = (points @ along / norm(along)).mean(axis=1)
+        first, last = _ends(np.diff(way) - speed * body.dt / 2, start, stop - 1, count)
         value[first + 1 : last + 1, which] = speed
-    drift = _drift(_stance_velocity(spread, line.spread(np.asarray(over + base)), up, body.dt), body.dt)
-    if drift is not None and drift[2] > fastest + 3 * np.sqrt(2) * body.noise / body.dt:
+    drift = _drift(_stance_velocity(placed, line.spread(over + base), up, body.dt), body.dt)
+    if drift is not None and drift[2] > fastest + noise:
         start, stop, speed = drift
         for first, last in runs(np.asarray(value.any(axis=1))):
             if first < stop and last > start:
@@ -119,38 +114,32 @@ def _slides(
     body: Body,
     points: Array,
     down: NDArray[np.bool_],
-    up: Array,
     count: int,
     bounds: tuple[float, float, float],
+    noise: float,
 ) -> NDArray[np.bool_]:
     """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for so many slots."""
     fastest, uneven, rising = bounds
+    up = up_of(body)
     known = np.isfinite(points).all(axis=(0, 2))
-    none = np.zeros(len(points), dtype=np.bool_)
-    if not known.any():
-        return none
-    ways = np.diff(points[:, known], axis=0) / body.dt
-    if len(ways) < max(count, 5):
-        return none
-    velocity = median_of_five(ways)
-    noise = 3 * np.sqrt(2) * body.noise / body.dt
-    level = velocity - (velocity @ up)[..., None] * up
+    slides = np.zeros(len(points), dtype=np.bool_)
+    if not known.any() or len(points) <= max(count, 5):
+        return slides
+    velocity = median_of_five(np.diff(points[:, known], axis=0) / body.dt)
+    level = perpendicular(velocity, up)
     mean = level.mean(axis=1)
-    flat = (np.abs(velocity @ up).max(axis=1) < rising + noise) & (
-        norm(level - mean[:, None]).max(axis=1) < uneven + noise
-    )
-    flat &= down[1:, known].any(axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
+    flat = (np.abs(velocity @ up).max(axis=1) < rising + noise) & down[1:, known].any(axis=1)
+    flat &= norm(level - mean[:, None]).max(axis=1) < uneven + noise
+    windows = sliding_window_view(mean, count, axis=0)
     even = windows.mean(axis=-1)
     differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
     share = EVEN_SHARE if known.sum() > 1 else 0.0
     steady = differs < np.maximum(uneven, share * norm(even)) + noise
-    steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
+    steady &= sliding_window_view(flat, count).all(axis=1)
     # Where noise lets feet differ by more than they slide, evenness is no evidence.
     steady &= norm(even) > max(fastest, noise / EVEN_SHARE)
     if noise > uneven:
         steady &= norm(even) < SWINGING_SPEED
-    slides = np.zeros(len(points), dtype=np.bool_)
     for window in np.flatnonzero(steady):
         slides[window : window + count + 1] = True
     return slides
@@ -161,14 +150,11 @@ def _stance_velocity(points: Array, over: Array, up: Array, step: float) -> Arra
 
     One foot of a walker always stands, so that it is near zero in every frame; NaN in frames without a foot down.
     """
-    velocity = np.full(points.shape, np.nan)
-    velocity[1:] = np.diff(points, axis=0) / step
-    velocity = velocity - (velocity @ up)[..., None] * up
+    velocity = perpendicular(np.diff(points, axis=0, prepend=np.nan) / step, up)
     speed = np.where(points @ up < over + 2 * DOWN_METRES, norm(velocity), np.nan)
     speed = np.where(np.isnan(speed), np.inf, speed)
-    slowest = speed.argmin(axis=1)
-    rows = np.arange(len(points))
-    return np.where(np.isfinite(speed[rows, slowest])[:, None], velocity[rows, slowest], np.nan)
+    slowest = np.take_along_axis(velocity, speed.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+    return np.where(np.isfinite(speed.min(axis=1))[:, None], slowest, np.nan)
 
 
 def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
@@ -205,24 +191,9 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
     return best
 
 
-def _roughly(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
+def _ends(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
     """Move the ends of a slide, by at most so many slots outward, to where what it gains (S - 1,) sums to most."""
     middle = (start + stop) // 2
     before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
     after = np.cumsum(gained[middle : stop + most])
     return middle - int(np.nanargmax(before)) - 1, middle + int(np.nanargmax(after)) + 1
-
-
-def _bend(way: Array, start: int, stop: int, most: int) -> int:
-    """Find where an even slide of points (S, P) starts: where two lines meet that fit each point's way best."""
-    first, last = max(start - most, 0), min(start + most, stop)
-    time = np.arange(first, last + 1, dtype=np.float64)
-    piece = way[first : last + 1]
-    piece, time = piece[np.isfinite(piece).all(axis=1)], time[np.isfinite(piece).all(axis=1)]
-    best, least = start, np.inf
-    for bend in range(max(first + 2, start - BEND_FRAMES), min(last - 2, start + BEND_FRAMES) + 1):
-        lines = np.stack([np.ones(len(time)), time - bend, np.maximum(time - bend, 0)], axis=1)
-        left = piece - lines @ np.linalg.lstsq(lines, piece, rcond=None)[0]
-        if np.vdot(left, left) < least:
-            best, least = bend, float(np.vdot(left, left))
-    return best
