@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, runs
 from posekit.validators.body import Body, once
-from posekit.validators.motion.jumps import LEAST_JUMP, Jumps, jumps_of
+from posekit.validators.motion.jumps import LEAST_JUMP, jumps_of
 from posekit.validators.motion.order import ORDERED_RATE, displaced, stretches_of
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, norm, timeline_of
@@ -47,8 +47,8 @@ class Explained:
         Frames by which each is out of its place, by the motion.
     exchanged : bool array (T, 6)
         Pairs whose right and left are exchanged.
-    jumps : Jumps
-        Jumps in slots.
+    jumps : array (S, 15)
+        Jumps of the joints and of the body, metres; see `posekit.validators.motion.jumps.jumps_of`.
     joints : array (S, 14, 3)
         The motion that is left.
     noise : float
@@ -59,7 +59,7 @@ class Explained:
     repeats: NDArray[np.intp]
     displaced: NDArray[np.intp]
     exchanged: NDArray[np.bool_]
-    jumps: Jumps
+    jumps: Array
     joints: Array
     noise: float
 
@@ -101,7 +101,7 @@ def explained(body: Body) -> Explained:
             exchanged[edge] = False
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints, body.dt)
-    jumped = (jumps.joint > LEAST_JUMP) | (jumps.body > LEAST_JUMP)[:, None]
+    jumped = (jumps[:, :-1] > LEAST_JUMP) | (jumps[:, -1:] > LEAST_JUMP)
     return Explained(
         timeline=timeline,
         repeats=repeats[back],

@@ -12,7 +12,7 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.sides import SIDE_PAIRS
-from posekit.validators.motion.timeline import median_of_five, norm
+from posekit.validators.motion.timeline import known_median, median_of_five, norm
 from posekit.validators.motion.trembling import trembling_frames
 
 #: Part of a step by which a time stamp is early that belongs to the frame before: a quarter of one is its own slot.
@@ -121,10 +121,9 @@ def teleport(clip: Body, /, *, joint: float = 0.07, body: float = 0.06) -> Judge
     """
     needs_rate(clip, JUMPING_RATE)
     found = explained(clip)
-    jumps = np.column_stack([found.jumps.joint, found.jumps.body])
     return Judgement(
         (*JOINTS, "body"),
-        found.timeline.of_frames(jumps),
+        found.timeline.of_frames(found.jumps),
         upper=np.array([joint] * len(JOINTS) + [body]),
         tolerance=TELEPORT_DEVIATIONS * clip.noise,
     )
@@ -171,7 +170,7 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
     allowed = DRIFT_DEVIATIONS * np.fmax(shaken, body.noise) / np.where(usual > 0, usual, 1.0)
     return Judgement(
         tuple(map(segment_name, LIMB_SEGMENTS)),
-        found.timeline.of_frames(np.where(np.isfinite(lengths), median_of_five(_held(lengths)), np.nan) / usual - 1.0),
+        found.timeline.of_frames(_smooth(lengths) / usual - 1.0),
         -share,
         share,
         found.timeline.of_frames(allowed),
@@ -183,20 +182,19 @@ def _usual(lengths: Array, share: float) -> Array:
 
     Where many frames differ from the median, that length of the two is the usual one which the other side has.
     """
-    known = [column[column > 0] for column in lengths.T]
-    usual = np.array([np.median(one) if len(one) else np.nan for one in known])
-    for k, column in enumerate(known):
+    usual = np.array([known_median(column) for column in lengths.T])
+    for k, column in enumerate(lengths.T):
         twin = usual[k + 2 if k % 4 < 2 else k - 2]
         others = column[np.abs(column / usual[k] - 1.0) > share]
-        if len(others) > LEAST_OTHER * len(column):
+        if len(others) > LEAST_OTHER * np.isfinite(column).sum():
             other = float(np.median(others))
             if abs(other - twin) < abs(usual[k] - twin):
                 usual[k] = other
     return usual
 
 
-def _held(lengths: Array) -> Array:
-    """Put the last known length where one is not known (S, K)."""
-    slots = np.arange(len(lengths))[:, None]
-    last = np.maximum.accumulate(np.where(np.isfinite(lengths), slots, 0), axis=0)
-    return np.take_along_axis(lengths, last, axis=0)
+def _smooth(lengths: Array) -> Array:
+    """Return medians over five slots (S, K): an unknown length is the last known one beside others."""
+    known = np.isfinite(lengths)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(lengths))[:, None], 0), axis=0)
+    return np.where(known, median_of_five(np.take_along_axis(lengths, last, axis=0)), np.nan)

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, runs
+from posekit.geometry import Array, mean_known, runs
 from posekit.ranking.standing import centre_of_mass
-from posekit.skeleton import FEET_POINTS, JOINT, SIDES
+from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
 from posekit.validators.body import Body, once
 from posekit.validators.motion.lifted import lifted_by
-from posekit.validators.motion.timeline import norm, timeline_of
+from posekit.validators.motion.timeline import known_median, norm, timeline_of
 
 #: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
 TOE_METRES: Final = 0.02
@@ -106,8 +106,7 @@ def stature_of(body: Body) -> float:
         for side in SIDES
         for upper, lower in (("hip", "knee"), ("knee", "ankle"))
     ]
-    medians = [float(np.median(leg[np.isfinite(leg)])) for leg in legs if np.isfinite(leg).any()]
-    return 2 * float(np.mean(medians)) / LEG_SHARE if medians else np.nan
+    return 2 * float(mean_known(np.array([known_median(leg) for leg in legs]))) / LEG_SHARE
 
 
 def _stature(body: Body) -> float:
@@ -122,7 +121,7 @@ def up_of(body: Body) -> Array:
 
 def soles(body: Body) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
-    ankles = body.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]
+    ankles = body.joints[:, both("ankle")]
     toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
     over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(body)] * 2)
     return np.concatenate([body.feet, ankles], axis=1), over
@@ -149,8 +148,7 @@ def speeds(body: Body, points: Array, frames: int = 1) -> Array:
 def ground_of(body: Body) -> Ground:
     """Estimate the ground of a body whose direction up is known."""
     feet, over = soles(body)
-    up = np.zeros(3) if body.up is None else body.up
-    line = timeline_of(body)
+    line, up = timeline_of(body), up_of(body)
     points = np.concatenate([body.joints, feet[:, : len(FEET_POINTS)]], axis=1)
     height = points @ up
     legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them

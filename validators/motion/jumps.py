@@ -9,8 +9,7 @@ rolls, kicks and flips, their joints do not all go the same way; a body that is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -33,54 +32,38 @@ SIDE_FRAMES: Final = 3
 JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Jumps:
-    """Jumps of (T,) frames above the neighbours' own misfit, metres; NaN where not known.
+def _filter(at: int) -> tuple[Array, Array]:
+    """Fit a cubic, and a jump of one of them, to seven frames by least squares: two degrees of freedom are left.
 
-    Parameters
-    ----------
-    joint : array (T, 14)
-        Jumps of single joints beside the body's.
-    body : array (T,)
-        Jumps of the body: the median joint.
+    Return the weights of the jump (7,), and of the misfit of the others from a smooth curve (2, 7), of unit length.
     """
-
-    joint: Array
-    body: Array
-
-
-class _Filter(NamedTuple):
-    """Weights of a jump (K,), and of the misfit of neighbours from a smooth curve (2, K), each of unit length."""
-
-    jump: Array
-    misfit: Array
+    times = np.arange(7.0) - at
+    design = np.column_stack([np.vander(times, 4, increasing=True), times == 0])
+    return np.linalg.pinv(design)[-1], np.linalg.svd(design)[0][:, design.shape[1] :].T / np.sqrt(2.0)
 
 
-def _filter(times: Array, degree: int, jumped: NDArray[np.bool_]) -> _Filter:
-    """Fit a polynomial and a jump of some of the frames by least squares: two degrees of freedom are left."""
-    design = np.column_stack([np.vander(times, degree + 1, increasing=True), jumped])
-    return _Filter(
-        jump=np.linalg.pinv(design)[-1],
-        misfit=np.linalg.svd(design)[0][:, design.shape[1] :].T / np.sqrt(2.0),
-    )
-
-
-_ONE_FRAME: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
-_NEAR_END: Final = {at: _filter(np.arange(7.0) - at, 3, np.arange(7) == at) for at in (1, 2)}
+#: Filters by the place of the jump among seven frames: in the middle, or next to an end of the clip.
+_FILTERS: Final = {at: _filter(at) for at in (1, 2, SIDE_FRAMES)}
 _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
-def jumps_of(joints: Array, step: float) -> Jumps:
+def jumps_of(joints: Array, step: float) -> Array:
     """Measure the jumps of joints in slots of even time (S, 14, 3), so many seconds each (NaN where not known).
+
+    Returns
+    -------
+    array (S, 15)
+        Metres above the neighbours' own misfit, of each joint beside the body's, and of the body (the median joint);
+        NaN where not known.
 
     Notes
     -----
     A jump of one frame is how far it is from the cubic through three frames on either side; at an end it is the third
     difference. All less some times the misfit of the neighbours themselves. A body that stays moved is for
-    `posekit.validators.motion.displaced_body`.
+    `displaced_by`.
     """
     count = len(joints)
-    offset, misfit = _measured(joints, _ONE_FRAME, count)
+    offset, misfit = (centred(one, count, SIDE_FRAMES) for one in _measured(joints, SIDE_FRAMES))
     body = middle(offset)
     alone = norm(body) - JOINT_MISFITS * middle(misfit)
     moved = alone > 0
@@ -98,26 +81,24 @@ def jumps_of(joints: Array, step: float) -> Jumps:
         third = norm(filtered(joints, _THIRD_DIFFERENCE))
         joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
         joint[-1] = third[-1] - END_MISFITS * third[-3:-1].max(axis=0)
-        for at, by in _NEAR_END.items():
+        for at in (1, 2):
             for end, frame, window in ((0, at, joints[:7]), (-1, -1 - at, joints[:-8:-1])):
-                jump = _near_end(window, by)
+                off, misfits = _measured(window, at)
+                jump = norm(off[0]) - JOINT_MISFITS * misfits[0]
                 # If the last frame jumps, its neighbours do not.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
-    return Jumps(joint=joint, body=np.fmax(alone, displaced))
+    return np.column_stack([joint, np.fmax(alone, displaced)])
 
 
-def _near_end(window: Array, by: _Filter) -> Array:
-    """Return the jumps (14,) of one of seven frames (7, 14, 3): the farther it is from their middle, the less sure."""
-    misfit = np.sqrt((norm(np.tensordot(by.misfit, window, axes=1)) ** 2).sum(axis=0))
-    unsure = np.sqrt((by.jump**2).sum() / (_ONE_FRAME.jump**2).sum())
-    return np.asarray(norm(np.tensordot(by.jump, window, axes=1)) - JOINT_MISFITS * unsure * misfit)
+def _measured(joints: Array, at: int) -> tuple[Array, Array]:
+    """Return the jump of the frame `at` of each seven (N, 14, 3), and the misfit of the others (N, 14).
 
-
-def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
-    """Return jumps (S, 14, 3) and misfits (S, 14), placed at the fourth frame of the filter."""
-    parts = [filtered(joints, weights) for weights in by.misfit]
-    misfit = np.sqrt(sum(np.einsum("tji,tji->tj", part, part) for part in parts))
-    return centred(filtered(joints, by.jump), count, SIDE_FRAMES), centred(misfit, count, SIDE_FRAMES)
+    The farther the frame is from their middle, the less sure is its jump: the misfit counts more.
+    """
+    jump, misfit = _FILTERS[at]
+    unsure = np.linalg.norm(jump) / np.linalg.norm(_FILTERS[SIDE_FRAMES][0])
+    squares = sum(norm(filtered(joints, weights)) ** 2 for weights in misfit)
+    return filtered(joints, jump), unsure * np.sqrt(squares)
 
 
 #: Longest time over which a body is displaced, seconds: slower displacements are motion.
@@ -207,13 +188,8 @@ def _beyond(
 
 def middle(values: Array) -> Array:
     """Return the median over the known joints of (S, 14, ...)."""
-    known = np.isfinite(values)
-    if known.all():
-        half = values.shape[1] // 2
-        ordered = np.partition(values, (half - 1, half), axis=1)
-        return np.asarray((ordered[:, half - 1] + ordered[:, half]) / 2.0)
     ordered = np.sort(values, axis=1)  # what is not known comes last
-    number = known.sum(axis=1, keepdims=True)
+    number = np.isfinite(values).sum(axis=1, keepdims=True)
     low, high = (
         np.take_along_axis(ordered, np.maximum(k, 0), axis=1) for k in ((number - 1) // 2, number // 2)
     )

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, dot
 from posekit.skeleton import JOINT
 from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS
-from posekit.validators.motion.timeline import norm
+from posekit.validators.motion.timeline import groups, norm
 
 #: Joints that have no side.
 MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
@@ -61,11 +61,10 @@ def displaced(joints: Array) -> NDArray[np.intp]:
     if count < LEAST_FRAMES + 2:
         return places
     steps = np.diff(joints, axis=0)
-    dots = np.einsum("tji,tji->tj", steps[1:], steps[:-1])
     moving = (norm(steps[1:]) > LEAST_METRES) & (norm(steps[:-1]) > LEAST_METRES)
-    backward = ((dots < 0) & moving).sum(axis=1)
+    backward = (dot(steps[1:], steps[:-1]) < 0) & moving
     turning = np.zeros(count, dtype=np.bool_)
-    turning[1:-1] = (backward * 2 > moving.sum(axis=1)) & (moving.sum(axis=1) >= LEAST_JOINTS)
+    turning[1:-1] = (2 * backward.sum(axis=1) > moving.sum(axis=1)) & (moving.sum(axis=1) >= LEAST_JOINTS)
     for first, last in _stretches(turning):
         rows = np.arange(max(first - AROUND_FRAMES, 0), min(last + AROUND_FRAMES + 1, count))
         rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
@@ -94,20 +93,16 @@ def _without_sides(joints: Array) -> Array:
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return the frames of stretches with frames out of place (T,), including those in place by chance."""
-    at = np.flatnonzero(places)
     inside = np.zeros(len(places), dtype=np.bool_)
-    for part in np.split(at, np.flatnonzero(np.diff(at) > TURNS_APART) + 1) if len(at) else []:
+    for part in groups(np.flatnonzero(places), TURNS_APART):
         inside[part[0] : part[-1] + 1] = True
     return inside
 
 
 def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last of the stretches in which frames turn back, three of them or more."""
-    at = np.flatnonzero(turning)
-    if not len(at):
-        return []
     found = []
-    for part in np.split(at, np.flatnonzero(np.diff(at) > TURNS_APART) + 1):
+    for part in groups(np.flatnonzero(turning), TURNS_APART):
         for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
             last = min(first + LONGEST_STRETCH - 1, int(part[-1]))
             if np.count_nonzero((part >= first) & (part <= last)) >= LEAST_FRAMES - 1:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from posekit.geometry import Array, dot, unit
-from posekit.skeleton import JOINT, SIDES
+from posekit.skeleton import JOINT, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 
@@ -66,8 +66,8 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
 def _inverted(body: Body, cosine: Array, share: float) -> bool:
     height = body.height
     neck, pelvis = height[:, JOINT["neck"]], height[:, JOINT["pelvis"]]
-    ankles = height[:, [JOINT[f"{side}_ankle"] for side in SIDES]].min(axis=1)
-    wrists = height[:, [JOINT[f"{side}_wrist"] for side in SIDES]].max(axis=1)
+    ankles = height[:, both("ankle")].min(axis=1)
+    wrists = height[:, both("wrist")].max(axis=1)
     turned = (cosine < INVERTED_COSINE) & (ankles > pelvis)
     carried = wrists < neck - REACH_METRES
     return bool(np.mean(turned & ~carried) >= share)
@@ -77,9 +77,7 @@ def _lies(body: Body, trunk: Array, cosine: Array, share: float) -> bool:
     middle = np.nanmean(trunk, axis=0)
     axis = np.zeros(3)
     axis[np.argmax(np.abs(middle))] = np.sign(middle[np.argmax(np.abs(middle))])
-    hips, ankles = (
-        body.joints[:, [JOINT[f"{side}_{name}"] for side in SIDES]].mean(axis=1) for name in ("hip", "ankle")
-    )
+    hips, ankles = (body.joints[:, both(name)].mean(axis=1) for name in ("hip", "ankle"))
     straight = (trunk @ axis > UPRIGHT_COSINE) & (unit(hips - ankles) @ axis > UPRIGHT_COSINE)
     if np.mean(straight & (np.abs(cosine) < LYING_COSINE)) >= share:
         across = hips - (hips @ axis)[:, None] * axis
@@ -97,7 +95,7 @@ def _stands(body: Body, up: Array | None, share: float) -> bool:
     """Return whether ankles are the lowest joints along a direction, at one level on the plane through the origin."""
     height = body.joints @ (np.zeros(3) if up is None else up)
     lowest = np.fmin.reduce(height, axis=1)
-    ankles = np.fmin.reduce(height[:, [JOINT[f"{side}_ankle"] for side in SIDES]], axis=1)
+    ankles = np.fmin.reduce(height[:, both("ankle")], axis=1)
     level = SOLE_METRES[0] < float(np.nanmedian(lowest)) < SOLE_METRES[1]
     return level and _range(lowest) < STEADY_METRES and bool(np.mean(ankles <= lowest) >= share)
 

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.skeleton import JOINT, N_TRUNK_JOINTS
-from posekit.validators.motion.timeline import norm
+from posekit.geometry import Array, cross, dot, unit
+from posekit.skeleton import JOINT, N_TRUNK_JOINTS, both
+from posekit.validators.motion.timeline import known_median, norm
 
 #: Parts with a right and a left joint.
 SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
@@ -55,7 +55,7 @@ EXCHANGED_COST: Final = 0.03
 
 
 def exchanged_pairs(
-    joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_] | None = None, noise: float = 0.0
+    joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_], noise: float
 ) -> NDArray[np.bool_]:
     """Return which of `SIDE_PAIRS` have right and left exchanged (T, 6).
 
@@ -67,8 +67,8 @@ def exchanged_pairs(
         Right and left toe, right and left heel.
     head : array (T, 5, 3)
         Nose, eyes and ears.
-    follows : bool array (T - 1,), optional
-        Whether each frame but the first is the next one in time; all are if not given.
+    follows : bool array (T - 1,)
+        Whether each frame but the first is the next one in time.
     noise : float
         Standard deviation of measured coordinates, metres.
     """
@@ -78,9 +78,8 @@ def exchanged_pairs(
     across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
     together, hips, shoulders = _evidence(joints, across, feet, head, NOISE_FACTOR * noise)
     continuity = _continuity(joints, across)
-    gap = ~known_before(across)
-    if follows is not None:
-        gap |= ~follows
+    known = np.isfinite(across[..., 0])
+    gap = ~((known[1:] & known[:-1]).any(axis=1) & follows)
     continuity[gap] = 0.0
     firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | gap]))
     sums = [np.add.reduceat(one, firsts, axis=0) for one in (together, hips, shoulders)]
@@ -101,17 +100,10 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
     """Exchange right and left of joints (T, 14, 3) at pairs (T, 6)."""
     if not swapped.any():
         return points
-    mended = points.copy()
-    for k, (right, left) in enumerate(zip(RIGHT_JOINTS, LEFT_JOINTS, strict=True)):
-        rows = swapped[:, k]
-        mended[rows, right], mended[rows, left] = points[rows, left], points[rows, right]
+    mended, turned = points.copy(), swapped[..., None]
+    mended[:, RIGHT_JOINTS] = np.where(turned, points[:, LEFT_JOINTS], points[:, RIGHT_JOINTS])
+    mended[:, LEFT_JOINTS] = np.where(turned, points[:, RIGHT_JOINTS], points[:, LEFT_JOINTS])
     return mended
-
-
-def known_before(across: Array) -> NDArray[np.bool_]:
-    """Return between which frames some pair is known in both (T - 1,)."""
-    known = np.isfinite(across[..., 0])
-    return np.asarray((known[1:] & known[:-1]).any(axis=1))
 
 
 def _evidence(
@@ -133,18 +125,18 @@ def _evidence(
     trunk = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
     across_shoulders, across_hips = across[:, 0], across[:, 3]
     sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
-    together[:, 4] = _sure(-np.einsum("ti,ti->t", across_shoulders, across_hips) / sizes * 2.0)
-    forward = _unit(np.cross(trunk, across_hips))
+    together[:, 4] = _sure(-dot(across_shoulders, across_hips) / sizes * 2.0)
+    forward = unit(cross(trunk, across_hips))
     bends = []
     for right in (RIGHT_JOINTS, LEFT_JOINTS):
         hip, knee, ankle = (joints[:, right[k]] for k in (3, 4, 5))
         # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
-        bends.append(np.einsum("ti,ti->t", knee - (hip + ankle) / 2.0, forward))
-    toes = np.einsum("tki,ti->tk", feet[:, :2] - joints[:, [RIGHT_JOINTS[5], LEFT_JOINTS[5]]], forward)
+        bends.append(dot(knee - (hip + ankle) / 2.0, forward))
+    toes = dot(feet[:, :2] - joints[:, both("ankle")], forward[:, None])
     hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
     hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
-    facing = _unit(np.cross(trunk, across_shoulders))
-    nose = np.einsum("ti,ti->t", head[:, 0] - (head[:, 3] + head[:, 4]) / 2.0, facing)
+    facing = unit(cross(trunk, across_shoulders))
+    nose = dot(head[:, 0] - (head[:, 3] + head[:, 4]) / 2.0, facing)
     return together, hips, _sure(nose / max(BEND_METRES, unsure))
 
 
@@ -155,8 +147,8 @@ def _length(straight: Array, crossed: Array, torn: float) -> float:
     middle of the shortest interval with two fifths of them (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69,
     1012-1016).
     """
-    middle = _median(straight)
-    if not _median(np.abs(straight - middle)) > torn:
+    middle = known_median(straight)
+    if not known_median(np.abs(straight - middle)) > torn:
         return middle
     every = np.sort(np.concatenate([straight, crossed], axis=None))
     every = every[np.isfinite(every)]
@@ -165,18 +157,9 @@ def _length(straight: Array, crossed: Array, torn: float) -> float:
     return float(every[start + within // 2])
 
 
-def _median(lengths: Array) -> float:
-    known = lengths[np.isfinite(lengths)]
-    return float(np.median(known)) if len(known) else np.nan
-
-
 def _sure(evidence: Array) -> Array:
     """Bound evidence to -1 and 1; unknown evidence is 0."""
     return np.asarray(np.nan_to_num(np.clip(evidence, -1.0, 1.0)))
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.maximum(norm(vectors), 1e-9)[..., None])
 
 
 def _continuity(joints: Array, across: Array) -> Array:

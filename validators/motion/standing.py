@@ -9,9 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, runs
+from posekit.geometry import Array, runs, unit
 from posekit.ranking.standing import centre_of_mass
-from posekit.skeleton import FEET_POINTS, JOINT, SIDES
+from posekit.skeleton import FEET_POINTS, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, check
 from posekit.validators.motion.ground import (
@@ -24,6 +24,7 @@ from posekit.validators.motion.ground import (
     soles,
     speeds,
     stature_of,
+    up_of,
 )
 
 #: Standard deviations of noise by which the lowest of several points may be lower than they are.
@@ -176,22 +177,21 @@ def balance(body: Body, *, beyond: float = 0.0) -> Judgement:
 
 def upright(body: Body, share: float) -> NDArray[np.bool_]:
     """Return the frames (T,) whose hips are above the feet by a share of the legs' length."""
-    hips = body.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].mean(axis=1)
-    ankles = np.fmin.reduce(body.height[:, [JOINT[f"{side}_ankle"] for side in SIDES]], axis=1)
+    hips = body.height[:, both("hip")].mean(axis=1)
+    ankles = np.fmin.reduce(body.height[:, both("ankle")], axis=1)
     return np.asarray(hips - ankles > share * LEG_SHARE * stature_of(body))
 
 
 def beyond_feet(body: Body) -> Array:
     """Return how far the centre of mass is beyond the feet that bear (T,), metres; negative over them."""
-    up = np.zeros(3) if body.up is None else body.up
     feet, over = soles(body)
-    height = feet @ up - over
+    height = feet @ up_of(body) - over
     bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
     # A foot reaches beyond its known points: all of it beyond an ankle, its end and edges beyond a toe.
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
     reach = (0.4 if toes else FORWARD_SHARE) * FOOT_SHARE * stature_of(body)
     centre = centre_of_mass(body.joints)
-    return beyond_support(centre, np.where(bears[..., None], feet, np.nan), up) - reach
+    return beyond_support(centre, np.where(bears[..., None], feet, np.nan), up_of(body)) - reach
 
 
 def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
@@ -214,16 +214,13 @@ def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
     array (T,)
         Metres; negative inside; NaN where nothing bears, or the point is not known.
     """
-    first = np.cross(up, np.eye(3)[np.abs(up).argmin()])
-    first = first / np.linalg.norm(first)
+    first = unit(np.cross(up, np.eye(3)[np.abs(up).argmin()]))
     across = np.stack([first, np.cross(up, first)], axis=1)
     at, corners = points @ across, bearing @ across
     one, other = zip(*itertools.permutations(range(corners.shape[1]), 2), strict=True)
     edges = corners[:, other] - corners[:, one]
     normals = edges[..., ::-1] * [1.0, -1.0]
-    ways = np.concatenate([normals, at[:, None] - corners], axis=1)
-    lengths = np.linalg.norm(ways, axis=2, keepdims=True)
-    ways = ways / np.where(lengths > 0, lengths, np.nan)
+    ways = unit(np.concatenate([normals, at[:, None] - corners], axis=1))
     reach = np.fmax.reduce(np.einsum("tdi,tpi->tdp", ways, corners), axis=2)
     beyond = np.fmax.reduce(np.einsum("tdi,ti->td", ways, at) - reach, axis=1)
     # A point on the only corner has no way from it.

@@ -95,6 +95,12 @@ def centred(values: Array, count: int, first: int) -> Array:
     return found
 
 
+def known_median(values: Array) -> float:
+    """Return the median of the known numbers of an array; NaN if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan
+
+
 def median_of_five(values: Array) -> Array:
     """Return medians over five slots (S, ...), mirrored at the ends: NaN where one is not known."""
     padded = np.pad(values, ((2, 2), *[(0, 0)] * (values.ndim - 1)), mode="reflect")

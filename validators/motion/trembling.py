@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.validators.motion.timeline import centred, filtered, norm
+from posekit.validators.motion.timeline import centred, filtered, groups, known_median, norm
 
 #: Frames over which trembling is measured.
 TREMBLING_FRAMES: Final = 15
@@ -89,8 +89,7 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
 def usual_trembling(joints: Array) -> float:
     """Return the median trembling of joints (T, 14, 3) early in a clip, metres: no less than its noise."""
     rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
-    known = rough[np.isfinite(rough)]
-    return float(np.median(known)) if len(known) else 0.0
+    return float(np.nan_to_num(known_median(rough)))
 
 
 def _windows(rough: Array) -> Array:
@@ -120,8 +119,7 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
     rough = centred(norm(filtered(joints, _FOURTH)), len(joints), 2)
     stretched = centred(np.abs(filtered(_lengths(joints), _FOURTH)), len(joints), 2)
     exact = np.zeros(hot.shape, dtype=np.bool_)
-    at = np.flatnonzero(hot.any(axis=1))
-    for part in np.split(at, np.flatnonzero(np.diff(at) > NEAR_FRAMES) + 1):
+    for part in groups(np.flatnonzero(hot.any(axis=1)), NEAR_FRAMES):
         first, last = int(part[0]), int(part[-1])
         which = np.flatnonzero(hot[first : last + 1].any(axis=0))
         segments = sorted({k for joint in which.tolist() for k in _SEGMENTS_OF[joint]})

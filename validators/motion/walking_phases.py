@@ -97,15 +97,11 @@ def walking_phases(
     out = out - _mean(out, size)
     swings, speeds = _mean(out**2, size) >= swing**2, change(out)
 
-    first, second = (
-        [JOINT[name] for name in names] for names in zip(*SWING_IN_TURN.values(), strict=True)
-    )
+    first, second = ([JOINT[name] for name in names] for names in zip(*SWING_IN_TURN.values(), strict=True))
     squares = _mean(speeds**2, size)
     product = _mean(speeds[:, first] * speeds[:, second], size)
     turns = swings[:, first] & swings[:, second] & walks
-    girdles, ends = (
-        [JOINT[name] for name in names] for names in zip(*SWING_FORWARD.values(), strict=True)
-    )
+    girdles, ends = ([JOINT[name] for name in names] for names in zip(*SWING_FORWARD.values(), strict=True))
     limbs = joints[:, ends] - joints[:, girdles]
     along, over = (
         _mean(change(dot(limbs, axis)) ** 2, size) for axis in (forward, cross(forward, down[:, None]))
