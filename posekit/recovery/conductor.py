@@ -411,14 +411,7 @@ class _Conductor:
         if not self.photograph:
             return modes.covariance()
         # y = x e^-s: dy = e^-s (dx - x ds)
-        from posekit.solver import reference
-        from posekit.solver.modes import KNOWN
-
-        p = modes.problem
-        whole, x = (
-            np.linalg.inv(reference.information(p.records, p.limits, modes.frame, modes.x, KNOWN)),
-            modes.x[:, :-1],
-        )
+        whole, x = modes.covariance(size=True), modes.x[:, :-1]
         cross = x[:, :, None] * whole[:, None, -1, :-1]
         full = whole[:, :-1, :-1] - cross - cross.transpose(0, 2, 1)
         full += x[:, :, None] * x[:, None] * whole[:, -1:, -1:]

@@ -98,12 +98,32 @@ double interpolated(double x, const double* at, const double* y, int n) {
   return y[n - 1];
 }
 
+// Ranges of hips and shoulders are rounded off with small whole powers.
+double raised(double x, double power) { return power == 2 ? x * x : power == 3 ? x * x * x : std::pow(x, power); }
+double root(double x, double power) {
+  return power == 2 ? std::sqrt(x) : power == 3 ? std::cbrt(x) : std::pow(x, 1 / power);
+}
+
+// Elevation, plane and turn of an arm, the same in all writings; zero for legs.
+struct Reading {
+  double elevation, plane, offset;
+};
+Reading reading_of(int limb, const double g[4]) {
+  if (limb > 1) return {0, 0, 0};
+  const double a = g[0] * SIGN[limb][0], b = g[1] * SIGN[limb][1];
+  const double sb = std::sin(b), cb = std::cos(b), forward = std::sin(a) * cb, down = std::cos(a) * cb;
+  const double elevation = std::atan2(std::sqrt(forward * forward + sb * sb), down), plane = std::atan2(sb, forward);
+  const double twist = -2 * std::atan2(std::sin(a / 2) * std::sin(b / 2), std::cos(a / 2) * std::cos(b / 2));
+  const double from_side = M_PI / 2 - (plane < SEAM ? plane + 2 * M_PI : plane);
+  return {elevation, plane, twist - (1 - std::cos(elevation)) * from_side};
+}
+
 // Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
-double limb_residual(const Limits& L, int limb, const double g[4], int way, double out[4]) {
+double limb_residual(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double out[4]) {
   const int kind = limb / 2, over = way / 2, flipped = way & 1;
   const bool arm = kind == 0 && L.by_elevation > 0;
   double a = g[0] * SIGN[limb][0], b = g[1] * SIGN[limb][1], c = g[2] * SIGN[limb][2], e = g[3] * SIGN[limb][3];
-  double r[7] = {a + M_PI * over, over ? M_PI - b : b, c + M_PI * (over ^ flipped), flipped ? -e : e, 0, 0, 0};
+  double r[7] = {a + M_PI * over, over ? M_PI - b : b, c + M_PI * (over ^ flipped), flipped ? -e : e, reading.elevation, reading.plane, 0};
   double bound[2][4], mean[2][4], middle[4], turn[2], outward[2] = {0, 0};
   bool turns[2] = {false, false};
   for (int i = 0; i < 4; ++i) {
@@ -112,15 +132,6 @@ double limb_residual(const Limits& L, int limb, const double g[4], int way, doub
     for (int s = 0; s < 2; ++s) bound[s][i] = L.limit[limb][i][s], mean[s][i] = L.mean[kind][i][s];
   }
   if (kind == 1 && L.between_hips > 0) r[0] -= std::min(std::max(r[0] - middle[0], L.hip_turn[0]), L.hip_turn[1]);
-  double offset = 0;
-  if (kind == 0) {
-    double sa = std::sin(a), ca = std::cos(a), sb = std::sin(b), cb = std::cos(b);
-    double forward = sa * cb, down = ca * cb;
-    r[4] = std::atan2(std::sqrt(forward * forward + sb * sb), down);
-    r[5] = std::atan2(sb, forward);
-    double twist = -2 * std::atan2(std::sin(a / 2) * std::sin(b / 2), std::cos(a / 2) * std::cos(b / 2));
-    offset = twist - (1 - std::cos(r[4])) * (M_PI / 2 - (r[5] < SEAM ? r[5] + 2 * M_PI : r[5]));
-  }
   if (arm)
     for (int i = 0; i < 2; ++i) bound[0][i] = -INFINITY, bound[1][i] = INFINITY;
   const double sine = std::sin(r[3]);
@@ -148,16 +159,16 @@ double limb_residual(const Limits& L, int limb, const double g[4], int way, doub
     for (int i = 0; i < 3; ++i) {
       double centre = i == 2 ? (mean[0][2] + mean[1][2]) / 2 : middle[i];
       if (i) {
-        double left = std::pow(std::max(1 - used, std::pow(LEAST_LEFT, power)), 1 / power);
+        double left = root(std::max(1 - used, raised(LEAST_LEFT, power)), power);
         for (int s = 0; s < 2; ++s) bound[s][i] = centre + (bound[s][i] - centre) * left;
       }
       double off = r[i] - centre, half = off < 0 ? centre - L.limit[limb][i][0] : L.limit[limb][i][1] - centre;
-      if (i < 2) used += std::pow(std::fabs(off) / half, power);
+      if (i < 2) used += raised(std::fabs(off) / half, power);
     }
   }
   if (turns[0] || turns[1]) {
     double centre = turns[0] && turns[1] ? (turn[0] + turn[1]) / 2 : turns[0] ? turn[0] : turn[1];
-    double raw = turned(r[2] + offset + M_PI * over, centre), shift = raw - r[2];
+    double raw = turned(r[2] + reading.offset + M_PI * over, centre), shift = raw - r[2];
     r[2] = raw;
     for (int s = 0; s < 2; ++s) bound[s][2] = turns[s] ? turn[s] : bound[s][2] + shift;
   }
@@ -176,12 +187,12 @@ double limb_residual(const Limits& L, int limb, const double g[4], int way, doub
 }
 
 // The least violated writing; residuals are in `out`.
-int least_writing(const Limits& L, int limb, const double g[4], double out[4], double& best) {
+int least_writing(const Limits& L, int limb, const double g[4], const Reading& reading, double out[4], double& best) {
   const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
   int which = 0;
   best = INFINITY;
   for (int way = 0; way < ways && best > 0; ++way) {
-    double r[4], total = limb_residual(L, limb, g, way, r);
+    double r[4], total = limb_residual(L, limb, g, reading, way, r);
     if (total < best) best = total, which = way, std::memcpy(out, r, sizeof r);
   }
   return which;
@@ -267,14 +278,15 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
     const Frame& R = m < 2 ? torso : hips;
     const Limb s = limb_of(x, m, R);
     double r[4], total;
-    int way = least_writing(L, m, s.g, r, total);
+    const Reading reading = reading_of(m, s.g);
+    int way = least_writing(L, m, s.g, reading, r, total);
     chi2 += scale * scale * total;
     if (!n || total == 0) continue;
     double slope[4][4];  // of each residual along each angle
     for (int i = 0; i < 4; ++i) {
       double g[4] = {s.g[0], s.g[1], s.g[2], s.g[3]}, moved[4];
       g[i] += ANGLE_STEP;
-      limb_residual(L, m, g, way, moved);
+      limb_residual(L, m, g, i < 2 ? reading_of(m, g) : reading, way, moved);
       for (int k = 0; k < 4; ++k) slope[k][i] = (moved[k] - r[k]) / ANGLE_STEP;
     }
     double cg = std::cos(s.g[2]), sg = std::sin(s.g[2]), ce = std::cos(s.g[3]), se = std::sin(s.g[3]);
@@ -381,17 +393,18 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
   return limits && p.limit_weight > 0 ? chi2 + limit_terms(p, *limits, x, parts, n) : chi2;
 }
 
+// M = U'U: the upper triangle becomes U, row by row, so that the inner loops run along rows.
 template <int K>
 bool cholesky(double M[K][K]) {
-  for (int i = 0; i < K; ++i)
-    for (int j = 0; j <= i; ++j) {
-      double s = M[i][j];
-      for (int k = 0; k < j; ++k) s -= M[i][k] * M[j][k];
-      if (i == j) {
-        if (!(s > 0)) return false;
-        M[i][i] = std::sqrt(s);
-      } else M[i][j] = s / M[j][j];
+  for (int k = 0; k < K; ++k) {
+    if (!(M[k][k] > 0)) return false;
+    const double f = 1 / std::sqrt(M[k][k]);
+    for (int j = k; j < K; ++j) M[k][j] *= f;
+    for (int i = k + 1; i < K; ++i) {
+      const double c = M[k][i];
+      for (int j = i; j < K; ++j) M[i][j] -= c * M[k][j];
     }
+  }
   return true;
 }
 
@@ -402,21 +415,29 @@ bool eliminate(Normal& n, double damping, unsigned parts, double add_l[4][6], do
     if (!(parts >> (m + 1) & 1)) continue;
     for (int i = 0; i < 6; ++i) add_l[m][i] = n.L[m][i][i] * damping + FLOOR, n.L[m][i][i] += add_l[m][i];
     if (!cholesky<6>(n.L[m])) return false;
+    int used[T], count = 0;  // a limb within its limits knows three coordinates of the trunk, and the size
+    for (int c = 0; c < T; ++c)
+      for (int i = 0; i < 6; ++i)
+        if (n.C[m][i][c] != 0) {
+          used[count++] = c;
+          break;
+        }
     for (int i = 0; i < 6; ++i) {
-      double f = 1 / n.L[m][i][i];
+      const double f = 1 / n.L[m][i][i];
       for (int k = 0; k < i; ++k) {
-        n.l[m][i] -= n.L[m][i][k] * n.l[m][k];
-        for (int c = 0; c < T; ++c) n.C[m][i][c] -= n.L[m][i][k] * n.C[m][k][c];
+        n.l[m][i] -= n.L[m][k][i] * n.l[m][k];
+        for (int c = 0; c < count; ++c) n.C[m][i][used[c]] -= n.L[m][k][i] * n.C[m][k][used[c]];
       }
       n.l[m][i] *= f;
-      for (int c = 0; c < T; ++c) n.C[m][i][c] *= f;
+      for (int c = 0; c < count; ++c) n.C[m][i][used[c]] *= f;
     }
-    if (parts & 1)
-      for (int k = 0; k < 6; ++k)
-        for (int i = 0; i < T; ++i) {
-          n.g[i] -= n.C[m][k][i] * n.l[m][k];
-          for (int j = 0; j <= i; ++j) n.H[i][j] -= n.C[m][k][i] * n.C[m][k][j];
-        }
+    if (!(parts & 1)) continue;
+    for (int c = 0; c < count; ++c)
+      for (int k = 0; k < 6; ++k) {
+        const double at = n.C[m][k][used[c]];
+        n.g[used[c]] -= at * n.l[m][k];
+        for (int d = c; d < count; ++d) n.H[used[c]][used[d]] -= at * n.C[m][k][used[d]];
+      }
   }
   if (!(parts & 1)) return true;
   for (int i = 0; i < T; ++i) n.H[i][i] += add_t[i];
@@ -430,12 +451,11 @@ double step(const Normal& start, double damping, unsigned parts, double dx[N]) {
   if (!eliminate(n, damping, parts, add_l, add_t)) return -1;
   if (parts & 1) {
     for (int i = 0; i < T; ++i) {
-      double s = n.g[i];
-      for (int k = 0; k < i; ++k) s -= n.H[i][k] * t[k];
-      t[i] = s / n.H[i][i], gain += t[i] * t[i];
+      t[i] = n.g[i] / n.H[i][i], gain += t[i] * t[i];
+      for (int k = i + 1; k < T; ++k) n.g[k] -= n.H[i][k] * t[i];
     }
     for (int i = T - 1; i >= 0; --i) {
-      for (int k = i + 1; k < T; ++k) t[i] -= n.H[k][i] * t[k];
+      for (int k = i + 1; k < T; ++k) t[i] -= n.H[i][k] * t[k];
       t[i] /= n.H[i][i];
     }
     for (int i = 0; i < T; ++i) gain += add_t[i] * t[i] * t[i], dx[i < 18 ? i : 42] = -t[i];
@@ -449,7 +469,7 @@ double step(const Normal& start, double damping, unsigned parts, double dx[N]) {
         for (int c = 0; c < T; ++c) d[i] -= n.C[m][i][c] * t[c];
     }
     for (int i = 5; i >= 0; --i) {
-      for (int k = i + 1; k < 6; ++k) d[i] -= n.L[m][k][i] * d[k];
+      for (int k = i + 1; k < 6; ++k) d[i] -= n.L[m][i][k] * d[k];
       d[i] /= n.L[m][i][i];
     }
     for (int i = 0; i < 6; ++i) gain += add_l[m][i] * d[i] * d[i], dx[3 * (i < 3 ? MID[m] : END[m]) + i % 3] = -d[i];
@@ -459,17 +479,17 @@ double step(const Normal& start, double damping, unsigned parts, double dx[N]) {
 
 double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double precision,
                double hopeless, int& steps) {
-  Normal here, there;
-  double damping = 1e-4, chi2 = evaluate(p, L, x, parts, &here), dx[N] = {}, y[N];
+  Normal two[2], *here = two, *there = two + 1;
+  double damping = 1e-4, chi2 = evaluate(p, L, x, parts, here), dx[N] = {}, y[N];
   for (; steps < most && std::isfinite(chi2); ++steps) {
-    double gain = step(here, damping, parts, dx);
+    double gain = step(*here, damping, parts, dx);
     if (gain < 0) {
       damping = std::max(damping * 8, 1e-4);
       continue;
     }
     if ((gain <= precision && damping <= 0.1) || damping > 1e6 || (chi2 > hopeless && gain < 0.5 * chi2)) break;
     for (int i = 0; i < N; ++i) y[i] = x[i] + dx[i];
-    double value = evaluate(p, L, y, parts, &there);
+    double value = evaluate(p, L, y, parts, there);
     if (value <= chi2) {
       double ratio = (chi2 - value) / gain;
       damping = std::max(ratio > 0.75 ? damping * 0.1 : ratio < 0.25 ? damping * 4 : damping, 1e-12);
@@ -520,7 +540,7 @@ double summarize(Normal& n, double covariance[J][3][3]) {
   for (int c = 0; c < T; ++c) {  // inverse of the trunk's factor, then of the trunk's matrix
     for (int i = c; i < T; ++i) {
       double s = i == c;
-      for (int k = c; k < i; ++k) s -= n.H[i][k] * inverse[k][c];
+      for (int k = c; k < i; ++k) s -= n.H[k][i] * inverse[k][c];
       inverse[i][c] = s / n.H[i][i];
     }
     logdet += 2 * std::log(n.H[c][c]);
@@ -536,7 +556,7 @@ double summarize(Normal& n, double covariance[J][3][3]) {
     for (int c = 0; c < 6; ++c) {
       for (int i = c; i < 6; ++i) {
         double s = i == c;
-        for (int k = c; k < i; ++k) s -= n.L[m][i][k] * U[k][c];
+        for (int k = c; k < i; ++k) s -= n.L[m][k][i] * U[k][c];
         U[i][c] = s / n.L[m][i][i];
       }
       logdet += 2 * std::log(n.L[m][c][c]);
