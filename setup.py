@@ -8,6 +8,7 @@ setup(
         Pybind11Extension(
             "posekit.solver._compiled",
             ["posekit/solver/solver.cpp"],
+            depends=["posekit/solver/limits.hpp"],
             cxx_std=17,
             extra_compile_args=["-O3", "-fno-math-errno", "-pthread"],
             extra_link_args=["-pthread"],
