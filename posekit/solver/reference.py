@@ -84,9 +84,9 @@ def evaluate(
         for row, terms, slopes in _limit_rows(limits, joints, parts):
             weight = problems["limit_weight"][row, None]
             r, d = terms * weight, slopes * weight[..., None]
-            np.add.at(out.chi2, row, dot(r, r))
-            np.add.at(out.gradient, row, np.einsum("mkc,mk->mc", d, r))
-            np.add.at(out.matrix, row, np.einsum("mkc,mkd->mcd", d, d))
+            out.chi2[row] += dot(r, r)
+            out.gradient[row] += np.einsum("mkc,mk->mc", d, r)
+            out.matrix[row] += d.transpose(0, 2, 1) @ d
     if pull is not None:
         r = pull(joints)
         moved = np.repeat(x[:, None, :SIZE], SIZE, axis=1) + PULL_STEP * np.eye(SIZE)
@@ -374,6 +374,7 @@ def separate(
     joints = x[:, :SIZE].reshape(-1, 14, 3)
     joints = joints - joints[:, :1]
     edges = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
+    every = information(problems, limits, which, x, known)
     for a, b in pairwise(edges.tolist()):
         kept: list[int] = []
         for k in range(a, b):
@@ -383,8 +384,7 @@ def separate(
             same = bool((far < within).any())
             if not same and near.size:
                 d = x[k] - x[near]
-                H = information(problems, limits, which[near], x[near], known)
-                same = bool((np.einsum("ni,nij,nj->n", d, H, d) < level).any())
+                same = bool((np.einsum("ni,nij,nj->n", d, every[near], d) < level).any())
             if not same:
                 kept.append(k)
         keep[kept] = True
