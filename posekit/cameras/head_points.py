@@ -108,27 +108,6 @@ def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
     return ""
 
 
-def head_points_cam(R: Array, t: Array, points: ArrayLike | HeadPoints) -> Array:
-    """Place head points (P, 3) in the camera frame, ``R p + t``.
-
-    Parameters
-    ----------
-    R : array (..., 3, 3)
-        Rotation from the head's frame to the camera's.
-    t : array (..., 3)
-        The head frame's origin in the camera frame, metres.
-    points : HeadPoints or array (P, 3)
-        Metres, head frame.
-
-    Returns
-    -------
-    array (..., P, 3)
-        Metres, camera frame.
-    """
-    places = points.points if isinstance(points, HeadPoints) else np.asarray(points, dtype=np.float64)
-    return np.asarray(places @ np.swapaxes(R, -1, -2) + t[..., None, :])
-
-
 #: The head of Lee & Chen 1985, Table A.2(a), in metres.
 #:
 #: The right eye's x is printed as -32.168 cm. Only -31.168, the left eye's, gives the projection of Table A.2(b)
