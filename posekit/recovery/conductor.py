@@ -30,7 +30,7 @@ from posekit.recovery.certify import (
 from posekit.recovery.gather import Found, gathered
 from posekit.recovery.person import person_of, sided, uncertainty_of
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.scales import figure_linkage
+from posekit.recovery.scales import figure_linkage, from_near, from_usual_distance
 from posekit.recovery.sight import SHARP_PIXELS, Sight, sight_of
 from posekit.settings import EXACT, MEASURED, PHOTOGRAPH, RecoverSettings, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
@@ -295,11 +295,9 @@ class _Conductor:
             least = np.full(len(problem), np.inf)
             np.minimum.at(least, modes.frame, modes.chi2)
             modes = modes.take(((least < EXACT_CHI2) & (problem.freedom > 0))[modes.frame])
-        frame, joints, size = sight.frame[modes.frame], modes.joints, np.zeros(len(modes))
+        frame, joints, scale = sight.frame[modes.frame], modes.joints, self._scale(sight, modes.frame)
         if self.photograph:
-            # The scale is as open as the size: the person keeps the stated size, and the scale takes the rest.
-            size = modes.size
-            joints = joints * np.exp(-size)[:, None, None]
+            joints, scale = from_near(joints, _middle(sight)[modes.frame], scale)
         head = np.full((len(joints), len(HEAD_POINTS), 3), np.nan)
         verdict = self.noisy.certify(joints, head)
         volume = modes.log_evidence + 0.5 * modes.chi2
@@ -312,12 +310,16 @@ class _Conductor:
             "head": head,
             "chi2": modes.chi2,
             "inferred": hidden,
-            "scale": self._scale(sight, modes.frame) * np.exp(size),
+            "scale": scale,
         }
         solved = np.unique(frame).tolist()
         chosen = [self._chosen(k, np.flatnonzero(frame == k), columns, score, verdict) for k in solved]
         rows = np.concatenate([one.rows for one in chosen]) if chosen else np.empty(0, dtype=np.intp)
-        covariance, start = self._covariance(modes.take(rows)), 0
+        covariance, start = modes.covariance(rows), 0
+        if self.photograph:
+            # A larger person farther away gives the same picture.
+            x = self.lengths_known.common * modes.x[rows, :-1]
+            covariance = covariance + x[:, :, None] * x[:, None]
         for k, one in zip(solved, chosen, strict=True):
             own, start = covariance[start : start + len(one.rows)], start + len(one.rows)
             if len(one.rows) or not sharp:
@@ -340,16 +342,19 @@ class _Conductor:
 
     def _problem(self, sight: Sight, *, sharp: bool) -> Problem:
         """Lay the problem of some rows out for the solver."""
-        return Problem.seen(
+        problem = Problem.seen(
             sight.camera,
             sight.image,
             SHARP_PIXELS * sight.deviation if sharp else sight.deviation,
             lengths=self.lengths,
             length_deviation=0.0 if sharp else sight.lengths.deviations,
-            size_deviation=0.0 if sharp else sight.size_deviation,
+            size_deviation=0.0 if sharp or self.photograph else sight.size_deviation,
             root=None if self.photograph else np.where(sight.given[:, None], sight.root, np.nan),
             limits=self.limits,
             robust=bool(self.view.derived) and not self.photograph,
+        )
+        return (
+            from_usual_distance(problem, _middle(sight), sight.size_deviation) if self.photograph else problem
         )
 
     def _chosen(
@@ -401,21 +406,14 @@ class _Conductor:
         )
         if covariance is not None:
             block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
+            if self.photograph:
+                # There is no place in space: radii are about the middle of the joints.
+                block = block - block.mean(axis=1, keepdims=True)
+                block = block - block.mean(axis=3, keepdims=True)
             table["radius"] = joint_radius(np.einsum("njajb->njab", block))
         if self.settings.group is not None:
             table["group"] = group_of(table["joints"], self.settings.group)
         return Found(table, answer, rejected, judged, unlisted=unlisted, unlisted_probability=rest)
-
-    def _covariance(self, modes: Modes) -> Array:
-        """Return the covariances (N, 42, 42) of the joints of modes; of photographs in the stated size."""
-        if not self.photograph:
-            return modes.covariance()
-        # y = x e^-s: dy = e^-s (dx - x ds)
-        whole, x = modes.covariance(size=True), modes.x[:, :-1]
-        cross = x[:, :, None] * whole[:, None, -1, :-1]
-        full = whole[:, :-1, :-1] - cross - cross.transpose(0, 2, 1)
-        full += x[:, :, None] * x[:, None] * whole[:, -1:, -1:]
-        return np.asarray(np.exp(-2 * modes.size)[:, None, None] * full)
 
     def _answer_lengths(self, joints: Array, probability: Array) -> Array:
         """Return the lengths of the answer: the person's, in the mean size of the survivors."""
@@ -476,6 +474,11 @@ class _Conductor:
             "contact_margin": self.noisy.settings.contact_margin,
         }
         return {**found, "noisy": noise}
+
+
+def _middle(sight: Sight) -> Array:
+    """Return the middle of the trunk's image points (H, 2) before a scaled orthographic camera, metres."""
+    return np.asarray(np.nanmean(sight.camera.normalize(sight.image)[:, :6], axis=1))
 
 
 @cache

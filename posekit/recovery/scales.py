@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from posekit.body import Figure
 from posekit.errors import refusal
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS
+from posekit.solver import Problem
 
 if TYPE_CHECKING:
     from posekit.recovery.objects import Linkage
@@ -41,11 +43,65 @@ PHOTOGRAPH_OFFSETS: Final = np.array([ANNOTATION_SIGMAS[name.rpartition("_")[2]]
 #: Depth by which a joint is off the body's middle, and distance of a camera, where none is known.
 RELIEF_METRES, USUAL_DISTANCE_METRES = 0.25, 4.5
 
+#: Relative deviation of that distance: photographs of a whole person are taken from 3 to 7 m.
+DISTANCE_DEVIATION: Final = 0.4
+
 #: Relative deviation of a scale by how it was found: who stands for their stature does not stand quite straight.
 SCALE_DEVIATIONS: Final = {"likely": 0.08, "min": 0.08, "stature": 0.03}
 
 #: Shortfall of a segment at a scale that is stated for exact points, in metres, that no noise explains.
 LONGEST_TOO_SHORT: Final = 0.3
+
+
+def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
+    r"""Return a scaled orthographic problem as a camera at the usual distance d sees it, before the person's middle.
+
+    What is nearer looks larger before every real camera. A posture of depth z about the plane of the scale is seen at
+    :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rays in metres.
+    middle : array (F, 2)
+        Middle of the person, metres.
+    scale_deviation : array (F,)
+        Relative deviation of the scale.
+    """
+    d = USUAL_DISTANCE_METRES
+    root = np.broadcast_to([0.0, 0.0, d], problem.root.shape)
+    weight = np.zeros_like(problem.root_whitening)
+    weight[:, 2, 2] = 1 / (d * scale_deviation)
+    seen = problem.seen_joints[..., None]
+    return replace(
+        problem,
+        rays=np.where(seen, (problem.rays - middle[:, None]) / d, 0.0),
+        whitening=problem.whitening * d,
+        root=root,
+        root_whitening=weight,
+        perspective=True,
+    )
+
+
+def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]:
+    """Return postures (N, 14, 3) of `from_usual_distance` in the frame of a scaled orthographic camera.
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3)
+        Before the camera at the usual distance, metres.
+    middle, scale : array (N, 2), (N,)
+        Middle of the person at the nominal scale, metres, and that scale.
+
+    Returns
+    -------
+    joints, scale : array (N, 14, 3), (N,)
+        The neck has depth 0, and the scale is that of its plane.
+    """
+    depth = joints[:, 0, 2]
+    nearer = depth / USUAL_DISTANCE_METRES
+    moved = np.concatenate([middle * nearer[:, None], -depth[:, None]], axis=1)
+    return joints + moved[:, None], scale / nearer
 
 
 def scales_of(

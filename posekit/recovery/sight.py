@@ -17,6 +17,7 @@ from posekit.cameras.lee_chen import camera_position, rotation_to_paper
 from posekit.errors import PosekitError, refusal
 from posekit.geometry import Array, Record
 from posekit.recovery.scales import (
+    DISTANCE_DEVIATION,
     PHOTOGRAPH_OFFSETS,
     RELIEF_METRES,
     SCALE_DEVIATIONS,
@@ -330,8 +331,8 @@ def _photograph(
     image = view.image[frame]
     metres = (square[frame] - np.nanmean(square[frame, :6], axis=1, keepdims=True)) / scale[:, None, None]
     aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
-    # What is nearer looks larger, which no scaled orthographic camera shows: more so far from the middle.
-    off = np.hypot(PHOTOGRAPH_OFFSETS, RELIEF_METRES / USUAL_DISTANCE_METRES * aside)
+    # What is nearer looks larger, by the distance of the camera: more so far from the middle.
+    off = np.hypot(PHOTOGRAPH_OFFSETS, DISTANCE_DEVIATION * RELIEF_METRES / USUAL_DISTANCE_METRES * aside)
     root = np.zeros((len(frame), 3))
     root[:, :2] = square[frame, 0] / scale[:, None]
     return Sight(

@@ -93,13 +93,10 @@ class Modes:
         logdet, covariance = run("summaries", self.problem, self.frame, self.x, KNOWN)
         return logdet, covariance
 
-    def covariance(self, rows: Ints | slice = slice(None), *, size: bool = False) -> Array:
-        """Return the covariance of all joint positions of some modes (K, 42, 42), square metres.
-
-        With `size`, of all unknowns (K, 43, 43): the last is the logarithm of the size.
-        """
-        whole = np.linalg.inv(run("information", self.problem, self.frame[rows], self.x[rows], KNOWN))
-        return np.asarray(whole if size else whole[:, :42, :42])
+    def covariance(self, rows: Ints | slice = slice(None)) -> Array:
+        """Return the covariance of all joint positions of some modes (K, 42, 42), square metres."""
+        information = run("information", self.problem, self.frame[rows], self.x[rows], KNOWN)
+        return np.asarray(np.linalg.inv(information)[:, :42, :42])
 
     def residuals(self, rows: Ints | slice = slice(None)) -> Mapping[str, Array]:
         """Return the size of every residual of some modes (K,), standard deviations, by what it is of.

@@ -69,12 +69,12 @@ class Rays:
 
 def necks(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
     """Return where necks may be: frames (K,), ascending, and positions (K, 3)."""
-    known = problem.rooted | (not problem.perspective)
-    frames, places = [np.flatnonzero(known)], []
-    if problem.perspective:
-        places.append(problem.root[known])
-    else:
-        places.append(rays.origin[known, 0] + problem.root[known] * [0.0, 0.0, 1.0])
+    rooted, deep = problem.rooted, (problem.root_whitening[:, 2, 2] > 0) & problem.seen_joints[:, 0]
+    known = rooted | deep | (not problem.perspective)
+    # Where only the depth is known, the neck is there on its ray.
+    root, origin, ray = (one[known] for one in (problem.root, rays.origin[:, 0], rays.direction[:, 0]))
+    beside = origin + ((root - origin)[:, 2] / ray[:, 2])[:, None] * ray
+    frames, places = [np.flatnonzero(known)], [np.where(rooted[known, None], root, beside)]
     open_ = np.flatnonzero(~known)
     if open_.size:
         d, seen = rays.direction[open_], problem.seen_joints[open_]
