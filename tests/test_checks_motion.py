@@ -186,6 +186,36 @@ def test_a_fall_slower_than_gravity_doubts_the_rate() -> None:
     assert "about 30 Hz would fit" in warning
 
 
+def pendulum_walk(steps: int = 8, length: float = 0.6, width: float = 0.2, rate: float = 60.0) -> np.ndarray:
+    """Return joints (T, 14, 3) of a body whose centre of mass goes as an inverted pendulum over each standing foot."""
+    neutral = FIGURE.neutral_points[:14] - FIGURE.neutral_points[12:14].mean(axis=0)
+    omega, seconds = np.sqrt(9.81 / (neutral[4, 2] + 0.1)), 0.5
+    time = np.arange(round(steps * seconds * rate)) / rate
+    step, t = np.divmod(time, seconds)
+    t, side = t - seconds / 2, np.where(step % 2, 1.0, -1.0)
+    forward = step * length + length / 2 * np.sinh(omega * t) / np.sinh(omega * seconds / 2)
+    across = side * width / 2 * (1 - np.cosh(omega * t) / np.cosh(omega * seconds / 2))
+    joints = neutral + np.stack([forward, across, np.zeros(len(t))], axis=1)[:, None]
+    joints[..., 2] += 0.066
+    swing = np.stack(
+        [step * length + 2 * length * t / seconds, -side * width / 2, 0.116 - 0.8 * t**2], axis=1
+    )
+    stance = np.stack([step * length, side * width / 2, np.full(len(t), 0.066)], axis=1)
+    right = side < 0
+    joints[:, 12] = np.where(right[:, None], stance, swing)
+    joints[:, 13] = np.where(right[:, None], swing, stance)
+    return joints
+
+
+def test_a_walk_out_of_balance_doubts_the_rate() -> None:
+    joints = pendulum_walk()
+    time = np.arange(len(joints)) / 60.0
+    assert not judged(joints, time=time).warnings
+    for factor in (0.5, 2.0):
+        (warning,) = judged(joints, time=factor * time).warnings
+        assert "about 60 Hz would fit" in warning
+
+
 def test_published_profiles_follow_their_rules() -> None:
     joints = gesture()
     sunk = joints.copy()
