@@ -145,6 +145,7 @@ def test_planted_defects_are_named_in_their_frames(
         assert report.clips[0].reason == check
     if plant is first_pose:
         assert not frames_of(report, "swap")
+        assert any(note.startswith("Frame 0 is another posture") for note in report.notes)
 
 
 def test_gaps_and_repeated_times_are_named_by_timing() -> None:
@@ -204,6 +205,7 @@ def pendulum_walk(steps: int = 8, length: float = 0.6, width: float = 0.2, rate:
     right = side < 0
     joints[:, 12] = np.where(right[:, None], stance, swing)
     joints[:, 13] = np.where(right[:, None], swing, stance)
+    joints[:, 10:12] = (joints[:, 4:6] + joints[:, 12:14]) / 2 + [0.05, 0.0, 0.0]
     return joints
 
 
@@ -214,6 +216,16 @@ def test_a_walk_out_of_balance_doubts_the_rate() -> None:
     for factor in (0.5, 2.0):
         (warning,) = judged(joints, time=factor * time).warnings
         assert "about 60 Hz would fit" in warning
+
+
+def test_a_walk_that_stays_in_place_is_said_to_be_on_a_treadmill() -> None:
+    joints = pendulum_walk()
+    time = np.arange(len(joints)) / 60.0
+    belt = joints - 1.2 * time[:, None, None] * [1.0, 0.0, 0.0]
+    assert not any("treadmill" in note for note in judged(joints, time=time).notes)
+    report = judged(belt, time=time, noise=0.0)
+    assert frames_of(report, "sliding")
+    assert any("backward at 1.2 m/s" in note and "treadmill" in note for note in report.notes)
 
 
 def test_published_profiles_follow_their_rules() -> None:

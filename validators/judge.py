@@ -20,6 +20,7 @@ from posekit.validators.body import Body
 from posekit.validators.check import Check, Judgement, NotAskedError, find_check, judged, message_of
 from posekit.validators.collision import Collision
 from posekit.validators.joint_range import JointRange
+from posekit.validators.motion.hints import hints
 from posekit.validators.motion.profile import MOTION_CHECKS, load_profile, some_of
 from posekit.validators.motion.rate import rate_doubts
 from posekit.validators.motion.standing import balance
@@ -317,25 +318,16 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         messages={name: message_of(check) for name, (check, _) in found.items()},
         not_asked=not_asked,
         settings={**body.settings.to_json(), **body.allowed()},
-        notes=(*motion.notes, *_ground_note(body, found)),
+        notes=(
+            *motion.notes,
+            *hints(body, {name: one for name, (_, one) in found.items()}, np.asarray(motion.frame)),
+        ),
         warnings=(*motion.warnings, *rate_doubts(body)),
     )
 
 
 #: Columns of the findings of a report that are whole numbers.
 WHOLE: Final = ("row", "check", "place")
-
-
-def _ground_note(body: Body, found: dict[str, Any]) -> list[str]:
-    """State the height of an estimated ground."""
-    if body.settings.ground is not None or not {"penetration", "floating"} & set(found):
-        return []
-    from posekit.validators.motion.ground import ground_of
-
-    ground = ground_of(body)
-    resting = int(ground.resting.sum())
-    frames = f"{resting} frames in which the body rests" if resting >= 3 else "its lowest frames"
-    return [f"Ground estimated at {ground.low:.3f} m along up, from {frames}; state it with --ground."]
 
 
 class Validator:

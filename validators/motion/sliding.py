@@ -77,30 +77,26 @@ def sliding(
         Metres a second that a foot on the ground goes up or down at most.
     """
     needs_rate(body, SLIDING_RATE)
-    line, ground, up = timeline_of(body), ground_of(body), up_of(body)
-    feet, over = soles(body)
-    base = (ground.low + ground.high + ground.lifted)[:, None]
+    line, up, (feet, over) = timeline_of(body), up_of(body), soles(body)
     hips = body.height[:, both("hip")].min(axis=1)[:, None]
     crawls = hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body)
-    down = line.spread((~crawls & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
+    down = line.spread((~crawls & (feet @ up - over < _base(body) + DOWN_METRES)).astype(np.float64)) > 0
     placed = line.spread(feet)
     count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
     noise = 3 * np.sqrt(2) * body.noise / body.dt
-    slides = [
-        _slides(body, placed[:, foot], down[:, foot], count, (fastest, uneven, rising), noise)
-        for foot in FOOT_POINTS
-    ]
     value = np.zeros((len(placed), len(SIDES)))
-    for start, stop in runs(np.any(slides, axis=0)):
-        which = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
-        points = placed[:, [point for k in which for point in FOOT_POINTS[k]]]
-        points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
-        along = perpendicular((points[stop - 1] - points[start]).mean(axis=0), up)
-        speed = float(norm(along)) / ((stop - 1 - start) * body.dt)
-        way = (points @ along / norm(along)).mean(axis=1)
-        first, last = _ends(np.diff(way) - speed * body.dt / 2, start, stop - 1, count)
-        value[first + 1 : last + 1, which] = speed
-    drift = _drift(_stance_velocity(placed, line.spread(over + base), up, body.dt), body.dt)
+    for side, foot in enumerate(FOOT_POINTS):
+        points = placed[:, foot]
+        for start, stop in runs(
+            _slides(body, points, down[:, foot], count, (fastest, uneven, rising), noise)
+        ):
+            known = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
+            along = perpendicular((known[stop - 1] - known[start]).mean(axis=0), up)
+            speed = float(norm(along)) / ((stop - 1 - start) * body.dt)
+            way = (known @ along / norm(along)).mean(axis=1)
+            first, last = _ends(np.diff(way) - speed * body.dt / 2, start, stop - 1, count)
+            value[first + 1 : last + 1, side] = speed
+    drift = _drift(_stance_velocity(body), body.dt)
     if drift is not None and drift[2] > fastest + noise:
         start, stop, speed = drift
         for first, last in runs(np.asarray(value.any(axis=1))):
@@ -145,16 +141,23 @@ def _slides(
     return slides
 
 
-def _stance_velocity(points: Array, over: Array, up: Array, step: float) -> Array:
+def _stance_velocity(body: Body) -> Array:
     """Return the velocity along the ground of the slowest point of both feet that is down (S, 3), metres a second.
 
     One foot of a walker always stands, so that it is near zero in every frame; NaN in frames without a foot down.
     """
-    velocity = perpendicular(np.diff(points, axis=0, prepend=np.nan) / step, up)
-    speed = np.where(points @ up < over + 2 * DOWN_METRES, norm(velocity), np.nan)
-    speed = np.where(np.isnan(speed), np.inf, speed)
+    line, up, (feet, over) = timeline_of(body), up_of(body), soles(body)
+    down = line.spread(np.where(feet @ up - over < _base(body) + 2 * DOWN_METRES, 1.0, np.nan))
+    velocity = perpendicular(np.diff(line.spread(feet), axis=0, prepend=np.nan) / body.dt, up)
+    speed = np.nan_to_num(norm(velocity) * down, nan=np.inf)
     slowest = np.take_along_axis(velocity, speed.argmin(axis=1)[:, None, None], axis=1)[:, 0]
     return np.where(np.isfinite(speed.min(axis=1))[:, None], slowest, np.nan)
+
+
+def _base(body: Body) -> Array:
+    """Return the highest level of the ground in each frame (T, 1), metres along up."""
+    ground = ground_of(body)
+    return np.asarray((ground.low + ground.high + ground.lifted)[:, None])
 
 
 def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
