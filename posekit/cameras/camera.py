@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, Protocol
+from abc import abstractmethod
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
 from posekit.errors import CameraError, refusal, shown
-from posekit.geometry import FARTHEST_COORDINATE, Array, Flags
+from posekit.geometry import FARTHEST_COORDINATE, Array, Flags, Record, read_only
 
 #: Half the distance (m) between the two candidates below which they count as one.
 #:
@@ -35,45 +36,50 @@ class Lift(NamedTuple):
     excess: Array
 
 
-class Camera(Protocol):
-    """The interface of the three cameras.
+class Camera(Record):
+    """Base of the three cameras.
 
     Camera frame as OpenCV's: x right, y down, z forward. Normalised image points are free of intrinsics and lens:
     (x/z, y/z) of a perspective camera, (x, y) in metres of the scaled orthographic one. The first axis of every
     array counts frames, for cameras whose focal length or scale differs between frames.
     """
 
-    @property
-    def perspective(self) -> bool:
-        """Whether rays meet in the optical centre; otherwise they are parallel."""
-        ...
+    #: Whether rays meet in the optical centre; otherwise they are parallel.
+    perspective: ClassVar[bool] = True
 
+    @abstractmethod
     def project(self, points: Array) -> Array:
         """Project points (F, ..., 3), camera frame, metres, to image points (F, ..., 2)."""
-        ...
 
+    @abstractmethod
     def normalize(self, image: Array) -> Array:
         """Turn image points (F, ..., 2) into normalised ones; NaN if no ray reaches the point."""
-        ...
 
+    @abstractmethod
     def jacobian(self, normalized: Array) -> Array:
         """Return the derivatives (F, ..., 2, 2) of image points by their normalised ones (F, ..., 2)."""
-        ...
 
     def rays(self, image: Array) -> tuple[Array, Array]:
         """Return origins and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
-        ...
+        direction = np.concatenate([self.normalize(image), np.ones_like(image[..., :1])], axis=-1)
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        return np.zeros_like(direction), direction
 
     def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
-        """Find the ends of segments from `start` (F, ..., 3) of `length` (m) seen at `pixel` (F, ..., 2)."""
-        ...
+        """Find the ends of segments: see `meet_sphere`.
 
-
-def perspective_rays(normalized: Array) -> tuple[Array, Array]:
-    """Return origins and unit directions (..., 3) of the rays of normalised points (..., 2)."""
-    direction = np.concatenate([normalized, np.ones_like(normalized[..., :1])], axis=-1)
-    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-    return np.zeros_like(direction), direction
+        Parameters
+        ----------
+        start : array (F, ..., 3)
+            Known ends, camera frame, metres.
+        pixel : array (F, ..., 2)
+            Image points of the other ends.
+        length : array broadcastable to (F, ...)
+            Lengths, metres.
+        tolerance : float
+            Metres by which a segment may be too short for its image.
+        """
+        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
 
 
 def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float) -> Lift:
@@ -108,19 +114,34 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     return Lift(origin[..., None, :] + depth[..., None] * direction[..., None, :], valid, excess)
 
 
-def check_positive(name: str, value: float | Array | None) -> None:
-    """Raise `CameraError` if a focal length or a scale is not positive and finite; None is unknown."""
+def positive(name: str, value: float | Array | None) -> float | Array | None:
+    """Return a focal length or a scale, one or one a frame, as it is kept; None is unknown.
+
+    Raises
+    ------
+    CameraError
+        If it is not positive and finite.
+    """
     if value is None:
-        return
-    values = np.asarray(value)
+        return None
+    values = read_only(value)
     good = (values >= 1 / FARTHEST_COORDINATE) & (values <= FARTHEST_COORDINATE)
     if values.ndim > 1 or not good.all():
         bad = shown(values.tolist()) if values.ndim > 1 else shown(float(values[~good].flat[0]))
         limits = f"{1 / FARTHEST_COORDINATE:g} to {FARTHEST_COORDINATE:g}"
         raise refusal("camera", name, bad, f"a number from {limits}, one or one a frame", error=CameraError)
+    return values if values.ndim else float(values)
 
 
-def per_frame(value: float | Array, ndim: int) -> Array:
-    """Shape one number, or one a frame (F,), so that it broadcasts against an array of `ndim` axes."""
+def per_frame(name: str, value: float | Array | None, ndim: int) -> Array:
+    """Shape one number, or one a frame (F,), so that it broadcasts against an array of `ndim` axes.
+
+    Raises
+    ------
+    CameraError
+        If it is unknown.
+    """
+    if value is None:
+        raise refusal("camera", name, "null", "a positive number", "give it", error=CameraError)
     values = np.asarray(value, dtype=np.float64)
     return values.reshape(*values.shape, *(1,) * (ndim - 1)) if values.ndim else values

@@ -13,15 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from posekit.cameras.camera import Lift, check_positive, meet_sphere, per_frame, perspective_rays
-from posekit.errors import CameraError, refusal
-from posekit.geometry import Array, Record, from_metres, read_only
+from posekit.cameras.camera import Camera, per_frame, positive
+from posekit.geometry import Array, from_metres
 
 UP_FLIP: Array = np.array([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class LeeChenCamera(Record):
+class LeeChenCamera(Camera):
     """A perspective camera with image points in metres on the image plane, y down.
 
     Parameters
@@ -38,51 +37,31 @@ class LeeChenCamera(Record):
     f: float | Array | None
 
     def __post_init__(self) -> None:
-        check_positive("f", self.f)
-        if self.f is not None:
-            self._set("f", read_only(self.f) if np.ndim(self.f) else float(self.f))
-
-    @property
-    def perspective(self) -> bool:
-        """Whether rays meet in the optical centre: always."""
-        return True
+        self._set("f", positive("f", self.f))
 
     def project(self, points: Array) -> Array:
         """Project points (F, ..., 3), OpenCV camera frame, to the image plane (F, ..., 2); NaN behind the camera."""
         depth = points[..., 2:]
-        return np.asarray(points[..., :2] / np.where(depth > 0, depth, np.nan) * self._distances(points.ndim))
+        return np.asarray(
+            points[..., :2] / np.where(depth > 0, depth, np.nan) * per_frame("f", self.f, points.ndim)
+        )
 
     def normalize(self, image: Array) -> Array:
         """Turn image points (F, ..., 2), metres, into (x/z, y/z)."""
-        return np.asarray(image / self._distances(image.ndim))
+        return np.asarray(image / per_frame("f", self.f, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
         """Return the derivatives (F, ..., 2, 2) of image points by (x/z, y/z)."""
-        distances = np.broadcast_to(self._distances(normalized.ndim), normalized.shape)
+        distances = np.broadcast_to(per_frame("f", self.f, normalized.ndim), normalized.shape)
         return np.asarray(distances[..., None] * np.eye(2))
-
-    def rays(self, image: Array) -> tuple[Array, Array]:
-        """Return origins (zero) and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
-        return perspective_rays(self.normalize(image))
-
-    def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
-        """Find the ends of segments: see `posekit.cameras.PinholeCamera.lift`."""
-        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
 
     def take(self, rows: Any) -> LeeChenCamera:
         """Return the camera of some frames."""
-        if np.ndim(self.f if self.f is not None else 0.0) == 0:
-            return self
-        return LeeChenCamera(f=np.asarray(self.f)[rows])
+        return LeeChenCamera(f=self.f[rows]) if isinstance(self.f, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
         """Return the camera as files spell it, f in `unit`."""
         return {"model": "lee-chen", "f": None if self.f is None else from_metres(self.f, unit).tolist()}
-
-    def _distances(self, ndim: int) -> Array:
-        if self.f is None:
-            raise refusal("camera", "f", "null", "a distance in metres", "give it", error=CameraError)
-        return per_frame(self.f, ndim)
 
 
 def image_from_paper(image: Array) -> Array:

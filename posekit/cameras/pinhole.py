@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras import lens
-from posekit.cameras.camera import Lift, meet_sphere, perspective_rays
+from posekit.cameras.camera import Camera
 from posekit.errors import CameraError, refusal, shown
-from posekit.geometry import UP_AXES, Array, Record, best_rotation, from_metres
+from posekit.geometry import UP_AXES, Array, best_rotation, from_metres
 
 #: Largest accepted width or height of a picture, pixels.
 MAX_PICTURE_SIDE: Final = 10**6
@@ -20,7 +20,7 @@ ROTATION_ROUNDING: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class PinholeCamera(Record):
+class PinholeCamera(Camera):
     """A perspective camera: x right, y down, z forward, origin at the optical centre.
 
     Parameters
@@ -113,11 +113,6 @@ class PinholeCamera(Record):
         return refusal(source, field, got, expected, error=CameraError)  # type: ignore[return-value]
 
     @property
-    def perspective(self) -> bool:
-        """Whether rays meet in the optical centre: always."""
-        return True
-
-    @property
     def guessed(self) -> bool:
         """Whether the focal length is a guess."""
         return self.deviation > 0
@@ -160,26 +155,6 @@ class PinholeCamera(Record):
         if self.distortion is None:
             return np.broadcast_to(scale, (*normalized.shape[:-1], 2, 2))
         return np.asarray(scale @ lens.lens_jacobian(normalized, self.distortion, fisheye=self.fisheye))
-
-    def rays(self, image: Array) -> tuple[Array, Array]:
-        """Return origins (zero) and unit directions (..., 3) of the rays of pixels (..., 2)."""
-        return perspective_rays(self.normalize(image))
-
-    def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
-        """Find the ends of segments: see `posekit.cameras.camera.meet_sphere`.
-
-        Parameters
-        ----------
-        start : array (..., 3)
-            Known ends, camera frame, metres.
-        pixel : array (..., 2)
-            Image points of the other ends.
-        length : array broadcastable to (...)
-            Lengths, metres.
-        tolerance : float
-            Metres by which a segment may be too short for its image.
-        """
-        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
 
     def take(self, rows: Any) -> PinholeCamera:
         """Return the camera of some frames: the same for all."""

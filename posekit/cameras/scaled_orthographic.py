@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.camera import COINCIDENT_METRES, Lift, check_positive, per_frame
-from posekit.errors import CameraError, refusal
-from posekit.geometry import PER_METRE, Array, Record, read_only
+from posekit.cameras.camera import COINCIDENT_METRES, Camera, Lift, per_frame, positive
+from posekit.geometry import PER_METRE, Array
 
 #: Relative rounding of coordinates: at the lower bound of s the segment that sets it must neither fail nor split.
 BOUND_ROUNDING: Final = 1e-15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ScaledOrthographicCamera(Record):
+class ScaledOrthographicCamera(Camera):
     r"""A distant camera, which sees all of the body at one scale: :math:`(u, v) = s\,(x, y)` (Taylor 2000, eq. 1).
 
     The frame is OpenCV's: x right, y down, z forward; its origin is the image's, and its depth is arbitrary.
@@ -34,32 +33,28 @@ class ScaledOrthographicCamera(Record):
         If the scale or the aspect ratio is not finite and positive.
     """
 
+    perspective = False
+
     scale: float | Array | None
     aspect: float = 1.0
 
     def __post_init__(self) -> None:
-        check_positive("scale", self.scale)
-        check_positive("aspect", self.aspect)
-        if self.scale is not None:
-            self._set("scale", read_only(self.scale) if np.ndim(self.scale) else float(self.scale))
-
-    @property
-    def perspective(self) -> bool:
-        """Whether rays meet in the optical centre: never, they are parallel."""
-        return False
+        self._set("scale", positive("scale", self.scale))
+        self._set("aspect", positive("aspect", self.aspect))
 
     def project(self, points: Array) -> Array:
         """Project points (F, ..., 3), metres, to pixels (F, ..., 2)."""
-        return np.asarray(points[..., :2] * self._scales(points.ndim) / np.array([self.aspect, 1.0]))
+        scale = per_frame("scale", self.scale, points.ndim) / np.array([self.aspect, 1.0])
+        return np.asarray(points[..., :2] * scale)
 
     def normalize(self, image: Array) -> Array:
         """Turn pixels (F, ..., 2) into x, y (F, ..., 2), metres: only the depth remains unknown."""
-        return np.asarray(image * np.array([self.aspect, 1.0]) / self._scales(image.ndim))
+        return np.asarray(image * np.array([self.aspect, 1.0]) / per_frame("scale", self.scale, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
         """Return the derivatives (F, ..., 2, 2) of pixels by x, y (F, ..., 2)."""
-        scales = np.broadcast_to(self._scales(normalized.ndim), normalized.shape) / [self.aspect, 1.0]
-        return np.asarray(scales[..., None] * np.eye(2))
+        scale = per_frame("scale", self.scale, normalized.ndim) / np.array([self.aspect, 1.0])
+        return np.asarray(np.broadcast_to(scale, normalized.shape)[..., None] * np.eye(2))
 
     def rays(self, image: Array) -> tuple[Array, Array]:
         """Return origins at depth 0 and directions (0, 0, 1), both (F, ..., 3), of pixels (F, ..., 2)."""
@@ -71,17 +66,6 @@ class ScaledOrthographicCamera(Record):
         r"""Find the ends of segments: the start's depth plus or minus :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}`.
 
         (Taylor 2000, eq. 2.) Nothing is behind this camera.
-
-        Parameters
-        ----------
-        start : array (F, ..., 3)
-            Known ends, metres.
-        pixel : array (F, ..., 2)
-            Image points of the other ends.
-        length : array broadcastable to (F, ...)
-            Lengths, metres.
-        tolerance : float
-            Metres by which a segment may be too short for its image.
         """
         place = self.normalize(pixel)
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
@@ -100,17 +84,10 @@ class ScaledOrthographicCamera(Record):
 
     def take(self, rows: Any) -> ScaledOrthographicCamera:
         """Return the camera of some frames."""
-        if np.ndim(self.scale if self.scale is not None else 0.0) == 0:
-            return self
-        return ScaledOrthographicCamera(scale=np.asarray(self.scale)[rows], aspect=self.aspect)
+        return replace(self, scale=self.scale[rows]) if isinstance(self.scale, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
         """Return the camera as files spell it, the scale in pixels a `unit`."""
         scale = None if self.scale is None else (np.asarray(self.scale) / PER_METRE[unit]).tolist()
         fields: dict[str, Any] = {"model": "scaled-orthographic", "scale": scale}
         return fields if self.aspect == 1 else {**fields, "aspect": self.aspect}
-
-    def _scales(self, ndim: int) -> Array:
-        if self.scale is None:
-            raise refusal("camera", "scale", "null", "pixels a metre", "give it", error=CameraError)
-        return per_frame(self.scale, ndim)
