@@ -1,8 +1,7 @@
 r"""Left and right exchanged by a detector: in single pictures, or in all of them.
 
-In single pictures an exchange makes the difference d of right and left jump: along a film the signs :math:`s_t` with
-the least second differences :math:`\sum_t | s_t d_t - 2 s_{t-1} d_{t-1} + s_{t-2} d_{t-2} |^2` are found by dynamic
-programming over :math:`s_t s_{t-1}` (Viterbi 1967). An exchange in all pictures shows
+In single pictures an exchange makes the difference d of right and left jump: along a film each :math:`d_t` gets the
+sign :math:`s_t` that agrees with :math:`2 s_{t-1} d_{t-1} - s_{t-2} d_{t-2}`. An exchange in all pictures shows
 in shoulders, hips and face that are opposite to each other, and in a face that is seen while the right shoulder is at
 the picture's right.
 """
@@ -35,7 +34,7 @@ FACE_HIDDEN: Final = 0.25
 FACE_AWAY_WEIGHT: Final = 0.7
 #: Size of a jump, in leg lengths: smaller ones are noise.
 JUMP: Final = 0.25
-#: Ratio of the second differences before and after an exchange back, from which an exchange is suspected.
+#: Ratio of the squared second differences before and after an exchange back, from which an exchange is suspected.
 JUMP_GAIN: Final = 4.0
 #: Pictures of a film without gaps in which a jump can be found.
 LEAST_PICTURES: Final = 5
@@ -68,23 +67,23 @@ def side_warnings(points: Array, confidence: Array, frame: Ints, detections: Det
     list of str
         A sentence each; empty if nothing is suspected.
     """
-    found, body, pictures = [], points.copy(), detections.pictures
-    jumps = {"arms": np.zeros(len(frame), dtype=np.bool_), "legs": np.zeros(len(frame), dtype=np.bool_)}
-    around = AROUND if detections.film else 0
+    found, body, around = [], points.copy(), AROUND if detections.film else 0
     if detections.film:
-        ways = _orders(body, around)
-        for name, parts in (("arms", ARM), ("legs", LEG)):
-            jumps[name] = _jumps(body, frame, parts)
-        alone = jumps["arms"] ^ jumps["legs"]
-        for name, parts in (("arms", ARM), ("legs", LEG)):
-            for start, end in runs(jumps[name].copy()):
-                # Arms or legs alone, exchanged, would be opposite to the other pair.
-                jumps[name][start:end] = (ways["shoulder"] * ways["hip"] * alone)[start:end].sum() <= 0
-            body[jumps[name]] = _exchanged(body[jumps[name]], parts)
-    if (jumped := jumps["arms"] | jumps["legs"]).any():
-        names = [pictures[k] or str(k) for k in frame[jumped].tolist() if k < len(pictures)]
-        listed = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
-        found.append(f"{detections.source}: left and right jump in {jumped.sum()} pictures: {listed}")
+        jumps = {parts: _jumps(points, frame, parts) for parts in (ARM, LEG)}
+        orders = _orders(points, around)
+        # Arms or legs alone, exchanged, would be opposite to the other pair.
+        alike = orders["shoulder"] * orders["hip"] * (jumps[ARM] ^ jumps[LEG])
+        for parts, jumped in jumps.items():
+            for start, end in runs(jumped.copy()):
+                jumped[start:end] = alike[start:end].sum() <= 0
+            right, left = ([POINT[f"{side}_{part}"] for part in parts] for side in SIDES)
+            body[np.ix_(jumped, right + left)] = points[np.ix_(jumped, left + right)]
+        names = [
+            detections.picture(k).removeprefix("picture ") for k in frame[jumps[ARM] | jumps[LEG]].tolist()
+        ]
+        if names:
+            listed = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
+            found.append(f"{detections.source}: left and right jump in {len(names)} pictures: {listed}")
     evidence = _opposed(body, confidence, around)
     total = sum(evidence.values())
     if "shoulders against hips" in evidence or total > SURE:
@@ -109,32 +108,19 @@ def _middle(points: Array, part: str) -> Array:
     return (_of(points, f"right_{part}") + _of(points, f"left_{part}")) / 2
 
 
-def _long(vectors: Array) -> Array:
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
-
-
-def _limb(points: Array, side: str, parts: tuple[str, str, str]) -> Array:
-    a, b, c = (_of(points, f"{side}_{part}") for part in parts)
-    return _long(b - a) + _long(c - b)
-
-
-def _trunk(points: Array) -> Array:
-    return _long(_middle(points, "hip") - _middle(points, "shoulder"))
-
-
-def _upright(points: Array) -> Flags:
-    """Tell where the trunk is within 45 degrees of upright in the picture (F,)."""
-    up = _middle(points, "shoulder") - _middle(points, "hip")
-    with np.errstate(invalid="ignore"):
-        return np.asarray(-up[:, 1] > np.abs(up[:, 0]))
+def _length(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
 def _size(points: Array, around: int) -> Array:
     """Return the person's leg length in each picture (F,): the largest of both legs and of the trunk's share."""
-    lengths = [_limb(points, side, LEG) for side in SIDES]
-    each = np.fmax(np.fmax(*lengths), LEG_OVER_TRUNK * _trunk(points))
-    padded = np.pad(each, around, constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1)
+    each = LEG_OVER_TRUNK * _length(_middle(points, "hip") - _middle(points, "shoulder"))
+    for side in SIDES:
+        hip, knee, ankle = (_of(points, f"{side}_{part}") for part in LEG)
+        each = np.fmax(each, _length(knee - hip) + _length(ankle - knee))
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(each, around, constant_values=np.nan), 2 * around + 1
+    )
     found = np.full(len(each), np.nan)
     some = ~np.isnan(windows).all(axis=1)
     found[some] = np.nanmedian(windows[some], axis=1)
@@ -193,43 +179,33 @@ def _facing(points: Array, confidence: Array) -> Array:
     seen = (sure[:, face] >= FACE_SEEN * body[:, None]).all(axis=1) & there[:, face].all(axis=1) & between
     ear = (sure[:, head[3:]] >= FACE_HIDDEN * body[:, None]).any(axis=1) & there[:, head[3:]].any(axis=1)
     away = (sure[:, face] < FACE_HIDDEN * body[:, None]).all(axis=1) & ear
-    return np.where(_upright(points), np.where(seen, 1.0, np.where(away, -FACE_AWAY_WEIGHT, 0.0)), 0.0)
-
-
-def _exchanged(points: Array, parts: tuple[str, ...]) -> Array:
-    ends = [POINT[f"{side}_{part}"] for side in SIDES for part in parts]
-    exchanged = points.copy()
-    exchanged[:, ends] = points[:, ends[len(parts) :] + ends[: len(parts)]]
-    return exchanged
+    up = _middle(points, "shoulder") - _middle(points, "hip")
+    with np.errstate(invalid="ignore"):
+        upright = -up[:, 1] > np.abs(up[:, 0])  # within 45 degrees
+    return np.where(upright, np.where(seen, 1.0, np.where(away, -FACE_AWAY_WEIGHT, 0.0)), 0.0)
 
 
 def _jumps(points: Array, frame: Ints, parts: tuple[str, ...]) -> Flags:
     """Tell the pictures (F,) in which some parts have left and right exchanged against the pictures around."""
     found = np.zeros(len(frame), dtype=np.bool_)
-    d = np.stack([_pair(points, part) for part in parts], axis=1) / _size(points, AROUND)[:, None, None]
-    rows = np.flatnonzero(~np.isnan(d).any(axis=(1, 2)))
-    if len(rows) < 2:
-        return found
-    gaps = np.flatnonzero(np.diff(frame[rows]) > np.median(np.diff(frame[rows]))) + 1
+    d = np.concatenate([_pair(points, part) for part in parts], axis=1) / _size(points, AROUND)[:, None]
+    rows = np.flatnonzero(~np.isnan(d).any(axis=1))
+    steps = np.diff(frame[rows])
+    gaps = np.flatnonzero(steps > np.median(steps)) + 1 if len(steps) else []
     for stretch in np.split(rows, gaps):
-        if len(stretch) >= LEAST_PICTURES:
-            found[stretch] = _in_stretch(d[stretch].reshape(len(stretch), -1))
-    return found
-
-
-def _in_stretch(d: Array) -> Flags:
-    """Tell the exchanged pictures of a stretch without gaps (F, n), in leg lengths."""
-    signs, found = _signs(d), np.zeros(len(d), dtype=np.bool_)
-    if (signs < 0).sum() * 2 > len(signs):
-        signs = -signs
-    if float(np.median(_bends(d * signs[:, None]))) > APART**2:
-        return found
-    for start, end in runs(np.asarray(signs < 0)):
-        kept = signs.copy()
-        kept[start:end] = 1
-        near = slice(max(start - 2, 0), min(end + 2, len(d)))
-        worst, rest = (float(_bends(d[near] * one[near, None]).max(initial=0.0)) for one in (kept, signs))
-        found[start:end] = worst > JUMP**2 and worst > JUMP_GAIN * rest
+        if len(stretch) < LEAST_PICTURES:
+            continue
+        own = d[stretch]
+        signs = _signs(own)
+        signs *= np.where(signs.sum() < 0, -1, 1)
+        if np.median(_bends(own * signs[:, None])) > APART**2:
+            continue
+        for start, end in runs(np.asarray(signs < 0)):
+            labelled = signs.copy()
+            labelled[start:end] = 1
+            near = slice(max(start - 2, 0), end + 2)
+            worst, rest = (_bends((own * one[:, None])[near]).max(initial=0.0) for one in (labelled, signs))
+            found[stretch[start:end]] = worst > JUMP**2 and worst > JUMP_GAIN * rest
     return found
 
 
@@ -238,17 +214,10 @@ def _bends(d: Array) -> Array:
 
 
 def _signs(d: Array) -> Array:
-    """Return the signs (F,) with the least sum of squared second differences."""
-    a = np.concatenate([[0.0], (d[1:] * d[:-1]).sum(axis=1)])
-    b = np.concatenate([[0.0, 0.0], (d[2:] * d[:-2]).sum(axis=1)])
-    ratio, cost = np.array([1.0, -1.0]), np.zeros(2)
-    came = np.zeros((len(d), 2), dtype=np.intp)
+    """Return the signs (F,) with which differences (F, n) go on as the two before them lead to expect."""
+    signs = np.ones(len(d))
+    signs[1] = np.where(d[1] @ d[0] < 0, -1, 1)
     for t in range(2, len(d)):
-        # The part of |s_t d_t - 2 s_(t-1) d_(t-1) + s_(t-2) d_(t-2)|^2 that the signs change.
-        near, far = a[t] * ratio[None] + a[t - 1] * ratio[:, None], b[t] * np.outer(ratio, ratio)
-        way = cost[:, None] - 4 * near + 2 * far
-        came[t], cost = way.argmin(axis=0), way.min(axis=0)
-    state, steps = int(cost.argmin()), np.ones(len(d))
-    for t in range(len(d) - 1, 0, -1):
-        steps[t], state = ratio[state], int(came[t, state])
-    return np.asarray(np.cumprod(steps))
+        expected = 2 * signs[t - 1] * d[t - 1] - signs[t - 2] * d[t - 2]
+        signs[t] = np.where(d[t] @ expected < 0, -1, 1)
+    return signs
