@@ -227,7 +227,7 @@ def test_all_counts_of_coefficients_are_read(count: int, tmp_path: Path) -> None
             "rows: 4",
             "distortion: got 5 numbers; expected as many as rows and cols say",
         ),
-        ("opencv.yml", "flags: 0", "flags: &anchor 0", "line 6"),
+        ("opencv.yml", "flags: 0", "flags: *anchor", "line 6"),
         ("opencv.yml", "flags: 0", "flags: [1, 2", "line 6"),
         ("opencv.yml", "flags: 0", "image_width: 3", "line 6"),
         ("ros.yaml", "plumb_bob", "ds", 'distortion_model: got "ds"'),

@@ -77,7 +77,8 @@ def side_warnings(points: Array, confidence: Array, frame: Ints, detections: Det
             for start, end in runs(jumped.copy()):
                 jumped[start:end] = alike[start:end].sum() <= 0
             right, left = ([POINT[f"{side}_{part}"] for part in parts] for side in SIDES)
-            body[np.ix_(jumped, right + left)] = points[np.ix_(jumped, left + right)]
+            for here, there in zip(right + left, left + right, strict=True):
+                body[jumped, here] = points[jumped, there]
         names = [
             detections.picture(k).removeprefix("picture ") for k in frame[jumps[ARM] | jumps[LEG]].tolist()
         ]
@@ -191,7 +192,7 @@ def _jumps(points: Array, frame: Ints, parts: tuple[str, ...]) -> Flags:
     d = np.concatenate([_pair(points, part) for part in parts], axis=1) / _size(points, AROUND)[:, None]
     rows = np.flatnonzero(~np.isnan(d).any(axis=1))
     steps = np.diff(frame[rows])
-    gaps = np.flatnonzero(steps > np.median(steps)) + 1 if len(steps) else []
+    gaps = np.flatnonzero(steps > np.median(steps) if len(steps) else steps) + 1
     for stretch in np.split(rows, gaps):
         if len(stretch) < LEAST_PICTURES:
             continue

@@ -8,20 +8,17 @@ unit is that of its calibration board, mostly millimetres; Caliscope's ``rotatio
 from __future__ import annotations
 
 import json
-import re
 import warnings
-from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
-from xml.etree import ElementTree
 
 import numpy as np
 
 from posekit.cameras import PinholeCamera
 from posekit.errors import CameraError, InputError, cut, one_line, refusal, shown
-from posekit.files import text, write_bytes
+from posekit.files import write_bytes
 from posekit.formats import json_file
 from posekit.formats.node import Node, as_numbers
 from posekit.formats.options import Options
@@ -46,8 +43,6 @@ FIELDS: Final = {
 }
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
-#: Lines of YAML: number, indentation, content.
-Lines = deque[tuple[int, int, str]]
 MAX_CAMERAS: Final = 100_000
 #: Largest distance of a camera from the world's origin at which a file without a unit is taken as metres.
 METRES_UP_TO: Final = 100.0
@@ -55,13 +50,6 @@ METRES_UP_TO: Final = 100.0
 MILLIMETRES_FROM: Final = 1000.0
 #: Cosine between an axis of the world and the mean upward direction of the pictures, from which that axis is up.
 LEAST_UPRIGHT: Final = 0.8
-#: An entry of a map in YAML, a word in a list in brackets, and the words that are no text.
-_YAML_ENTRY: Final = re.compile(r"(\"[^\"]*\"|'[^']*'|[^:#&*\[\]{}\"'-][^:]*?)\s*:(?:\s+(.*))?$")
-_YAML_WORD: Final = re.compile(r"\"[^\"]*\"|'[^']*'|[^\[\]{},:\s\"'][^\[\]{},:\"']*")
-_WORDS: Final[dict[str, Any]] = {
-    **{"true": True, "false": False, "null": None, "~": None},
-    **{".nan": np.nan, ".inf": np.inf, "-.inf": -np.inf},
-}
 
 
 def looks_like(document: Any) -> bool:
@@ -292,129 +280,6 @@ def _named(fields: Fields, aliases: tuple[str, ...], suffix: str) -> Any:
                     one = isinstance(value, np.ndarray) and value.size == 1
                     return value.item() if one else value
     return None
-
-
-def parse_xml(data: bytes, source: str) -> dict[str, Any]:
-    """Parse OpenCV's FileStorage XML into plain fields; entities and document types are refused."""
-    import defusedxml.ElementTree as safe
-
-    try:
-        root = safe.fromstring(text(data, source), forbid_dtd=True)
-    except (ElementTree.ParseError, ValueError) as error:  # refused entities are a ValueError
-        reason = cut(one_line(str(error)))
-        raise refusal(source, "", f"no plain XML: {reason}", "XML without a document type") from None
-    if root.tag != "opencv_storage":
-        raise refusal(source, "", f"the root element <{cut(root.tag)}>", "<opencv_storage>")
-    return {element.tag: _xml_value(element) for element in root}
-
-
-def _xml_value(element: ElementTree.Element) -> Any:
-    """Turn an element into an object, a list, numbers or a text."""
-    if len(element):
-        inner = {child.tag: _xml_value(child) for child in element}
-        return [_xml_value(child) for child in element] if set(inner) == {"_"} else inner
-    words = (element.text or "").split()
-    values = [_scalar(word) for word in words]
-    if not all(type(value) in (int, float) for value in values):
-        return (element.text or "").strip().strip('"')
-    return values[0] if len(values) == 1 and element.tag != "data" else values
-
-
-def parse_yaml(data: bytes, source: str) -> Any:
-    """Parse the part of YAML that OpenCV's FileStorage and ROS write: maps, lists, numbers and words.
-
-    Raises
-    ------
-    InputError
-        If the text holds anything else: anchors, aliases, blocks of text, several documents.
-    """
-    lines = deque(_yaml_lines(text(data, source), source))
-    if not lines:
-        raise refusal(source, "", "nothing but comments", "YAML", "check how it was written")
-    try:
-        value = _yaml_block(lines, source)
-    except RecursionError:
-        raise _bad_yaml(source, 1, "too many levels") from None
-    if lines:
-        raise _bad_yaml(source, lines[0][0], lines[0][2])
-    return value
-
-
-def _bad_yaml(source: str, line: int, got: str) -> InputError:
-    return refusal(source, f"line {line}", shown(got), "maps, lists, numbers and words")
-
-
-def _yaml_lines(content: str, source: str) -> Iterator[tuple[int, int, str]]:
-    """Yield line number, indentation and content of logical lines: a list in brackets may span several."""
-    parts: list[str] = []
-    start = indent = opened = 0
-    for number, raw in enumerate(content.splitlines(), 1):
-        line = re.sub(r"(^|\s)#.*", "", raw) if '"' not in raw and "'" not in raw else raw
-        if not parts:
-            if not line.strip() or line.startswith(("%", "---", "...")):
-                continue
-            start, indent = number, len(line) - len(line.lstrip(" "))
-        parts.append(line.strip())
-        plain = re.sub(r"\"[^\"]*\"|'[^']*'", "", line)
-        opened += sum(map(plain.count, "[{")) - sum(map(plain.count, "]}"))
-        if opened <= 0:
-            yield start, indent, " ".join(parts)
-            parts, opened = [], 0
-    if parts:
-        raise _bad_yaml(source, start, " ".join(parts))
-
-
-def _yaml_block(lines: Lines, source: str) -> Any:
-    """Take the block that starts at the first line, a list with dashes or a map, off the lines."""
-    indent, dashed = lines[0][1], _is_dashed(lines[0][2])
-    items, found = list[Any](), dict[str, Any]()
-    while lines and lines[0][1] == indent and _is_dashed(lines[0][2]) == dashed:
-        number, _, content = lines.popleft()
-        inner = content[1:].strip()
-        entry = _YAML_ENTRY.match(content)
-        if dashed and _YAML_ENTRY.match(inner):  # a map whose first entry is on the line of its dash
-            lines.appendleft((number, indent + len(content) - len(inner), inner))
-            items.append(_yaml_block(lines, source))
-        elif dashed:
-            items.append(_yaml_value(inner, number, indent, lines, source))
-        elif entry is not None and (name := entry[1].strip("\"'")) not in found:
-            found[name] = _yaml_value(entry[2] or "", number, indent, lines, source)
-        else:
-            raise _bad_yaml(source, number, content)
-    return items if dashed else found
-
-
-def _is_dashed(content: str) -> bool:
-    return f"{content} ".startswith("- ")
-
-
-def _yaml_value(content: str, number: int, indent: int, lines: Lines, source: str) -> Any:
-    """Parse the value on a line, JSON once its words are spelled so, or take the block below it."""
-    content = re.sub(r"^!!?[\w-]+\s*", "", content)
-    if not content:
-        below = lines and (lines[0][1] > indent or (lines[0][1] == indent and _is_dashed(lines[0][2])))
-        return _yaml_block(lines, source) if below else None
-    if content[0] not in "[{&*|>":
-        return _scalar(content)
-    try:
-        if content[0] in "&*|>":
-            raise ValueError("an anchor, an alias or a block of text")
-        spelled = _YAML_WORD.sub(lambda word: json.dumps(_scalar(word[0])), re.sub(r",\s*\]", "]", content))
-        return json.loads(spelled)
-    except (ValueError, RecursionError):
-        raise _bad_yaml(source, number, content) from None
-
-
-def _scalar(word: str) -> Any:
-    """Read a plain word: a number, a truth value, nothing, or a text."""
-    word = word.strip()
-    if word[:1] in "\"'" and word[-1:] == word[:1] and len(word) > 1:
-        return word[1:-1]
-    if word.casefold() in _WORDS:
-        return _WORDS[word.casefold()]
-    if re.fullmatch(r"[+-]?\d{1,18}", word):
-        return int(word)
-    return float(word) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", word) else word
 
 
 def write(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:

@@ -23,8 +23,8 @@ CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "c3d": ("c3d:parse", (".c3d",)),
     "parquet": ("parquet:parse", (".parquet", ".pq")),
     "toml": ("layout:parse_toml", (".toml",)),
-    "yaml": ("cameras_file:parse_yaml", (".yaml", ".yml")),
-    "xml": ("cameras_file:parse_xml", (".xml",)),
+    "yaml": ("file_storage:parse_yaml", (".yaml", ".yml")),
+    "xml": ("file_storage:parse_xml", (".xml",)),
 }
 #: First bytes by which a file with another ending is recognised.
 STARTS: Final = {
