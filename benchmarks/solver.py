@@ -29,13 +29,13 @@ from posekit.synthesis import random_views, with_noise
 @contextmanager
 def reference() -> Iterator[None]:
     """Solve with the NumPy reference, as where no compiler was found."""
-    compiled: Any = engine._compiled
-    engine._compiled = None
+    compiled: Any = engine.compiled
+    engine.compiled = None
     try:
         with warnings.catch_warnings(action="ignore", category=UserWarning):
             yield
     finally:
-        engine._compiled = compiled
+        engine.compiled = compiled
 
 
 def some(view: View, rows: slice) -> View:

@@ -24,7 +24,7 @@ from posekit.settings import EXACT, ValidateSettings
 from posekit.skeleton import DOFS, JOINT, JOINTS
 from posekit.synthesis.walker import Walker
 from posekit.validators import Body, Judgement, judge_postures, validate_motion
-from posekit.validators.judge import KNOWN, POSTURE_CHECKS, early_checks, posture_judge
+from posekit.validators.judge import KNOWN, POSTURE_CHECKS, PostureJudge, early_checks
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "own_check.py"
 FIGURE = posekit.load_figure()
@@ -77,7 +77,7 @@ def test_verdicts_do_not_depend_on_order_batches_or_the_frame_of_the_points(name
     joints = postures(60)
     R = pin.Quaternion(np.array([0.1, 0.5, -0.3, 0.8]) / np.linalg.norm([0.1, 0.5, -0.3, 0.8])).matrix()
     order = np.random.default_rng(1).permutation(60)
-    judge = posture_judge(FIGURE, ValidateSettings(), EXACT)
+    judge = PostureJudge(FIGURE, ValidateSettings(), EXACT)
     whole = judge(POSTURE_CHECKS[name], joints).margin
     np.testing.assert_allclose(judge(POSTURE_CHECKS[name], joints[order]).margin, whole[order], atol=1e-9)
     one = np.concatenate([judge(POSTURE_CHECKS[name], joints[k : k + 1]).margin for k in range(60)])
@@ -104,7 +104,7 @@ def test_a_looser_tolerance_never_rejects_more(field: str, values: tuple[float, 
 
 def test_early_parts_reject_only_what_the_whole_check_rejects() -> None:
     joints = np.concatenate([postures(150), np.full((150, 5, 3), np.nan)], axis=1)
-    judge = posture_judge(FIGURE, ValidateSettings(), EXACT)
+    judge = PostureJudge(FIGURE, ValidateSettings(), EXACT)
     settings = ValidateSettings(checks=["rigid-parts", "joint-range", "collision"])
     whole = {name: judge(POSTURE_CHECKS[name], joints).violated.any(axis=1) for name in settings.checks or ()}
     parts = dict.fromkeys(whole, np.zeros(150, dtype=bool))
@@ -168,7 +168,7 @@ def test_collision_of_configurations_is_what_pinocchio_finds() -> None:
     ],
 )
 def test_ranges_of_people(part: str, legal: float, beyond: float) -> None:
-    judge = posture_judge(FIGURE, ValidateSettings(), EXACT)
+    judge = PostureJudge(FIGURE, ValidateSettings(), EXACT)
     assert not judge(POSTURE_CHECKS["joint-range"], bent(part, legal)).violated.any()
     found = judge(POSTURE_CHECKS["joint-range"], bent(part, beyond))
     named = [found.places[k] for k in np.flatnonzero(found.violated[0])]

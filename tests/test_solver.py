@@ -94,7 +94,7 @@ def test_engines_take_the_same_steps(kind, parts):
 def test_engines_find_the_same_modes(monkeypatch):
     problem = observed(length_deviation=0.02, size_deviation=0.02)
     fast = solve(problem)
-    monkeypatch.setattr(engine, "_compiled", None)
+    monkeypatch.setattr(engine, "compiled", None)
     engine._warn_once.cache_clear()
     with pytest.warns(UserWarning, match="compiler"):
         slow = solve(problem)

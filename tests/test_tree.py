@@ -10,9 +10,12 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
+from posekit.settings import EXACT, PHOTOGRAPH, RecoverSettings
 from posekit.skeleton import JOINTS, PARENTS, POINT, SEGMENT_NAMES, SEGMENTS
-from posekit.synthesis import builtin_view
-from posekit.tree import grow
+from posekit.synthesis import builtin_view, random_views
+from posekit.tree import grow, steps
+from posekit.validators import Judgement, PostureJudge
+from posekit.validators.judge import early_checks
 
 FIGURE = load_figure()
 VIEW = builtin_view("seq2")
@@ -196,3 +199,60 @@ def test_scaled_orthographic_leaves_come_in_mirror_pairs():
         apart = np.linalg.norm(joints[:, None] - mirrored[None], axis=3).max(axis=2)
         assert apart.min(axis=1).max() < 1e-6
         assert np.linalg.norm(joints - truth[frame], axis=2).max(axis=1).min() < 1e-6
+
+
+class FeetApart:
+    """The ankles are nearer than 20 cm."""
+
+    name, unit, reads, points = "feet-apart", "m", ("joints",), ("right_ankle", "left_ankle")
+
+    def judge(self, body):
+        apart = np.linalg.norm(body.joints[:, 12] - body.joints[:, 13], axis=1)
+        return Judgement(["ankles"], apart, lower=0.2)
+
+
+@pytest.mark.skipif(steps.compiled is None, reason="no compiled tree")
+@pytest.mark.parametrize(
+    ("changes", "tolerance"),
+    [
+        ({}, EXACT),
+        ({"ranges": "urdf"}, EXACT),
+        ({"ranges": "table1"}, EXACT),
+        ({"contact_margin": 0.02, "checks": ("rigid-parts", "collision", FeetApart)}, EXACT),
+        ({}, PHOTOGRAPH),
+    ],
+)
+def test_compiled_tree_and_reference_agree(monkeypatch, changes, tolerance):
+    """Survivors, reasons, values and bounds of the built-in checks, of noisy points too."""
+    rng = np.random.default_rng(5)
+    view = random_views(30, rng)
+    settings = RecoverSettings(**changes)
+    judge = PostureJudge(FIGURE, settings, tolerance, np.array([0.0, -1.0, 0.0]))
+    image = view.image + (rng.normal(0, 2, view.image.shape) if tolerance is PHOTOGRAPH else 0.0)
+    head = np.full((30, 5, 3), np.nan)
+    head[::3] = view.truth[::3, :1] + FIGURE.neutral_points[14:]
+    lengths = [FIGURE.lengths[name] for name in SEGMENT_NAMES]
+
+    def grown():
+        return grow(
+            view.camera,
+            image,
+            view.truth[:, 0],
+            lengths,
+            early_checks(settings),
+            judge=judge,
+            head=head,
+            tolerance=tolerance.tangent,
+        )
+
+    fast = grown()
+    monkeypatch.setattr(steps, "compiled", None)
+    slow = grown()
+    assert len(fast) > 30
+    np.testing.assert_array_equal(fast.frame, slow.frame)
+    np.testing.assert_array_equal(fast.code, slow.code)
+    assert fast.rejected == slow.rejected
+    for frame in range(30):
+        one, other = (sorted(each.pruned(frame)) for each in (fast, slow))
+        assert [row[:3] for row in one] == [row[:3] for row in other]
+        np.testing.assert_allclose([row[3:6] for row in one], [row[3:6] for row in other], atol=1e-9)

@@ -16,6 +16,7 @@ from posekit.body.capsules import CAPSULE_AXES
 from posekit.geometry import dot
 from posekit.robots.collision import segment_distance
 from posekit.skeleton import JOINTS, POINTS
+from posekit.tree.steps import CAPSULES, Step, step
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 
@@ -60,6 +61,21 @@ class Collision:
             last = max(point for point in read if point < len(JOINTS))
             groups.setdefault(("head" in pair, last), []).append(pair)
         return [Collision(pairs=tuple(pairs)) for pairs in groups.values()]
+
+    def steps(self, body: Body) -> list[Step] | None:
+        """Return the check of the figure's own postures as steps of the compiled tree; the head has none."""
+        if body.tolerance is None or any("head" in pair for pair in self.pairs):
+            return None
+        capsules = {capsule.link: capsule for capsule in body.figure.capsules}
+        found = []
+        for links in self.pairs:
+            pair = [capsules[link] for link in links]
+            points = [point for one in pair for point in one.points]
+            numbers = [number for one in pair for number in (one.center, one.half_length)]
+            numbers += [pair[0].radius + pair[1].radius, body.contact_margin]
+            place = "-".join(links)
+            found.append(step(CAPSULES, [place], points=points, tolerance=CONTACT_METRES, numbers=numbers))
+        return found
 
     def judge(self, body: Body) -> Judgement:
         """Measure the distances of all pairs."""

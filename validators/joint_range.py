@@ -19,7 +19,7 @@ from posekit.body import ClosedForm, Figure, load_figure
 from posekit.body.frames import torso_frame
 from posekit.geometry import Array, perpendicular, unit
 from posekit.skeleton import DOFS, HEAD_POINTS, HIPS, JOINT, JOINTS, TORSO
-from posekit.solver import Limits
+from posekit.solver import Limits, engine
 from posekit.solver.limits import (
     ENDS,
     KINDS,
@@ -33,6 +33,7 @@ from posekit.solver.limits import (
     pelvis_angles,
 )
 from posekit.solver.limits import torso_frame as torso_rows
+from posekit.tree.steps import LIMB, PELVIS, Step, step
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 from posekit.validators.hinges import bent_backward
@@ -98,6 +99,23 @@ class JointRange:
         whole = [JointRange(part=part) for part in PARTS]
         return [*whole[:2], *early, *whole[2:]]
 
+    def steps(self, body: Body) -> list[Step] | None:
+        """Return the check of the figure's own postures as steps of the compiled tree; the neck has none."""
+        table = load_ranges(body.settings.ranges)
+        printed = table is not None and table["kind"] in ("rotation", "projected")
+        if body.tolerance is None or printed or self.part == "neck":
+            return None
+        limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
+        if self.part == "pelvis":
+            return [step(PELVIS, DOFS[3:6], tolerance=body.angle_tolerance(), limits=limits.numbers)]
+        limb = LIMBS.index(self.part)
+        points = (
+            (STARTS[limb], MIDDLES[limb]) if self.upper_only else (STARTS[limb], MIDDLES[limb], ENDS[limb])
+        )
+        places, _ = _places(limits, limb)
+        tolerance = body.angle_tolerance()
+        return [step(LIMB, places, points=points, tolerance=tolerance, limb=limb, limits=limits.numbers)]
+
     def judge(self, body: Body) -> Judgement:
         """Measure the angles of the parts."""
         table = load_ranges(body.settings.ranges)
@@ -132,6 +150,10 @@ def _limb_range(
 
     Over time, neighbouring frames tell which way a hinge bends.
     """
+    if engine.compiled and not dt > 0:
+        places, keep = _places(limits, limb)
+        found = engine.compiled.stated(limits.numbers, limb, joints, tolerance, straight)
+        return Judgement(places, *found[..., keep])
     parent = torso_rows(joints) if limb < 2 else hips_frame(joints, bool(limits.numbers["between_hips"]))
     upper_segment, lower_segment = limb_directions(joints, limb)
     rotations = limb_angles(parent, upper_segment, lower_segment)
@@ -168,13 +190,17 @@ def _limb_range(
         best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)
         found[:, rows] = numbers[:, np.arange(len(rows)), best]
     found[0, backward < 0, 2] = np.nan  # the hinge is named, not the ball joint above it
+    places, keep = _places(limits, limb)
+    return Judgement(places, *found[..., keep])
+
+
+def _places(limits: Limits, limb: int) -> tuple[list[str], list[int]]:
+    """Return the names of a limb's judged angles, and which of the four they are."""
     side = LIMBS[limb].split("_")[0]
     places = [f"{side}_{angle}" for angle in KINDS[limb // 2]]
-    keep = [0, 1, 2, 3]
     if limb < 2 and limits.numbers["by_elevation"]:
-        keep, places[0] = [0, 2, 3], f"{side}_shoulder.elevation"
-    value, lower, upper, slack = found[..., keep]
-    return Judgement([places[k] for k in keep], value, lower, upper, slack)
+        return [f"{side}_shoulder.elevation", *places[2:]], [0, 2, 3]
+    return places, [0, 1, 2, 3]
 
 
 def _pelvis(limits: Limits, body: Body) -> Judgement:

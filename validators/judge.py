@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +16,7 @@ from posekit.geometry import Array
 from posekit.motion.motion import Motion
 from posekit.settings import Settings, Tolerance, ValidateSettings
 from posekit.skeleton import JOINTS, POINTS
+from posekit.tree.steps import Step
 from posekit.validators.body import Body
 from posekit.validators.check import Check, Judgement, NotAskedError, find_check, judged, message_of
 from posekit.validators.collision import Collision
@@ -124,10 +125,8 @@ class Pointed:
         return getattr(self.check, name)
 
 
-def posture_judge(
-    figure: Figure, settings: Settings, tolerance: Tolerance | None, up: Array | None = None
-) -> Callable[[Check, Array], Judgement]:
-    """Return a function that asks a check about postures (N, 14, 3) or (N, 19, 3) of a figure.
+class PostureJudge:
+    """Asks a check about postures (N, 14, 3) or (N, 19, 3) of a figure, as a tree does.
 
     Parameters
     ----------
@@ -140,13 +139,34 @@ def posture_judge(
     up : array (3,), optional
         Unit vector against gravity in the frame of the postures.
     """
-    asked = _validate_settings(settings)
 
-    def judge(check: Check, points: Array) -> Judgement:
-        found = judge_postures(points, [check], figure, asked, tolerance=tolerance, up=up)
+    def __init__(
+        self, figure: Figure, settings: Settings, tolerance: Tolerance | None, up: Array | None = None
+    ) -> None:
+        self.figure, self.settings, self.tolerance, self.up = (
+            figure,
+            _validate_settings(settings),
+            tolerance,
+            up,
+        )
+
+    def __call__(self, check: Check, points: Array) -> Judgement:
+        """Return the judgement of a check; it has no place where the check cannot be asked."""
+        found = judge_postures(
+            points, [check], self.figure, self.settings, tolerance=self.tolerance, up=self.up
+        )
         return found.get(check.name) or Judgement((), np.empty((len(points), 0)))
 
-    return judge
+    def steps(self, check: Check) -> list[Step] | None:
+        """Return a check as steps of the compiled tree; None if it has no such form."""
+        if not isinstance(check, RigidParts | JointRange | Collision):
+            return None
+        none = np.empty((0, len(JOINTS), 3))
+        return check.steps(
+            Body(
+                joints=none, base=self.figure, settings=self.settings, tolerance=self.tolerance, motion=False
+            )
+        )
 
 
 def judge_postures(

@@ -11,6 +11,8 @@ import numpy as np
 from posekit.body.frames import torso_frame
 from posekit.geometry import Array, dot
 from posekit.skeleton import JOINT, JOINTS, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
+from posekit.tree.steps import DISTANCE, Step, step
+from posekit.tree.steps import TORSO as TORSO_STEP
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 
@@ -54,6 +56,26 @@ class RigidParts:
         """Return a check for each rigid segment and the torso: those that lift a joint have their length by design."""
         torso = RigidParts(segments=(), torso=True)
         return [*(replace(torso, segments=(segment,), torso=False) for segment in RIGID_SEGMENTS), torso]
+
+    def steps(self, body: Body) -> list[Step] | None:
+        """Return the check of exact postures as steps of the compiled tree."""
+        if body.tolerance is None or not body.tolerance.exact:
+            return None
+        found = [
+            step(
+                DISTANCE,
+                [segment_name(segment)],
+                points=segment,
+                tolerance=body.rigid_tolerance(segment),
+                numbers=[body.lengths[segment_name(segment)]],
+            )
+            for segment in self.segments
+        ]
+        if self.torso:
+            torso = [*body.figure.neutral_points[TORSO_POINTS].ravel(), float(not body.figure.side_known)]
+            tolerance = body.rigid_tolerance(RIGID_SEGMENTS[0])
+            found.append(step(TORSO_STEP, ["torso"], tolerance=tolerance, numbers=torso))
+        return found
 
     def judge(self, body: Body) -> Judgement:
         """Compare distances with the figure's, and the torso with its own."""

@@ -12,7 +12,7 @@ from posekit.geometry import Array, perpendicular, unit
 from posekit.settings import MEASURED, RecoverSettings, Tolerance
 from posekit.skeleton import HIPS, JOINT
 from posekit.solver import Limits
-from posekit.validators.judge import chosen_checks, early_checks, judge_postures, posture_judge
+from posekit.validators.judge import PostureJudge, chosen_checks, early_checks, judge_postures
 from posekit.validators.ranges import load_ranges
 
 #: Standard deviations of lengths and of joint limits that do not contradict a posture.
@@ -65,7 +65,7 @@ class Certifier:
             if not getattr(check, "over_time", False)
         ]
         self.early = early_checks(settings)
-        self.judge = posture_judge(figure, settings, tolerance, up)
+        self.judge = PostureJudge(figure, settings, tolerance, up)
 
     def certify(self, joints: Array, head: Array) -> Certificate:
         """Judge postures (N, 14, 3) with head points (N, 5, 3), NaN where not known."""

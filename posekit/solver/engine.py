@@ -14,14 +14,14 @@ from posekit.solver import reference
 from posekit.solver.problem import Problem
 
 try:
-    _compiled: Any = import_module("posekit.solver._compiled")
+    compiled: Any = import_module("posekit.solver._compiled")
 except ImportError:
-    _compiled = None
+    compiled = None
 
 
 def backend() -> str:
     """Return which solver runs: ``compiled`` or ``reference``."""
-    return "reference" if _compiled is None else "compiled"
+    return "reference" if compiled is None else "compiled"
 
 
 @cache
@@ -36,11 +36,11 @@ def _warn_once() -> None:
 
 def run(name: str, problem: Problem, *arguments: Any) -> Any:
     """Call a function of `posekit.solver.reference`, or its compiled twin, about the frames of a problem."""
-    if _compiled is None:
+    if compiled is None:
         _warn_once()
         return getattr(reference, name)(problem.records, problem.limits, *arguments)
     numbers = None if problem.limits is None else problem.limits.numbers
-    return getattr(_compiled, name)(problem.records, numbers, *arguments)
+    return getattr(compiled, name)(problem.records, numbers, *arguments)
 
 
 def descend(
@@ -61,5 +61,5 @@ def descend(
 
 def distinct(group: Ints, points: Array, within: float) -> Flags:
     """Return which rows are new among better ones of their group; see `posekit.solver.reference.distinct`."""
-    found: Flags = (reference if _compiled is None else _compiled).distinct(group, points, within)
+    found: Flags = (reference if compiled is None else compiled).distinct(group, points, within)
     return found

@@ -68,6 +68,7 @@ Frame hips_of(const double x[J][3], bool between) {
 }
 
 double interpolated(double x, const double* at, const double* y, int n) {
+  if (std::isnan(x)) return x;
   if (x <= at[0]) return y[0];
   for (int k = 1; k < n; ++k)
     if (x < at[k]) return y[k - 1] + (y[k] - y[k - 1]) / (at[k] - at[k - 1]) * (x - at[k - 1]);
@@ -94,14 +95,20 @@ Reading reading_of(int limb, const double g[4]) {
   return {elevation, plane, twist - (1 - std::cos(elevation)) * from_side};
 }
 
-// Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
-double limb_residual(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double out[4]) {
+// Angles of a limb in one writing with their bounds, radians: flexion or elevation, abduction, rotation, hinge.
+struct Written {
+  double value[4], bound[2][4];
+};
+// `slack` (radians) widens the sinus; a bound by an angle that is not known (NaN) is none.
+Written written(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double slack) {
   const int kind = limb / 2, over = way / 2, flipped = way & 1;
   const bool arm = kind == 0 && L.by_elevation > 0;
   double a = g[0] * SIGN[limb][0], b = g[1] * SIGN[limb][1], c = g[2] * SIGN[limb][2], e = g[3] * SIGN[limb][3];
   double r[7] = {a + M_PI * over, over ? M_PI - b : b, c + M_PI * (over ^ flipped), flipped ? -e : e,
                  reading.elevation, reading.plane, 0};
-  double bound[2][4], mean[2][4], middle[4], turn[2], outward[2] = {0, 0};
+  Written out;
+  auto& bound = out.bound;
+  double mean[2][4], middle[4], turn[2], outward[2] = {0, 0};
   bool turns[2] = {false, false};
   for (int i = 0; i < 4; ++i) {
     middle[i] = (L.mean[kind][i][0] + L.mean[kind][i][1]) / 2;
@@ -140,7 +147,7 @@ double limb_residual(const Limits& L, int limb, const double g[4], const Reading
         for (int s = 0; s < 2; ++s) bound[s][i] = centre + (bound[s][i] - centre) * left;
       }
       double off = r[i] - centre, half = off < 0 ? centre - L.limit[limb][i][0] : L.limit[limb][i][1] - centre;
-      if (i < 2) used += raised(std::fabs(off) / half, power);
+      if (i < 2) used += raised(std::fabs(off) / (half + slack), power);
     }
   }
   if (turns[0] || turns[1]) {
@@ -152,27 +159,8 @@ double limb_residual(const Limits& L, int limb, const double g[4], const Reading
   bound[0][2] -= outward[0];
   bound[1][2] += outward[1];
   if (arm) r[0] = r[4];
-  double total = 0;
-  for (int i = 0; i < 4; ++i) {
-    double above = r[i] - bound[1][i], below = bound[0][i] - r[i];
-    double o = above > 0 && above >= below ? above : below > 0 ? -below : 0.0;
-    if (o != 0 && (i == 2 || (i == 0 && !arm))) o *= (i == 2 ? std::sin(g[3]) : std::cos(g[1])) / std::sqrt(1 + o * o);
-    out[i] = o;
-    total += o * o;
-  }
-  return total;
-}
-
-// The least violated writing; residuals are in `out`.
-int least_writing(const Limits& L, int limb, const double g[4], const Reading& reading, double out[4], double& best) {
-  const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
-  int which = 0;
-  best = INFINITY;
-  for (int way = 0; way < ways && best > 0; ++way) {
-    double r[4], total = limb_residual(L, limb, g, reading, way, r);
-    if (total < best) best = total, which = way, std::memcpy(out, r, sizeof r);
-  }
-  return which;
+  std::memcpy(out.value, r, sizeof out.value);
+  return out;
 }
 
 struct Limb {
@@ -192,6 +180,56 @@ Limb limb_of(const double x[J][3], int m, const Frame& R) {
   s.g[0] = std::atan2(s.sa, s.ca), s.g[1] = std::atan2(py, h), s.g[2] = std::atan2(q, p);
   s.g[3] = std::atan2(std::sqrt(p * p + q * q), dot(s.u, s.l));
   return s;
+}
+
+// Angles of the hips' frame in the torso's, with what their derivatives need.
+struct Pelvis {
+  double g[3], sine, cosine;
+  Vec axis;
+};
+Pelvis pelvis_of(const Frame& torso, const Frame& hips) {
+  Pelvis s;
+  double px = -dot(torso.forward, hips.up), pz = -dot(torso.up, hips.up);
+  s.sine = -dot(torso.left, hips.up), s.cosine = std::sqrt(px * px + pz * pz);
+  double sa = s.cosine > 0 ? -px / s.cosine : 0.0, ca = s.cosine > 0 ? -pz / s.cosine : 1.0;
+  s.axis = ca * torso.forward - sa * torso.up;
+  s.g[0] = std::atan2(sa, ca), s.g[1] = std::atan2(s.sine, s.cosine);
+  s.g[2] = std::atan2(dot(cross(hips.up, s.axis), hips.forward), dot(s.axis, hips.forward));
+  return s;
+}
+
+// A limb as the check of joint ranges states it: angle, lower and upper bound, tolerance, degrees.
+struct Stated {
+  double row[4][4];
+};
+// In the usual writing, else in the one that is least outside. Below a bend of `straight`, and where `tolerance` leaves
+// it open, a rotation is not known (validators/joint_range.py; all in degrees).
+Stated stated(const Limits& L, int limb, const double g[4], double tolerance, double straight) {
+  constexpr double RADIAN = M_PI / 180, UNSEEN = 45;
+  const bool arm = limb < 2 && L.by_elevation > 0;
+  const double sine = std::fabs(std::sin(g[3])), least = std::max(tolerance * RADIAN / M_PI, 2.2250738585072014e-308);
+  const double turn = tolerance / std::max(std::isnan(sine) ? 1.0 : sine, least);
+  const bool open = turn > UNSEEN || sine < std::sin(straight * RADIAN);
+  const Reading reading = reading_of(limb, g);
+  auto state = [&](int way, Stated& out) {
+    const Written w = written(L, limb, g, reading, way, tolerance * RADIAN);
+    double worst = NAN;
+    for (int i = 0; i < 4; ++i) {
+      const double value = i == 2 && open ? NAN : w.value[i] / RADIAN, allowed = i == 2 ? turn : tolerance;
+      const double low = w.bound[0][i] / RADIAN, high = w.bound[1][i] / RADIAN;
+      out.row[0][i] = value, out.row[1][i] = low, out.row[2][i] = high, out.row[3][i] = allowed;
+      worst = std::fmax(worst, std::max(low - value, value - high) - allowed);
+    }
+    return worst;
+  };
+  Stated best, other;
+  if (!(state(limb < 2, best) > 0)) return best;
+  double least_worst = INFINITY;
+  for (int way = 0; way < (arm ? 2 : 4); ++way) {
+    const double worst = state(way, other);
+    if (worst < least_worst) least_worst = worst, best = other;
+  }
+  return best;
 }
 
 }  // namespace

@@ -38,6 +38,33 @@ struct Normal {
   double H[T][T], g[T], L[4][6][6], C[4][6][T], l[4][6];
 };
 
+// Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
+double limb_residual(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double out[4]) {
+  const Written w = written(L, limb, g, reading, way, 0);
+  const bool arm = limb < 2 && L.by_elevation > 0;
+  double total = 0;
+  for (int i = 0; i < 4; ++i) {
+    double above = w.value[i] - w.bound[1][i], below = w.bound[0][i] - w.value[i];
+    double o = above > 0 && above >= below ? above : below > 0 ? -below : 0.0;
+    if (o != 0 && (i == 2 || (i == 0 && !arm))) o *= (i == 2 ? std::sin(g[3]) : std::cos(g[1])) / std::sqrt(1 + o * o);
+    out[i] = o;
+    total += o * o;
+  }
+  return total;
+}
+
+// The least violated writing; residuals are in `out`.
+int least_writing(const Limits& L, int limb, const double g[4], const Reading& reading, double out[4], double& best) {
+  const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
+  int which = 0;
+  best = INFINITY;
+  for (int way = 0; way < ways && best > 0; ++way) {
+    double r[4], total = limb_residual(L, limb, g, reading, way, r);
+    if (total < best) best = total, which = way, std::memcpy(out, r, sizeof r);
+  }
+  return which;
+}
+
 // Adds one residual with its derivative along the trunk (18) and one limb (6).
 void add_row(Normal& n, int m, const double t[18], const double* d, double r, bool trunk) {
   if (trunk)
@@ -75,10 +102,7 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
   const Frame torso = torso_of(x), hips = hips_of(x, between);
   double chi2 = 0;
   if (trunk) {
-    double px = -dot(torso.forward, hips.up), py = -dot(torso.left, hips.up), pz = -dot(torso.up, hips.up);
-    double h = std::sqrt(px * px + pz * pz), sa = h > 0 ? -px / h : 0.0, ca = h > 0 ? -pz / h : 1.0;
-    Vec axis = ca * torso.forward - sa * torso.up, turn = cross(hips.up, axis);
-    double g[3] = {std::atan2(sa, ca), std::atan2(py, h), std::atan2(dot(turn, hips.forward), dot(axis, hips.forward))};
+    const auto [g, py, h, axis] = pelvis_of(torso, hips);
     double cosine = std::max(h, 0.05), square = cosine * cosine;
     Vec along[3] = {(1 / square) * (torso.left + py * hips.up), axis, (1 / square) * (hips.up + py * torso.left)};
     for (int k = 0; k < 3; ++k) {
@@ -567,6 +591,20 @@ py::array_t<bool> distinct(Longs group, Doubles points, double within) {
   return keep;
 }
 
+// Value, lower and upper bound and tolerance (4, M, 4) of one limb of bodies (M, 14, 3), degrees.
+py::array_t<double> stated_all(py::object limits, int limb, Doubles bodies, double tolerance, double straight) {
+  const Limits& L = *limits_of(limits);
+  const py::ssize_t count = bodies.shape(0);
+  py::array_t<double> out({(py::ssize_t)4, count, (py::ssize_t)4});
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const double(*x)[3] = reinterpret_cast<const double(*)[3]>(bodies.data() + k * J * 3);
+    const Frame R = limb < 2 ? torso_of(x) : hips_of(x, L.between_hips > 0);
+    const Stated one = stated(L, limb, limb_of(x, limb, R).g, tolerance, straight);
+    for (int i = 0; i < 16; ++i) out.mutable_data()[(i / 4 * count + k) * 4 + i % 4] = one.row[i / 4][i % 4];
+  }
+  return out;
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_compiled, m) {
@@ -575,4 +613,5 @@ PYBIND11_MODULE(_compiled, m) {
   m.def("summaries", &summaries);
   m.def("separate", &separate);
   m.def("distinct", &distinct);
+  m.def("stated", &stated_all);
 }

@@ -60,6 +60,11 @@ FIRST: Final = (0, *accumulate(1 << len(path_of(joint)) for joint in range(len(J
 
 HEAD_COLUMN: Final = FIRST[-1]
 
+#: Joints by the number of segments between them and the root.
+GENERATIONS: Final = tuple(
+    [joint for joint in range(1, len(JOINTS)) if len(path_of(joint)) == count] for count in range(1, 5)
+)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidates:
@@ -106,19 +111,21 @@ class Candidates:
         state, excess = np.zeros((frames, HEAD_COLUMN), dtype=np.int8), np.zeros((frames, HEAD_COLUMN))
         table[:, 0] = root
         unseen = np.asarray(np.isnan(image).any(axis=2))
-        for joint in range(1, len(JOINTS)):
-            parent = PARENTS[joint]
-            start = table[:, FIRST[parent] : FIRST[parent + 1]]
-            pixel = np.broadcast_to(image[:, joint, None], (*start.shape[:2], 2))
-            lift = camera.lift(start, pixel, lengths[:, joint - 1, None], tolerance=slack)
+        for joints in GENERATIONS:
+            parents = [PARENTS[joint] for joint in joints]
+            start = np.stack([table[:, FIRST[parent] : FIRST[parent + 1]] for parent in parents], axis=1)
+            pixel = np.broadcast_to(image[:, joints, None], (*start.shape[:3], 2))
+            length = np.repeat(lengths[:, [joint - 1 for joint in joints]], start.shape[2], axis=1)
+            flat = start.reshape(frames, -1, 3)
+            lift = camera.lift(flat, pixel.reshape(frames, -1, 2), length, tolerance=slack)
             found = np.where(lift.valid, OPEN, BEHIND)
             found[..., 1][lift.valid[..., 0] & ~lift.valid[..., 1]] = COINCIDENT
             found[(lift.excess > slack) & ~lift.valid.any(axis=-1)] = NO_SOLUTION
-            unknown = np.isnan(start).any(axis=2) | unseen[:, joint, None]
+            unknown = np.isnan(flat).any(axis=2) | np.repeat(unseen[:, joints], start.shape[2], axis=1)
             found[unknown] = OPEN, MISSING
-            own = slice(FIRST[joint], FIRST[joint + 1])
             points = np.where((found == OPEN)[..., None], lift.points, np.nan)
             points[unknown] = np.nan
+            own = np.concatenate([np.arange(FIRST[joint], FIRST[joint + 1]) for joint in joints])
             table[:, own] = points.reshape(frames, -1, 3)
             state[:, own] = found.reshape(frames, -1)
             excess[:, own] = np.repeat(lift.excess, 2, axis=1)

@@ -7,9 +7,10 @@ nodes that share it: given the torso, the four limbs are judged alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,52 +19,56 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Camera
 from posekit.geometry import Array, Ints
 from posekit.skeleton import JOINTS, POINT, POINTS, SEGMENTS
+from posekit.tree import steps
 from posekit.tree.candidates import (
     DEPTH,
     FIRST,
     NO_SOLUTION,
-    OPEN,
     UNJUDGED,
     Candidates,
     bits,
     path_of,
     support_of,
 )
+from posekit.tree.steps import BRANCH, Step, step
 
 #: Frames grown together: enough to spread the overhead of NumPy, few enough to keep memory small.
-FRAMES_AT_ONCE: Final = 500
+FRAMES_AT_ONCE: Final = 512
 
 #: Possible keys a node from which they are sorted instead of being looked up in a table.
 SPARSE_FROM: Final = 64
 
 
 class Pruned(NamedTuple):
-    """Branches that one reason pruned at one level.
+    """Pruned branches.
 
     Attributes
     ----------
-    level : int
-        Level; a branch stands for the 2^(13 - level) leaves below it.
-    check, unit : str
-        Name of the check and unit of its values.
-    places : tuple of str
-        What it judges.
-    frame, code, place : int array (P,)
-        The branches, and the first of `places` that is violated.
+    level : int array (P,)
+        A branch stands for the 2^(13 - level) leaves below it.
+    reason : int array (P,)
+        Row of `Trees.reasons`: the first that is violated.
+    frame, code : int array (P,)
+        The branches.
     value, lower, upper : array (P,)
         What was found there, and its bounds.
     """
 
-    level: int
-    check: str
-    unit: str
-    places: tuple[str, ...]
+    level: Ints
+    reason: Ints
     frame: Ints
     code: NDArray[np.int64]
-    place: Ints
     value: Array
     lower: Array
     upper: Array
+
+    @staticmethod
+    def joined(parts: Sequence[Pruned]) -> Pruned:
+        """Put branches one after the other."""
+        return Pruned(*(np.concatenate(column) for column in zip(NOTHING, *parts, strict=True)))
+
+
+NOTHING: Final = Pruned(*np.zeros((4, 0), dtype=np.int64), *np.zeros((3, 0)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,8 +83,10 @@ class Trees:
         Positions, camera frame, metres; NaN where a joint was not seen, and beyond it.
     length_residual : array (N,)
         Metres by which the worst segment is too short for its image and was taken as tangent to its ray.
-    losses : tuple of Pruned
-        In the order in which branches were pruned.
+    losses : Pruned
+        Of each frame in the order in which branches were pruned.
+    reasons : tuple of (str, str)
+        ``check/place`` and the unit of its values.
     candidates : tuple of Candidates
         Positions of all branches, of `FRAMES_AT_ONCE` frames each.
     count : int
@@ -90,7 +97,8 @@ class Trees:
     code: NDArray[np.int64]
     joints: Array
     length_residual: Array
-    losses: tuple[Pruned, ...]
+    losses: Pruned
+    reasons: tuple[tuple[str, str], ...]
     candidates: tuple[Candidates, ...]
     count: int
 
@@ -106,15 +114,12 @@ class Trees:
     @cached_property
     def rejected(self) -> list[dict[str, int]]:
         """Leaves of the full tree that were lost, by frame and reason; with the survivors they make 8192."""
+        width = max(len(self.reasons), 1)
+        weight = 1 << (DEPTH - self.losses.level)
+        number = np.bincount(self.losses.frame * width + self.losses.reason, weight, self.count * width)
         totals: list[dict[str, int]] = [{} for _ in range(self.count)]
-        for loss in self.losses:
-            weight, width = 1 << (DEPTH - loss.level), len(loss.places)
-            number = np.bincount(loss.frame * width + loss.place)
-            key = np.flatnonzero(number)
-            for k, n in zip(key.tolist(), number[key].tolist(), strict=True):
-                reason = f"{loss.check}/{loss.places[k % width]}"
-                total = totals[k // width]
-                total[reason] = total.get(reason, 0) + n * weight
+        for k in np.flatnonzero(number).tolist():
+            totals[k // width][self.reasons[k % width][0]] = int(number[k])
         return totals
 
     @cached_property
@@ -129,18 +134,12 @@ class Trees:
 
     def pruned(self, frame: int) -> list[tuple[str, str, str, float, float, float, str]]:
         """List every pruned branch of a frame: its code, joint, reason, value, bounds and unit."""
+        own = np.flatnonzero(self.losses.frame == frame)
         return [
-            (
-                f"{loss.code[k]:0{loss.level}b}",
-                JOINTS[loss.level],
-                f"{loss.check}/{loss.places[loss.place[k]]}",
-                float(loss.value[k]),
-                float(loss.lower[k]),
-                float(loss.upper[k]),
-                loss.unit,
+            (f"{code:0{level}b}", JOINTS[level], self.reasons[reason][0], *numbers, self.reasons[reason][1])
+            for level, reason, _, code, *numbers in zip(
+                *(one[own].tolist() for one in self.losses), strict=True
             )
-            for loss in self.losses
-            for k in np.flatnonzero(loss.frame == frame)
         ]
 
 
@@ -171,7 +170,8 @@ def grow(
         Asked in this order at the first level where all their ``points`` are placed.
     judge : callable, optional
         ``judge(check, points (N, 19, 3))`` returns the check's judgement of postures with head points; NaN marks points
-        that the check does not read. By default ``check.judge(points)``.
+        that the check does not read. By default ``check.judge(points)``. It may have a method ``steps(check)`` that
+        returns the check as steps of the compiled tree (`posekit.tree.steps`), or None.
     head : array (F, 5, 3), optional
         Head points, metres. A check that reads head points is not asked in frames that lack them.
     tolerance : float
@@ -186,20 +186,21 @@ def grow(
     frames = len(image)
     lengths = np.broadcast_to(np.asarray(lengths, dtype=np.float64), (frames, len(SEGMENTS)))
     head = np.full((frames, 5, 3), np.nan) if head is None else head
-    reads = [tuple(POINT[name] for name in getattr(check, "points", ()) or POINTS) for check in checks]
-    levels = [max([1, *(point for point in points if point <= DEPTH)]) for points in reads]
+    reasons: dict[tuple[str, str], int] = {}
+    plan = _planned(checks, getattr(ask, "steps", None), head)
     parts, losses, candidates = [], [], []
     for at in range(0, max(frames, 1), FRAMES_AT_ONCE):
         own = slice(at, at + FRAMES_AT_ONCE)
         found = Candidates.lifted(one.take(own), image[own], root[own], lengths[own], head[own], tolerance)
         frame, code = np.arange(len(image[own])), np.zeros(len(image[own]), dtype=np.int64)
-        for level in range(1, DEPTH + 1):
-            frame, code, lost = _branched(found, level, frame, code)
-            for check, points, first in zip(checks, reads, levels, strict=True):
-                if first == level and len(code):
-                    frame, code, more = _asked(found, level, frame, code, check, points, ask)
-                    lost += more
-            losses += [one._replace(frame=one.frame + at) for one in lost]
+        for fast, run in groupby(plan, key=lambda planned: planned.steps is not None):
+            if fast:
+                frame, code, lost = _compiled(found, list(run), frame, code, reasons)
+                losses.append(lost._replace(frame=lost.frame + at))
+                continue
+            for planned in run:
+                frame, code, lost = _taken(found, planned, frame, code, reasons, ask)
+                losses.append(lost._replace(frame=lost.frame + at))
         joints = found.places(DEPTH, range(len(JOINTS)), frame, code)[:, : len(JOINTS)]
         short = np.zeros(len(code))
         for joint in range(1, len(JOINTS)):
@@ -212,68 +213,142 @@ def grow(
         code=code,
         joints=joints,
         length_residual=short,
-        losses=tuple(losses),
+        losses=Pruned.joined(losses),
+        reasons=tuple(reasons),
         candidates=tuple(candidates),
         count=frames,
     )
 
 
+class _Planned(NamedTuple):
+    """A check, or None for branches to a joint, with the level at which it is asked and the points that it reads."""
+
+    level: int
+    check: Any
+    points: tuple[int, ...]
+    steps: Sequence[Step] | None
+
+
+def _planned(
+    checks: Sequence[Any], form: Callable[[Any], Sequence[Step] | None] | None, head: Array
+) -> list[_Planned]:
+    """Order branches and checks; those that the compiled tree takes have their steps."""
+    branch = [step(BRANCH, ())] if steps.compiled else None
+    plan = [_Planned(level, None, (), branch) for level in range(1, DEPTH + 1)]
+    for check in checks:
+        points = tuple(POINT[name] for name in getattr(check, "points", ()) or POINTS)
+        if max(points) > DEPTH and not np.isfinite(head).any():
+            continue  # a check that reads head points is not asked without them
+        level = max([1, *(point for point in points if point <= DEPTH)])
+        plan.append(_Planned(level, check, points, form(check) if steps.compiled and form else None))
+    return sorted(plan, key=lambda planned: planned.level)
+
+
+def _numbered(reasons: dict[tuple[str, str], int], names: Iterable[str], unit: str) -> Ints:
+    """Return the rows (K,) of reasons among all; new ones are added."""
+    return np.array([reasons.setdefault((name, unit), len(reasons)) for name in names], dtype=np.int64)
+
+
+def _branch_reasons(joint: int) -> list[str]:
+    return [f"{name}/{JOINTS[joint]}" for name in UNJUDGED.values()]
+
+
+def _compiled(
+    found: Candidates,
+    plan: Sequence[_Planned],
+    frame: Ints,
+    code: NDArray[np.int64],
+    reasons: dict[tuple[str, str], int],
+) -> tuple[Ints, NDArray[np.int64], Pruned]:
+    """Take nodes through consecutive steps of the compiled tree."""
+    records, limits = [], None
+    for planned in plan:
+        for one in planned.steps or ():
+            places, unit = _branch_reasons(planned.level), "m"
+            if planned.check is not None:
+                places, unit = [f"{planned.check.name}/{place}" for place in one.places], planned.check.unit
+            record = one.record.copy()
+            record["level"], record["reason"] = planned.level, _numbered(reasons, places, unit)[0]
+            records.append(record)
+            limits = limits if one.limits is None else one.limits
+    frame, code, whole, numbers = steps.compiled.grow(
+        found.table, found.state, found.excess, limits, np.array(records), frame, code
+    )
+    return frame, code, Pruned(*whole.reshape(-1, 4).T, *numbers.reshape(-1, 3).T)
+
+
+def _taken(
+    found: Candidates,
+    planned: _Planned,
+    frame: Ints,
+    code: NDArray[np.int64],
+    reasons: dict[tuple[str, str], int],
+    ask: Callable[[Any, Array], Any],
+) -> tuple[Ints, NDArray[np.int64], Pruned]:
+    """Take nodes through one step: branches to a joint, or a check."""
+    level, check = planned.level, planned.check
+    if check is None:
+        frame, code, reason, value, lower, upper = _branched(found, level, frame, code)
+        rows = _numbered(reasons, _branch_reasons(level), "m")
+    elif len(code):
+        places, reason, value, lower, upper = _asked(found, planned, frame, code, ask)
+        rows = _numbered(reasons, [f"{check.name}/{place}" for place in places], check.unit)
+    else:
+        return frame, code, NOTHING
+    dead = np.flatnonzero(reason >= 0)
+    at = np.full(len(dead), level)
+    lost = Pruned(
+        at,
+        rows[reason[dead]] if len(dead) else at,
+        frame[dead],
+        code[dead],
+        value[dead],
+        lower[dead],
+        upper[dead],
+    )
+    alive = reason < 0
+    return frame[alive], code[alive], lost
+
+
 def _branched(
     found: Candidates, joint: int, frame: Ints, code: NDArray[np.int64]
-) -> tuple[Ints, NDArray[np.int64], list[Pruned]]:
-    """Give every node a near and a far successor; those that the lift excludes are lost."""
+) -> tuple[Ints, NDArray[np.int64], Ints, Array, Array, Array]:
+    """Give every node a near and a far successor, each with the reason that excludes it (-1: none), and its numbers."""
     frame, code = np.repeat(frame, 2), np.repeat(code, 2) << 1
     code[1::2] |= 1
     column = FIRST[joint] + bits(joint, path_of(joint))[code]
-    state = found.state[frame, column]
-    lost = []
-    for kind, name in UNJUDGED.items():
-        dead = np.flatnonzero(state == kind)
-        if dead.size:
-            nothing = np.zeros(dead.size, dtype=np.intp)
-            bounds = np.full(dead.size, -np.inf), np.full(dead.size, 0.0 if kind == NO_SOLUTION else np.inf)
-            value = found.excess[frame[dead], column[dead]]
-            place = (JOINTS[joint],)
-            lost.append(Pruned(joint, name, "m", place, frame[dead], code[dead], nothing, value, *bounds))
-    alive = state == OPEN
-    return frame[alive], code[alive], lost
+    state = found.state[frame, column].astype(np.int64)
+    upper = np.where(state == NO_SOLUTION, 0.0, np.inf)
+    return frame, code, state - 1, found.excess[frame, column], np.full(len(code), -np.inf), upper
 
 
 def _asked(
     found: Candidates,
-    level: int,
+    planned: _Planned,
     frame: Ints,
     code: NDArray[np.int64],
-    check: Any,
-    points: tuple[int, ...],
     ask: Callable[[Any, Array], Any],
-) -> tuple[Ints, NDArray[np.int64], list[Pruned]]:
-    """Ask a check about every distinct choice of its own branches; the nodes that it rejects are lost."""
+) -> tuple[tuple[str, ...], Ints, Array, Array, Array]:
+    """Ask a check about every distinct choice of its own branches; return where each node fails (-1: nowhere)."""
+    level, check, points, _ = planned
     support = support_of(points)
     node, row = _distinct((frame << len(support)) | bits(level, support)[code])
     places = found.places(level, points, frame[node], code[node])
     of_head = [point for point in points if point > DEPTH]
     known = np.flatnonzero(np.isfinite(places[:, of_head]).all(axis=(1, 2)))
-    if not known.size:
-        return frame, code, []
-    judgement = ask(check, places[known])
-    value = np.asarray(judgement.value, dtype=np.float64)
-    lower, upper = (np.broadcast_to(bound, value.shape) for bound in (judgement.lower, judgement.upper))
-    violated = np.minimum(value - lower, upper - value) < -np.asarray(judgement.tolerance)
-    rejected = np.zeros(len(node), dtype=np.bool_)
-    rejected[known] = violated.any(axis=1)
-    dead = rejected[row]
-    if not dead.any():
-        return frame, code, []
-    place = np.zeros(len(node), dtype=np.intp)
-    place[known] = violated.argmax(axis=1)
-    spread = np.empty((3, len(node)))
-    spread[:, known] = [each[np.arange(len(known)), place[known]] for each in (value, lower, upper)]
-    at = row[dead]
-    name = check.name
-    named = tuple(judgement.places)
-    lost = Pruned(level, name, check.unit, named, frame[dead], code[dead], place[at], *spread[:, at])
-    return frame[~dead], code[~dead], [lost]
+    place, numbers = np.full(len(node), -1), np.full((3, len(node)), np.nan)
+    named: tuple[str, ...] = ()
+    if known.size:
+        judgement = ask(check, places[known])
+        named = tuple(judgement.places)
+        value = np.asarray(judgement.value, dtype=np.float64)
+        lower, upper = (np.broadcast_to(bound, value.shape) for bound in (judgement.lower, judgement.upper))
+        violated = np.minimum(value - lower, upper - value) < -np.asarray(judgement.tolerance)
+        fails = np.flatnonzero(violated.any(axis=1))
+        first = violated[fails].argmax(axis=1)
+        place[known[fails]] = first
+        numbers[:, known[fails]] = [each[fails, first] for each in (value, lower, upper)]
+    return named, place[row], *numbers[:, row]
 
 
 def _distinct(key: Ints) -> tuple[Ints, Ints]:
