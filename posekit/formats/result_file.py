@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,23 +29,43 @@ from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
 
 RESULT_SCHEMA: Final = "posekit.result/3"
 EARLIER_SCHEMA: Final = "posekit.result/2"
-#: Columns of the survivors, in the order of JSON, and the shape of one survivor's value.
-SHAPES: Final[dict[str, tuple[int | None, ...]]] = {
-    "joints": (len(JOINTS), 3),
-    "head": (len(HEAD_POINTS), 3),
-    "q": (None,),
-    "probability": (),
-    "chi2": (),
-    "branch": (),
-    "group": (),
-    "radius": (len(JOINTS),),
-    "inferred": (len(JOINTS),),
-    "scale": (),
+
+
+class Column(NamedTuple):
+    """Shape of one row's value (None for the number of frames, or of q), what says nothing, and power of length."""
+
+    shape: tuple[int | None, ...] = ()
+    empty: Any = np.nan
+    power: int = 0
+
+
+#: Columns of the survivors, in the order of JSON, then the arrays of the other tables.
+COLUMNS: Final = {
+    "joints": Column((len(JOINTS), 3), power=1),
+    "head": Column((len(HEAD_POINTS), 3), power=1),
+    "q": Column((None,)),
+    "probability": Column(),
+    "chi2": Column(empty=0.0),
+    "branch": Column(empty=""),
+    "group": Column(empty=-1),
+    "radius": Column((len(JOINTS),), 0.0, power=1),
+    "inferred": Column((len(JOINTS),), False),
+    "scale": Column(power=-1),
+    "frames.time": Column(),
+    "frames.unlisted": Column(empty=0),
+    "frames.unlisted_probability": Column(empty=0.0),
+    "answer.joints": Column((len(JOINTS), 3), power=1),
+    "answer.sure": Column(),
+    "answer.survivor": Column(empty=-1),
+    "answer.nearer": Column((len(TREE_SEGMENTS),), 0),
+    "answer.nearer_sure": Column((len(TREE_SEGMENTS),)),
+    "path.survivor": Column((None,), -1),
+    "path.probability": Column(),
+    "path.joints": Column((None, len(JOINTS), 3), power=1),
 }
-#: Values that say nothing; NaN for the other columns.
-FILL: Final[dict[str, Any]] = {"chi2": 0.0, "branch": "", "group": -1, "radius": 0.0, "inferred": False}
-#: Power of the unit of length in a column.
-POWER: Final = {"joints": 1, "head": 1, "radius": 1, "scale": -1}
+OF_SURVIVORS: Final = [name for name in COLUMNS if "." not in name]
+#: Columns that are there even if they say nothing.
+NEEDED: Final = ("joints", "q", "probability")
 CAMERA_LENGTHS: Final = ("f", "position")
 #: Fields of a frame's ``camera`` and ``root`` that are lengths.
 ROOT_LENGTHS: Final = ("estimate", "deviation", "lower", "upper", "depth")
@@ -57,9 +77,7 @@ FRAME_FILL: Final[dict[str, Any]] = {
     **{"camera": {}, "rejected": {}, "levels": (), "reason": "", "judged": "", "root": None}
 }
 FRAME_LISTS: Final = ("pictures", *FRAME_FILL)
-FRAME_ARRAYS: Final = ("time", "unlisted", "unlisted_probability")
 ANSWER_LISTS: Final = ("sure_of", "representatives", "represented")
-ANSWER_ARRAYS: Final = ("joints", "sure", "survivor", "nearer", "nearer_sure")
 
 
 def looks_like(document: Any) -> bool:
@@ -138,10 +156,11 @@ def plain(value: Any) -> Any:
 def _columns(recovery: Recovery) -> dict[str, NDArray[Any]]:
     """Return the survivors' columns that say something, without margins."""
     found = {}
-    for name in SHAPES:
-        values, fill = getattr(recovery.survivors, name), FILL.get(name, np.nan)
-        empty = np.isnan(values) if isinstance(fill, float) and np.isnan(fill) else values == fill
-        if name in ("joints", "q", "probability") or not empty.all():
+    for name in OF_SURVIVORS:
+        values, empty = getattr(recovery.survivors, name), COLUMNS[name].empty
+        unknown = isinstance(empty, float) and np.isnan(empty)
+        silent = np.isnan(values) if unknown else values == empty
+        if name in NEEDED or not silent.all():
             found[name] = values
     return found
 
@@ -150,7 +169,7 @@ def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
     """Go through the frames as JSON has them, in the file's unit."""
     per = PER_METRE[recovery.unit]
     lists = {
-        name: nullable(values * per ** POWER[name] if name in POWER else values)
+        name: nullable(values * per**power if (power := COLUMNS[name].power) else values)
         for name, values in _columns(recovery).items()
     }
     checks = list(recovery.survivors.margins)
@@ -222,28 +241,24 @@ def _of_json(root: Node) -> Recovery:
     frames, nq = document["frames"], len(document["configuration_names"])
     held = [frame["postures"] for frame in frames]
     postures = [posture for each in held for posture in each]
-    answers = [frame.get("answer") or {} for frame in frames]
+    answers, paths = [frame.get("answer") or {} for frame in frames], document.get("paths") or []
     starts = np.cumsum([0, *map(len, held)])
     columns: dict[str, Any] = {"frame": np.repeat(np.arange(len(frames)), np.diff(starts))}
-    for name, shape in SHAPES.items():
-        if name == "branch":
-            columns[name] = np.array([str(posture.get(name, "")) for posture in postures])
-        elif name in ("joints", "q") or any(name in posture for posture in postures):
-            columns[name] = stacked(postures, name, *(nq if extent is None else extent for extent in shape))
+    for name, (shape, empty, power) in COLUMNS.items():
+        table, _, field = name.rpartition(".")
+        holders = {"": postures, "frames": frames, "answer": answers, "path": paths}[table]
+        if empty == "":
+            columns[name] = np.array([str(one.get(field, empty)) for one in holders])
+        elif table in ("frames", "answer") or name in NEEDED or any(field in one for one in holders):
+            extents = [extent or (nq if name == "q" else len(frames)) for extent in shape]
+            columns[name] = _stacked(holders, field, *extents) / per**power
     margins = [posture.get("margins") or {} for posture in postures]
     for check in dict.fromkeys(check for one in margins for check in one):
-        columns[f"margin.{check}"] = stacked(margins, check)
-    columns |= {f"frames.{name}": stacked(frames, name) for name in FRAME_ARRAYS}
-    columns |= {f"answer.{name}": stacked(answers, name, *_answer_shape(name)) for name in ANSWER_ARRAYS}
-    columns["answer.survivor"] = np.nan_to_num(columns["answer.survivor"] + starts[:-1], nan=-1)
-    if paths := document.get("paths"):
-        local = stacked(paths, "survivor", len(frames))
+        columns[f"margin.{check}"] = _stacked(margins, check)
+    columns["answer.survivor"] = columns["answer.survivor"] + starts[:-1]
+    if paths:
+        local = columns["path.survivor"]
         columns["path.survivor"] = np.where(local >= 0, local + starts[:-1], -1)
-        columns["path.probability"] = stacked(paths, "probability")
-        columns["path.joints"] = stacked(paths, "joints", len(frames), len(JOINTS), 3)
-    for name in columns:
-        power = 1 if name in ("answer.joints", "path.joints") else POWER.get(name, 0)
-        columns[name] = columns[name] / per**power if power else columns[name]
     about = {name: document.get(name) for name in ABOUT}
     about["lengths"] = {name: value / per for name, value in (about["lengths"] or {}).items()}
     about["frames"] = {name: [frame.get(name) for frame in frames] for name in FRAME_LISTS}
@@ -263,7 +278,7 @@ def _of_json(root: Node) -> Recovery:
     return _of_columns(columns, about, root.source)
 
 
-def stacked(holders: Sequence[Mapping[str, Any]], name: str, *shape: int) -> Array:
+def _stacked(holders: Sequence[Mapping[str, Any]], name: str, *shape: int) -> Array:
     """Gather one field of many objects into an array (N, *shape); NaN where it is null or absent."""
     nothing = np.full(shape, np.nan).tolist() if shape else np.nan
     values = [nothing if (value := one.get(name)) is None else value for one in holders]
@@ -291,25 +306,23 @@ def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
 
 
 def _other_arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
-    path = recovery.path
-    held = {f"frames.{name}": np.asarray(getattr(recovery.frames, name)) for name in FRAME_ARRAYS}
-    held |= {f"answer.{name}": np.asarray(getattr(recovery.answer, name)) for name in ANSWER_ARRAYS}
-    if path is not None:
-        held |= {f"path.{name}": getattr(path, name) for name in ("survivor", "probability", "joints")}
-    return held
+    """Return the arrays of frames, answer and paths, metres."""
+    fields = (name.partition(".") for name in COLUMNS if "." in name)
+    return {
+        f"{table}.{field}": np.asarray(getattr(getattr(recovery, table), field))
+        for table, _, field in fields
+        if getattr(recovery, table) is not None
+    }
 
 
 def _flat(recovery: Recovery) -> dict[str, NDArray[Any]]:
     """Return the survivors as flat columns, named as `Recovery.to_pandas` names them."""
-    columns, frame = _columns(recovery), recovery.survivors.frame
+    frame = recovery.survivors.frame
     found = {"frame": frame, "time": np.asarray(recovery.frames.time)[frame]}
-    found |= {name: values for name, values in columns.items() if not SHAPES[name]}
-    found |= {f"margin_{check}": values for check, values in recovery.survivors.margins.items()}
-    for name in (name for name in columns if SHAPES[name]):
-        width = int(np.prod(columns[name].shape[1:]))
-        flat = columns[name].reshape(len(frame), width)
-        found |= dict(zip(_flat_names(name, width), flat.T, strict=True))
-    return found
+    for name, values in _columns(recovery).items():
+        flat = values.reshape(len(frame), int(np.prod(values.shape[1:])))
+        found |= dict(zip(_flat_names(name, flat.shape[1]), flat.T, strict=True))
+    return found | {f"margin_{check}": values for check, values in recovery.survivors.margins.items()}
 
 
 def _flat_names(name: str, width: int) -> list[str]:
@@ -319,22 +332,23 @@ def _flat_names(name: str, width: int) -> list[str]:
     if name in ("joints", "head"):
         points = JOINTS if name == "joints" else HEAD_POINTS
         return [f"{point}_{axis}" for point in points for axis in "xyz"]
-    return [f"{joint}_{name}" for joint in JOINTS]
+    return [f"{joint}_{name}" for joint in JOINTS] if COLUMNS[name].shape else [name]
 
 
 def _table_columns(table: Table) -> dict[str, Any]:
     """Gather the survivors' columns of a flat table."""
     names = set(table.names)
-    found: dict[str, Any] = {"frame": table.column("frame").astype(np.intp)}
+    frame = table.column("frame").astype(np.intp)
+    found: dict[str, Any] = {"frame": frame}
     width = sum(name.removeprefix("q_").isdecimal() for name in names if name.startswith("q_"))
-    for name, shape in SHAPES.items():
+    for name in OF_SURVIVORS:
         flat = _flat_names(name, width)
-        if not shape and name in names:
-            found[name] = np.array(table.texts(name)) if name == "branch" else table.column(name)
-        elif shape and set(flat) <= names:
-            values, rows = np.array([table.column(one) for one in flat]).T, len(found["frame"])
-            found[name] = values.reshape(rows, *(width if extent is None else extent for extent in shape))
-    margins = {name for name in table.names if name.startswith("margin_")}
+        if name == "branch" and name in names:
+            found[name] = np.array(table.texts(name))
+        elif set(flat) <= names:
+            values = np.array([table.column(one) for one in flat]).T
+            found[name] = values.reshape(len(frame), *(extent or width for extent in COLUMNS[name].shape))
+    margins = [name for name in table.names if name.startswith("margin_")]
     return found | {f"margin.{name.removeprefix('margin_')}": table.column(name) for name in margins}
 
 
@@ -347,71 +361,45 @@ def _parsed(text: str, path: str | Path) -> dict[str, Any]:
 
 def _of_columns(columns: Mapping[str, Any], about: Mapping[str, Any], path: str | Path) -> Recovery:
     """Make a recovery of arrays by name and of everything that is no array."""
-    root = Node(about, path)
-    held: dict[str, Any] = {**dict(about.get("arrays") or {}), **columns}
+    root, held = Node(about, path), {**dict(about.get("arrays") or {}), **columns}
     arrays = Node(held, path)
     frame = arrays.at("frame").array(None).astype(np.intp)
-    rows = len(frame)
-    survivors: dict[str, Any] = {}
-    for name, shape in SHAPES.items():
-        if name == "branch":
-            survivors[name] = None if name not in held else np.asarray(held[name])
-        elif name in held:
-            survivors[name] = _as_floats(arrays, name, rows, *shape)
-    for name, dtype in (("group", np.intp), ("inferred", np.bool_)):
-        if name in survivors:
-            survivors[name] = survivors[name].astype(dtype)
+    rows, count = len(frame), len(_values(arrays, "frames.time", None, None))
+    if rows and (frame.min() < 0 or frame.max() >= count or (np.diff(frame) < 0).any()):
+        raise arrays.at("frame").refused(f"ascending frames below {count}", "write the result again")
+    tables: dict[str, dict[str, Any]] = {"": {"frame": frame}, "frames": {}, "answer": {}, "path": {}}
+    length = {"": rows, "frames": count, "answer": count, "path": None}
+    for name in COLUMNS:
+        table, _, field = name.rpartition(".")
+        if name in held or table in ("frames", "answer") or name in NEEDED:
+            frames = None if name == "q" else count
+            tables[table][field] = _values(arrays, name, length[table], frames)
+    if (tables["answer"]["survivor"] >= rows).any():
+        raise arrays.at("answer.survivor").refused(f"rows of {rows} postures", "write the result again")
     margins = {
         name.removeprefix("margin."): arrays.at(name).array(rows, unknown=True)
         for name in held
         if name.startswith("margin.")
     }
-    frames, answer = root.at("frames").object(), root.at("answer").object()
-    count = len(_as_floats(arrays, "frames.time", None))
-    if rows and (frame.min() < 0 or frame.max() >= count or (np.diff(frame) < 0).any()):
-        raise arrays.at("frame").refused(f"ascending frames below {count}", "write the result again")
-    other = {name: _as_floats(arrays, f"frames.{name}", count) for name in FRAME_ARRAYS}
+    of_frames, of_answer = root.at("frames").object(), root.at("answer").object()
     lists: dict[str, Any] = {
-        name: [fill if one is None else one for one in frames.get(name) or [fill] * count]
-        for name, fill in FRAME_FILL.items()
+        name: [empty if one is None else one for one in of_frames.get(name) or [empty] * count]
+        for name, empty in FRAME_FILL.items()
     }
-    pictures = [str(name) for name in frames.get("pictures") or ()]
-    of_answer: dict[str, Any] = {
-        name: _as_floats(arrays, f"answer.{name}", count, *_answer_shape(name)) for name in ANSWER_ARRAYS
-    }
-    for name in ("survivor", "nearer"):
-        of_answer[name] = np.nan_to_num(of_answer[name]).astype(np.intp)
-    if (of_answer["survivor"] >= rows).any():
-        raise arrays.at("answer.survivor").refused(f"rows of {rows} postures", "write the result again")
-    path_arrays = None
-    if "path.survivor" in held:
-        survivor = _as_floats(arrays, "path.survivor", None, count).astype(np.intp)
-        path_arrays = Paths(
-            survivor=survivor,
-            probability=_as_floats(arrays, "path.probability", len(survivor)),
-            joints=_as_floats(arrays, "path.joints", len(survivor), count, len(JOINTS), 3),
-        )
-    names = root.at("joint_names").texts()
-    if names != JOINTS:
+    pictures = [str(name) for name in of_frames.get("pictures") or ()]
+    if root.at("joint_names").texts() != JOINTS:
         raise root.at("joint_names").refused("the 14 joints in tree order", "write the result again")
     mappings: dict[str, Any] = {name: about.get(name) or {} for name in MAPPINGS}
-    none: list[list[Any]] = [[]] * count
     return Recovery(
-        survivors=Survivors(frame=frame, margins=margins, **survivors),
-        frames=Frames(
-            time=other["time"],
-            unlisted=np.nan_to_num(other["unlisted"]).astype(np.intp),
-            unlisted_probability=np.nan_to_num(other["unlisted_probability"]),
-            pictures=pictures if any(pictures) else (),
-            **lists,
-        ),
+        survivors=Survivors(**tables[""], margins=margins),
+        frames=Frames(**tables["frames"], pictures=pictures if any(pictures) else (), **lists),
         answer=Answer(
-            **of_answer,
-            sure_of=list(answer.get("sure_of") or [""] * count),
-            representatives=[np.array(one, dtype=np.intp) for one in answer.get("representatives") or none],
-            represented=[np.array(one, dtype=np.float64) for one in answer.get("represented") or none],
+            **tables["answer"],
+            sure_of=of_answer.get("sure_of") or (),
+            representatives=[np.array(one, np.intp) for one in of_answer.get("representatives") or ()],
+            represented=[np.array(one, np.float64) for one in of_answer.get("represented") or ()],
         ),
-        path=path_arrays,
+        path=Paths(**tables["path"]) if tables["path"] else None,
         **mappings,
         configuration_names=root.at("configuration_names").texts(),
         unit=root.at("unit").text(PER_METRE),
@@ -419,13 +407,12 @@ def _of_columns(columns: Mapping[str, Any], about: Mapping[str, Any], path: str 
     )
 
 
-def _answer_shape(name: str) -> tuple[int, ...]:
-    return (len(JOINTS), 3) if name == "joints" else (len(TREE_SEGMENTS),) if "nearer" in name else ()
-
-
-def _as_floats(arrays: Node, name: str, *shape: int | None) -> Array:
-    """Return an array of numbers, truth values as 0 and 1."""
-    node = arrays.at(name)
+def _values(arrays: Node, name: str, rows: int | None, frames: int | None) -> NDArray[Any]:
+    """Return the array of a column; numbers that are not known have the value that says nothing."""
+    node, (shape, empty, _) = arrays.at(name), COLUMNS[name]
+    if empty == "":
+        return np.asarray(node.value)
     if isinstance(node.value, np.ndarray) and node.value.dtype.kind == "b":
         node = Node(node.value.astype(np.float64), node.source, node.place)
-    return node.array(*shape, unknown=True)
+    values = node.array(rows, *(extent or frames for extent in shape), unknown=True)
+    return np.where(np.isnan(values), empty, values).astype(type(empty))
