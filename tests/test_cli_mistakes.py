@@ -27,6 +27,8 @@ def lay_out(folder: Path) -> None:
     posekit.validate(np.repeat(posekit.load_figure().neutral_points[None, :14], 3, axis=0)).save(
         folder / "report.json"
     )
+    (folder / "angles.mot").write_text("angles\ninDegrees=yes\nendheader\ntime\tknee_angle_r\n0.0\t5.0\n")
+    (folder / "walk.glb").write_bytes(b"glTF\x02\x00\x00\x00")
     (folder / "empty").mkdir()
     (folder / "empty.json").write_bytes(b"")
     (folder / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(64))

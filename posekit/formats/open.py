@@ -50,6 +50,8 @@ READERS: Final[dict[str, tuple[str, ...]]] = {
 }
 #: Endings of pictures and films, which detectors read.
 PICTURES: Final = ".png .jpg .jpeg .tif .tiff .webp .bmp .gif .heic .mp4 .mov .avi".split()
+#: Endings of files with bodies that other programs show.
+WRITTEN_ONLY: Final = (".glb", ".gltf")
 
 
 def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
@@ -69,6 +71,9 @@ def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
     if suffix in PICTURES:
         remedy = "run a pose detector on it, and give what it writes"
         raise refusal(path, "", "pictures", "the key points that a detector found in them", remedy)
+    if suffix in WRITTEN_ONLY:
+        remedy = "give the file that it was made from"
+        raise refusal(path, "", f"{suffix}, which is written and not read", "a file of motion", remedy)
     if not data.strip():
         raise refusal(path, "", "an empty file", "one with data", "write or copy it again")
     if container is None:

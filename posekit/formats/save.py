@@ -88,7 +88,10 @@ def with_points(motion: Motion) -> Motion:
         If it is not known which robot it is, or the robot has other joints.
     """
     if not motion.robot or motion.q is None:
-        raise refusal(motion.source, "robot", "no name", "the robot of the configurations", "give --urdf")
+        remedy = "give it with --urdf" + (
+            ", or give the .trc of the markers" if motion.layout == "opensim" else ""
+        )
+        raise refusal(motion.source, "robot", "no name", "the robot of the configurations", remedy)
     from posekit.robots import load_robot
 
     robot = load_robot(motion.robot, bodies="none")

@@ -170,7 +170,9 @@ def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
     from posekit.motion import Motion
 
     if not options.urdf:
-        notes.append("coordinates of an OpenSim model are judged with its robot alone (--urdf)")
+        notes.append(
+            "these are coordinates of an OpenSim model: give a URDF with them (--urdf), or the .trc of the markers"
+        )
     return Motion(
         q=values[:, 1:],
         q_names=names[1:],

@@ -288,7 +288,9 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
         return motion
     if validator.robot is None:
         got = f"configurations of {motion.robot or 'a robot'}"
-        raise refusal(motion.source, "q", got, "those of the figure", "name the robot with --urdf")
+        remedy = "name the robot with --urdf"
+        remedy += ", or give the .trc of the markers" if motion.layout == "opensim" else ""
+        raise refusal(motion.source, "q", got, "those of the figure", remedy)
     q, notes = validator.robot.q_from_columns(motion.q_names, motion.q)  # type: ignore[arg-type]
     return replace(motion, q=q, q_names=names, notes=(*motion.notes, *notes))
 
