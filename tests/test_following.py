@@ -3,16 +3,18 @@
 import io
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_t
 
 import posekit
 from posekit.body import load_figure
 from posekit.following import Tracker, follow
 from posekit.following.kalman import DENSITY, Moving, smooth, steps
 from posekit.following.lines import answers
-from posekit.following.paths import SKIP, Candidates, Trellis, _usual_step, step_costs
+from posekit.following.paths import SKIP, Candidates, Trellis, _usual_step, candidates, step_costs
 from posekit.recovery import Answer, Frames, Recovery, Survivors
 
 FIGURE = load_figure()
@@ -222,3 +224,75 @@ def test_lines_are_answered_one_by_one(walk):
     assert "line 5" in told[3]["error"] and "left_wrist" not in told[4]["joints"]
     with pytest.raises(posekit.InputError, match="line 1"):
         list(answers(io.BytesIO(b"[]\n"), tracker()))
+
+
+def test_steps_cost_what_a_student_distribution_says():
+    rng = np.random.default_rng(5)
+    ends = Moving.nothing(2).given(STANDING + 0.1 * rng.normal(size=(2, 14, 3)), np.zeros((2, 14, 3, 3)))
+    led = ends.after(0.04).after(0.03)
+    A = rng.normal(size=(3, 14, 3, 3)) * 0.05
+    covariance = A @ A.swapaxes(-1, -2)
+    joints = ends.mean[:1, :, :3] + 0.1 * rng.normal(size=(3, 14, 3))
+    joints[2, 5] = np.nan
+    found = step_costs(ends, led, joints, covariance)
+    for s, n in itertools.product(range(2), range(3)):
+        cost = 0.0
+        for j in range(14):
+            if np.isnan(joints[n, j, 0]):
+                continue
+            S = led.spread[s, j, :3, :3] + covariance[n, j]
+            law = multivariate_t(loc=led.mean[s, j, :3], shape=S, df=4.0)
+            own = DENSITY[j] * 0.07**3 / 3  # the variance that the random acceleration adds
+            cost += law.logpdf(led.mean[s, j, :3]) - law.logpdf(joints[n, j])
+            cost += 0.5 * max(np.log(np.linalg.det(S) / own**3), 0.0)
+        assert found[s, n] == pytest.approx(cost, rel=1e-9)
+
+
+@pytest.mark.parametrize(("joint", "speed"), [(0, 15.0), (6, 25.0), (8, 35.0), (10, 25.0), (13, 35.0)])
+@pytest.mark.parametrize("deviation", [0.0, 0.01])
+def test_no_joint_is_faster_than_people_are(joint, speed, deviation):
+    spread = np.broadcast_to(deviation**2 * np.eye(3), (1, 14, 3, 3))
+    ends = Moving.nothing(1).given(STANDING[None], spread)
+    led = ends.after(0.1)
+    own = np.sqrt(np.trace(ends.spread[0, joint, :3, :3])) + np.sqrt(3) * deviation
+    for share, possible in ((0.999, True), (1.001, False)):
+        moved = STANDING[None].copy()
+        moved[0, joint, 1] += share * (0.1 * speed + 3.0 * own)
+        assert np.isfinite(step_costs(ends, led, moved, spread)[0, 0]) == possible
+
+
+@pytest.mark.parametrize("scale", [np.nan, 120.0], ids=["perspective", "orthographic"])
+def test_the_noise_of_a_survivor_is_along_its_rays(scale):
+    one = recovery_of([STANDING[None]], radius=0.196)
+    one = replace(one, survivors=replace(one.survivors, scale=np.array([scale])))
+    found = candidates(one, 0)
+    for j in range(14):
+        values, vectors = np.linalg.eigh(found.covariance[0, j])
+        np.testing.assert_allclose(np.sqrt(values), [0.02, 0.02, 0.1], rtol=1e-9)
+        ray = np.array([0, 0, 1.0]) if np.isfinite(scale) else STANDING[j] / np.linalg.norm(STANDING[j])
+        assert abs(vectors[:, 2] @ ray) == pytest.approx(1.0)
+    np.testing.assert_allclose(found.joints[0], STANDING - np.isfinite(scale) * STANDING[0])
+
+
+def test_smoothed_joints_that_are_never_seen_are_unknown_and_others_have_their_deviation():
+    time, joints = np.arange(5) / 30, np.repeat(STANDING[None], 5, axis=0)
+    joints[:, 3] = np.nan
+    joints[1:4, 7] = np.nan
+    covariance = np.broadcast_to(1e-4 * np.eye(3), (5, 14, 3, 3))
+    found, deviation = smooth(time, joints, covariance)
+    assert np.isnan(found[:, 3]).all() and np.isnan(deviation[:, 3]).all()
+    np.testing.assert_allclose(found[:, 7], STANDING[None, 7].repeat(5, axis=0), atol=1e-3)
+    assert (deviation[2, 7] > deviation[[0, 4], 7]).all()
+    assert (deviation[:, 0] < np.sqrt(3e-4)).all() and (deviation[:, 0] > 1e-3).all()
+
+
+@pytest.mark.parametrize(("apart", "paths"), [(0.24, 1), (0.26, 2)])
+def test_another_path_is_elsewhere_by_a_quarter_of_a_metre(apart, paths):
+    other = STANDING + apart * np.eye(14)[9][:, None] * [1.0, 0.0, 0.0]
+    frames = [np.stack([STANDING, other])] * 3
+    found = follow(recovery_of(frames, [np.array([0.7, 0.3])] * 3), paths=3)
+    assert len(found.path) == paths
+    np.testing.assert_array_equal(found.path.survivor[0], [0, 2, 4])
+    if paths == 2:
+        assert 0.0 < found.path.probability[1] < 0.4
+        np.testing.assert_array_equal(found.path.survivor[1], [1, 3, 5])

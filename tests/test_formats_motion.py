@@ -732,3 +732,145 @@ def test_damaged_files_raise_nothing_but_our_errors(tmp_path: Path, ending: str)
             posekit.open(file)
         except posekit.PosekitError:
             continue
+
+
+def npz(folder: Path, joints: Any, **about: Any) -> Path:
+    """Write an array file of the figure's 19 points."""
+    np.savez(folder / "x.npz", joints=joints, joint_names=np.array(POINTS), **about)
+    return folder / "x.npz"
+
+
+@pytest.mark.parametrize(
+    ("size", "stated", "unit", "said"),
+    [
+        *((size, "", "m", "") for size in (0.21, 1.7, 4.9)),
+        *((size, "", "m", "check the unit") for size in (0.19, 5.1, 15.0, 45.0, 90.0, 260.0, 390.0, 2600.0)),
+        *((size, "", "in", "lengths are in in") for size in (16.0, 48.0, 67.0, 86.0)),
+        *((size, "", "cm", "lengths are in cm") for size in (100.0, 170.0, 240.0)),
+        *((size, "", "mm", "lengths are in mm") for size in (410.0, 1700.0, 2450.0)),
+        *((170.0, stated, "cm", f"in {stated}, as stated, it would be") for stated in ("m", "mm")),
+        *((170.0, stated, stated, "") for stated in ("cm", "in")),
+        (25.0, "mm", "in", "in mm, as stated"),
+        (8.0, "cm", "cm", "0.08 m tall"),
+    ],
+)
+def test_the_unit_is_that_in_which_a_body_has_its_size(
+    tmp_path: Path, size: float, stated: str, unit: str, said: str
+) -> None:
+    """`size` is the stature by the limbs, in the file's unit; units are those of Drillis & Contini's shares."""
+    joints = walking().joints
+    shares = {
+        ("hip", "knee"): 0.245,
+        ("knee", "ankle"): 0.246,
+        ("shoulder", "elbow"): 0.186,
+        ("elbow", "wrist"): 0.146,
+    }
+    ends = [[joints[0, JOINTS.index(f"left_{part}")] for part in pair] for pair in shares]
+    limbs = [np.linalg.norm(a - b) / share for (a, b), share in zip(ends, shares.values(), strict=True)]
+    scale = size / np.median(limbs)
+    found = posekit.open(
+        npz(tmp_path, joints * scale, **({"unit": stated} if stated else {}), fps=RATE, up="+z")
+    )
+    metres = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}[unit]
+    np.testing.assert_allclose(found.joints, joints * scale * metres, rtol=1e-12)
+    assert found.unit == unit
+    texts = [text for text in (*found.notes, *found.warnings) if "tall by its limbs" in text]
+    assert len(texts) == bool(said) and all(said in text for text in texts)
+
+
+EVEN = np.arange(24) / RATE
+TWICE = np.sort(np.r_[EVEN[:23], EVEN[7]])
+
+
+@pytest.mark.parametrize(
+    ("about", "rate", "time", "said"),
+    [
+        ({"time": EVEN}, None, EVEN, ""),
+        ({"time": EVEN + 5}, None, EVEN + 5, ""),
+        ({"time": EVEN, "fps": 32.0}, None, EVEN, ""),
+        ({"time": EVEN, "fps": 33.5}, None, EVEN, "contradict the file's rate 33.5"),
+        ({"time": EVEN, "fps": 26.5}, None, EVEN, "contradict the file's rate 26.5"),
+        ({"time": EVEN}, 28.0, EVEN, ""),
+        ({"time": EVEN}, 60.0, EVEN, "contradict --rate 60"),
+        ({"time": TWICE}, None, TWICE, "stand still or go back at 1 of 23 steps"),
+        ({"time": EVEN[::-1].copy(), "fps": 30.0}, None, EVEN, "the rate is used instead"),
+        ({"time": EVEN[::-1].copy()}, None, EVEN[::-1], "stand still or go back at 23 of 23 steps"),
+        ({"time": np.zeros(24)}, 60.0, EVEN / 2, "the rate is used instead"),
+        ({"time": np.full(24, np.nan), "fps": 15.0}, None, 2 * EVEN, ""),
+        ({"fps": 30.0}, None, EVEN, ""),
+        ({"fps": 30.0}, 30.0, EVEN, ""),
+        ({"fps": 30.0}, 60.0, EVEN / 2, "--rate 60 is used in place of the file's 30"),
+        ({"fps": 0.0}, 60.0, EVEN / 2, ""),
+        ({"fps": -30.0}, None, None, "no times and no rate above 0"),
+        ({"fps": np.inf}, None, None, "no times and no rate above 0"),
+        ({}, None, None, "no times and no rate above 0"),
+        ({"fps": 30.0, "frame": np.arange(24) * 2}, None, 2 * EVEN, ""),
+        ({"fps": 30.0, "clip": np.repeat([0, 1, 2], 8)}, None, np.tile(EVEN[:8], 3), ""),
+        ({"time": np.tile(EVEN[:8], 3), "clip": np.repeat([0, 1, 2], 8)}, None, np.tile(EVEN[:8], 3), ""),
+        *(({"time": np.round(EVEN, digits)}, None, EVEN, "rounded to") for digits in (2, 3)),
+        ({"time": np.round(EVEN, 4)}, None, np.round(EVEN, 4), ""),
+        ({"time": np.round(np.arange(24) / 29.97, 3), "fps": 29.97}, None, np.arange(24) / 29.97, "1/29.97 s"),
+        ({"time": np.arange(24) / 25}, None, np.arange(24) / 25, ""),
+        ({"time": np.round(EVEN, 3) + 0.002 * (EVEN == EVEN[9])}, None, None, ""),
+    ],
+)  # fmt: skip
+def test_times_are_the_files_or_the_rates_and_contradictions_are_said(
+    tmp_path: Path, about: dict[str, Any], rate: float | None, time: Any, said: str
+) -> None:
+    found = posekit.open(npz(tmp_path, walking().joints, up="+z", **about), rate=rate)
+    if time is None and "time" in about:
+        time = about["time"]
+    if time is None:
+        assert np.isnan(found.time).all()
+    else:
+        np.testing.assert_allclose(found.time, time, atol=1e-12)
+    texts = [*found.warnings, *(note for note in found.notes if "time" in note)]
+    assert len(texts) == bool(said) and all(said in text for text in texts)
+
+
+def crawling(forward: float) -> Any:
+    """Return a person who lies along x and goes `forward` metres along it."""
+    joints = walking().rotated("+x").joints
+    joints = joints - joints[:, :1]
+    joints[..., 0] += np.linspace(0, forward, len(joints))[:, None]
+    return joints
+
+
+@pytest.mark.parametrize(
+    ("forward", "stated", "up", "said"),
+    [
+        (0.0, "", "+x", "+x is up by how bodies stand"),
+        (0.4, "", "+x", "+x is up by how bodies stand"),
+        (1.0, "", None, "is up by the ground: the lowest joint stays level along it"),
+        (0.0, "+z", "+z", "the person is lying in most frames if +z is up"),
+        (1.0, "+z", "+z", ""),
+        (0.0, "-x", "-x", "the person is upside down in most frames if -x is up"),
+        (0.0, "+x", "+x", ""),
+    ],
+)
+def test_the_up_axis_of_a_person_that_lies_is_told_by_the_ground(
+    tmp_path: Path, forward: float, stated: str, up: str | None, said: str
+) -> None:
+    joints = crawling(forward)
+    found = posekit.open(npz(tmp_path, joints, **({"up": stated} if stated else {}), fps=RATE))
+    texts = [text for text in (*found.notes, *found.warnings) if " up" in text]
+    assert len(texts) == bool(said) and all(said in text for text in texts)
+    assert found.up in ("+y", "+z") if up is None else found.up == up
+
+
+@pytest.mark.parametrize(
+    ("beside", "in_world"),
+    [(0.0, False), (0.9e-4, False), (1.2e-4, True)],
+    ids=["exact", "rounded", "moving"],
+)
+@pytest.mark.parametrize("root", ["pelvis", "hips"])
+def test_postures_relative_to_their_hips_are_no_motion_in_the_world(
+    tmp_path: Path, root: str, beside: float, in_world: bool
+) -> None:
+    motion = walking()
+    ends = ["right_hip", "left_hip"] if root == "hips" else ["pelvis"]
+    joints = motion.joints - motion.points(ends).mean(axis=1, keepdims=True)
+    joints += beside * np.linspace(0.5, 1, len(joints))[:, None, None] * [1.0, 0.0, 0.0]
+    found = posekit.open(npz(tmp_path, joints, fps=RATE, up="+z"))
+    assert found.in_world is in_world
+    assert any("relative to its own hips" in note for note in found.notes) is not in_world
