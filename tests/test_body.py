@@ -381,3 +381,88 @@ def test_uncertain_lengths_have_their_covariance():
     assert known.covariance[0, 1] == pytest.approx(0.03**2)
     assert LengthUncertainty.uniform(0.0).exact
     assert known.widened(100).common == 0.3
+
+
+def test_lengths_of_a_stature_are_those_of_the_literature():
+    """Winter 2009, fig. 4.1 (Drillis & Contini 1966); between key points de Leva 1996, table 4, and ANSUR II."""
+    drawn, seen = FIGURE.scaled(stature=1.8), FIGURE.scaled(stature=1.8, key_points=True)
+    limbs = {
+        "shoulder-elbow": (0.186, 0.16018),
+        "elbow-wrist": (0.146, 0.15339),
+        "hip-knee": (0.245, 0.22745),
+    }
+    limbs |= {
+        "knee-ankle": (0.246, 0.25285),
+        "shoulder-shoulder": (0.259, 0.1913),
+        "hip-hip": (0.191, 0.1103),
+    }
+    for name, shares in limbs.items():
+        start, end = name.split("-")
+        full = f"right_{start}-left_{end}" if start == end else f"left_{start}-left_{end}"
+        for figure, share in zip((drawn, seen), shares, strict=True):
+            assert figure.lengths[full] == pytest.approx(1.8 * share, rel=2e-4), name
+    height = drawn.neutral_points[:, 2]
+    assert height[1] - height[4] == pytest.approx((0.818 - 0.530) * 1.8, rel=1e-3)
+    half = seen.lengths["right_shoulder-left_shoulder"] / 2
+    assert seen.lengths["neck-left_shoulder"] == pytest.approx(half)
+    assert np.hypot(half, seen.lengths["neck-pelvis"]) == pytest.approx(seen.lengths["left_shoulder-pelvis"])
+
+
+@pytest.mark.parametrize(("stature", "possible"), [(0.39, False), (0.4, True), (2.8, True), (2.81, False)])
+def test_statures_are_those_of_people_in_metres(stature, possible):
+    if possible:
+        assert stature_from_lengths(FIGURE.scaled(stature=stature).lengths) == pytest.approx(stature)
+    else:
+        with pytest.raises(InputError, match=r"stature.*check its unit"):
+            FIGURE.scaled(stature=stature)
+
+
+@pytest.mark.parametrize(("share", "certain"), [(0.93, True), (1.07, False)])
+def test_the_side_of_the_shoulders_is_certain_within_three_deviations(share, certain):
+    """The deviation of the shoulders' place in front of the line, by drawing lengths."""
+    rng = np.random.default_rng(0)
+    names = list(TORSO_LENGTHS)
+
+    def forward_squared(lengths):
+        a, c, b = (lengths[n] for n in ("neck-right_shoulder", "right_shoulder-pelvis", "neck-pelvis"))
+        d, e = (lengths[n] for n in ("neck-left_shoulder", "left_shoulder-pelvis"))
+        w, h, k = (
+            lengths["right_shoulder-left_shoulder"],
+            (b * b + a * a - c * c) / 2 / b,
+            (b * b + d * d - e * e) / 2 / b,
+        )
+        across = np.sqrt(w * w - (h - k) ** 2)
+        y = (across - (d * d - k * k - a * a + h * h) / across) / 2
+        return a * a - h * h - y * y
+
+    own = np.array([FIGURE.lengths[name] for name in names])
+    drawn = np.exp(1e-5 * rng.normal(size=(20000, len(names)))) * own
+    deviation = np.std([forward_squared(dict(zip(names, row, strict=True))) for row in drawn]) / 1e-5
+    limit = 2 * forward_squared(FIGURE.lengths) / 3 / deviation
+    known = LengthUncertainty(own=dict.fromkeys(names, share * limit))
+    assert FIGURE.scaled(dict(FIGURE.lengths)).with_side_within(known).side_known == certain
+
+
+def test_uncertainties_of_lengths_add_up():
+    known = LengthUncertainty.uniform(0.01)
+    bends = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "left_shoulder-pelvis": 0.027}
+    for name in SEGMENT_NAMES:
+        own = np.hypot(0.01, bends.get(name, 0.0))
+        assert known.own[name] == pytest.approx(own) and known.total(name) == pytest.approx(
+            np.hypot(0.01, own)
+        )
+    assert LengthUncertainty.uniform(1e-4).own["neck-pelvis"] == pytest.approx(np.sqrt(10) * 1e-4)
+    covariance = known.covariance
+    assert covariance[0, 1] == pytest.approx(1e-4) and covariance[1, 0] == covariance[0, 1]
+    np.testing.assert_allclose(np.diag(covariance), [known.total(name) ** 2 for name in SEGMENT_NAMES])
+    wide = known.widened(3.0)
+    assert wide.common == pytest.approx(0.03) and wide.own["neck-pelvis"] == pytest.approx(
+        3 * np.hypot(0.01, 0.017)
+    )
+    assert known.widened(1e3).common == LengthUncertainty.uniform(known.widened(1e3).common).common
+    assert LengthUncertainty().exact and not known.exact and not LengthUncertainty(common=0.01).exact
+    assert not LengthUncertainty(own={"neck-pelvis": 0.01}).exact
+    assert hash(known) == hash(pickle.loads(pickle.dumps(known))) != hash(wide)
+    for wrong in ({"common": -0.01}, {"own": {"neck": 0.1}}, {"common": 1.0}):
+        with pytest.raises(InputError, match="length_deviation"):
+            LengthUncertainty(**wrong)

@@ -416,15 +416,66 @@ def test_exchanged_sides_are_told(tmp_path: Path) -> None:
         posekit.open(dumped(tmp_path / "exchanged.json", people)).view()
 
 
-def test_a_jump_of_left_and_right_is_told(tmp_path: Path) -> None:
+SIDES_OF = {"arms": [5, 6, 7, 8, 9, 10], "legs": [11, 12, 13, 14, 15, 16]}
+
+
+@pytest.mark.parametrize(
+    ("jumps", "said"),
+    [
+        ({"arms": (7, 8), "legs": (7, 8)}, "left and right jump in 2 pictures: 7, 8"),
+        ({"arms": (4,), "legs": (4,)}, "left and right jump in 1 pictures: 4"),
+        ({"legs": (9, 10, 11)}, "left and right jump in 3 pictures: 9, 10, 11"),
+        ({"arms": (6,), "legs": (12,)}, "left and right jump in 2 pictures: 6, 12"),
+        ({"arms": tuple(range(5, 12))}, "left and right jump in 7 pictures: 5, 6, 7, 8, 9, …"),
+        ({}, ""),
+    ],
+)
+def test_jumps_of_left_and_right_are_told(
+    tmp_path: Path, jumps: dict[str, tuple[int, ...]], said: str
+) -> None:
     people = [{"image_id": k, "keypoints": triples(person(k), COCO)} for k in range(18)]
-    for k, one in enumerate(people):
-        if k in (7, 8):
-            table = np.array(one["keypoints"]).reshape(17, 3)
-            table[5:] = table[[6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]]
-            one["keypoints"] = table.ravel().tolist()
-    with pytest.warns(UserWarning, match="left and right jump in 2 pictures: 7, 8"):
+    for part, pictures in jumps.items():
+        for k in pictures:
+            table = np.array(people[k]["keypoints"]).reshape(17, 3)
+            right, left = SIDES_OF[part][1::2], SIDES_OF[part][::2]
+            table[right + left] = table[left + right]
+            people[k]["keypoints"] = table.ravel().tolist()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
         posekit.open(dumped(tmp_path / "jump.json", people)).view()
+    found = [str(one.message) for one in told if "left and right" in str(one.message)]
+    assert len(found) == bool(said) and all(one.endswith(said) for one in found)
+
+
+@pytest.mark.parametrize(
+    ("turned", "face", "lean", "told"),
+    [
+        (False, 0.95, 0, False),
+        (True, 0.95, 0, True),
+        (True, 0.01, 0, False),
+        (False, 0.01, 0, True),
+        (True, 0.95, 90, False),
+    ],
+    ids=["faces us", "faces us exchanged", "from behind", "from behind exchanged", "lies"],
+)
+def test_exchanged_sides_are_told_by_face_and_back(
+    tmp_path: Path, turned: bool, face: float, lean: float, told: bool
+) -> None:
+    """A sure face looks at the camera, and then the right is at the picture's left; ears without a face look away."""
+    angle = np.radians(lean)
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    people = []
+    for k in range(FRAMES):
+        table = np.array(triples(person(k), COCO)).reshape(17, 3)
+        table[:, :2] = (table[:, :2] - [300, 250]) @ R.T + [300, 250]
+        table[:3, 2], table[3:5, 2] = face, 0.9
+        if turned:
+            table[5:] = table[[6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]]
+        people.append({"image_id": k, "keypoints": table.ravel().tolist()})
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        posekit.open(dumped(tmp_path / "sides.json", people)).view()
+    assert any("look exchanged in all pictures" in str(one.message) for one in said) == told
 
 
 @pytest.mark.parametrize(

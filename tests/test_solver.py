@@ -16,7 +16,9 @@ from posekit.errors import InputError
 from posekit.geometry import pa_mpjpe
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS
 from posekit.solver import Limits, Problem, backend, engine, reference, solve
+from posekit.solver.limits import ENDS, MIDDLES, STARTS
 from posekit.solver.modes import KNOWN
+from posekit.solver.starts import DEPTHS, Rays, limb_starts, trunk_starts
 from posekit.tree import grow
 
 FIGURE = load_figure()
@@ -385,3 +387,108 @@ def test_residuals_are_zero_exactly_where_findings_are_inside():
     np.testing.assert_array_equal(with_limits - without < 1e-12 * (1 + without), inside)
     assert inside.any()
     assert not inside.all()
+
+
+@pytest.mark.parametrize(
+    "camera", [CAMERA, ScaledOrthographicCamera(scale=130.0)], ids=["pinhole", "orthographic"]
+)
+@pytest.mark.parametrize("rooted", [True, False])
+def test_starts_lie_on_the_rays_at_the_lengths(camera, rooted):
+    """Every start projects onto the image; segments have their lengths, or end at the foot of the start on the ray."""
+    image = camera.project(TRUTH)
+    problem = observed(image=image, camera=camera, root=TRUTH[:, 0] if rooted else None)
+    frame, trunk = trunk_starts(problem, Rays(problem))
+    count = np.bincount(frame)
+    assert (np.diff(frame) >= 0).all()
+    assert (count == 32 * (1 if rooted or not camera.perspective else len(DEPTHS))).all()
+    np.testing.assert_allclose(camera.project(trunk), image[frame, :6], atol=1e-6)
+    for limb in (None, 0, 1, 2, 3):
+        chains, own = ([(a, b) for a, b in SEGMENTS[:13] if b < 6], trunk), frame
+        if limb is not None:
+            row, ends = limb_starts(problem, Rays(problem), frame, trunk, limb)
+            assert (np.bincount(row) == 4).all()
+            a, b, c = STARTS[limb], MIDDLES[limb], ENDS[limb]
+            joints = np.full((len(row), 14, 3), np.nan)
+            joints[:, :6], joints[:, [b, c]], own = trunk[row], ends, frame[row]
+            np.testing.assert_allclose(camera.project(ends), image[own][:, [b, c]], atol=1e-6)
+            chains = ([(a, b), (b, c)], joints)
+        for start, end in chains[0]:
+            length = LENGTHS[[tuple(sorted(one)) for one in SEGMENTS].index(tuple(sorted((start, end))))]
+            line = chains[1][:, end] - chains[1][:, start]
+            ray = chains[1][:, end] if camera.perspective else np.broadcast_to([0.0, 0, 1], line.shape)
+            found = np.linalg.norm(line, axis=1)
+            square = abs(np.einsum("ni,ni->n", line, ray) / found / np.linalg.norm(ray, axis=1)) < 1e-6
+            assert (np.isclose(found, length, atol=1e-9) | (square & (found > length))).all()
+            assert np.isclose(found, length, atol=1e-9).any()
+    if rooted:
+        nearest = [off(trunk[frame == k], TRUTH[k, :6]).min() for k in range(len(TRUTH))]
+        assert max(nearest) < 1e-6
+    elif camera.perspective:
+        depth = trunk[::32, 0, 2].reshape(len(TRUTH), -1)
+        np.testing.assert_allclose(depth / depth[:, :1], np.tile(DEPTHS / DEPTHS[0], (len(TRUTH), 1)))
+
+
+@pytest.mark.parametrize(("hidden", "count"), [([8], 2 * 30), ([6], 3 * 2 * 6), ([6, 8], 30 * 3)])
+def test_starts_of_hidden_joints_have_the_lengths_all_around(hidden, count):
+    image = IMAGE.copy()
+    image[:, hidden] = np.nan
+    problem = observed(image=image)
+    frame = np.arange(len(TRUTH))
+    row, ends = limb_starts(problem, Rays(problem), frame, TRUTH[:, :6], 0)
+    assert (np.bincount(row) == count).all() and (np.diff(row) >= 0).all()
+    upper, lower = (
+        LENGTHS[list(SEGMENT_NAMES).index(f"right_{name}")]
+        for name in ("shoulder-right_elbow", "elbow-right_wrist")
+    )
+    start = TRUTH[row, 1]
+    first, second = (
+        np.linalg.norm(ends[:, 0] - start, axis=1),
+        np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1),
+    )
+    fits = np.isclose(first, upper) & np.isclose(second, lower)
+    assert fits.mean() > 0.5 and (fits.all() or hidden == [6])
+    for k, joint in enumerate((6, 8)):
+        if joint not in hidden:
+            np.testing.assert_allclose(CAMERA.project(ends[:, k]), IMAGE[row, joint], atol=1e-6)
+    for f in frame:
+        middles = ends[row == f, 0] - start[row == f]
+        if hidden != [8]:  # on all sides of the line to the end
+            spread = np.linalg.eigvalsh(np.cov(middles.T))
+            assert spread[1] > 1e-4
+        nearest = np.linalg.norm(ends[row == f] - TRUTH[f, [6, 8]], axis=2).max(axis=1).min()
+        assert nearest < 0.3
+
+
+@pytest.mark.parametrize("hidden", [[3], [4], [1, 2], [0], [2, 3, 4], [0, 1, 2, 3, 5]])
+def test_trunks_with_hidden_joints_start_with_the_figures_shape(hidden):
+    image = IMAGE.copy()
+    image[:, hidden] = np.nan
+    problem = observed(image=image, root=None if 0 in hidden else TRUTH[:, 0])
+    frame, trunk = trunk_starts(problem, Rays(problem))
+    assert np.isfinite(trunk).all() and set(frame) == set(range(len(TRUTH)))
+    seen = [j for j in range(6) if j not in hidden]
+    np.testing.assert_allclose(CAMERA.project(trunk[:, seen]), IMAGE[frame][:, seen], atol=1e-6)
+    if not {0, 3} & set(hidden):  # others hang on neck and pelvis
+        nearest = [off(trunk[frame == k], TRUTH[k, :6]).min() for k in range(len(TRUTH))]
+        assert np.median(nearest) < 0.12
+
+
+def test_residuals_are_the_deviations_of_points_lengths_and_priors():
+    problem = observed(length_deviation=0.02, size_deviation=0.03, root_covariance=0.05**2 * np.eye(3))
+    modes = solve(problem)
+    found = modes.residuals()
+    joints, frame = modes.joints, modes.frame
+    image = np.linalg.norm(CAMERA.project(joints) - (IMAGE + 2.0 * NOISE)[frame], axis=2) / 2.0
+    near = image < 3  # the image is linearised at the observed point
+    for j, name in enumerate(JOINTS):
+        np.testing.assert_allclose(
+            found[f"image {name}"][near[:, j]], image[near[:, j], j], rtol=0.05, atol=0.02
+        )
+    for k, name in enumerate(SEGMENT_NAMES):
+        a, b = SEGMENTS[k]
+        length = np.linalg.norm(joints[:, a] - joints[:, b], axis=1)
+        deviation = abs(np.log(length / LENGTHS[k]) - modes.size) / 0.02
+        np.testing.assert_allclose(found[f"length {name}"], deviation, atol=1e-9)
+    np.testing.assert_allclose(found["size"], abs(modes.size) / 0.03, atol=1e-9)
+    root = np.linalg.norm(joints[:, 0] - TRUTH[frame, 0], axis=1) / 0.05
+    np.testing.assert_allclose(found["root"], root, rtol=1e-6, atol=1e-9)
