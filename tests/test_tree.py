@@ -12,6 +12,7 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.settings import EXACT, PHOTOGRAPH, RecoverSettings
 from posekit.skeleton import JOINTS, PARENTS, POINT, SEGMENT_NAMES, SEGMENTS
+from posekit.solver import engine
 from posekit.synthesis import builtin_view, random_views
 from posekit.tree import grow, steps
 from posekit.validators import Judgement, PostureJudge
@@ -247,6 +248,7 @@ def test_compiled_tree_and_reference_agree(monkeypatch, changes, tolerance):
 
     fast = grown()
     monkeypatch.setattr(steps, "compiled", None)
+    monkeypatch.setattr(engine, "compiled", None)
     slow = grown()
     assert len(fast) > 30
     np.testing.assert_array_equal(fast.frame, slow.frame)

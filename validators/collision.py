@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body.capsules import CAPSULE_AXES
-from posekit.geometry import dot
+from posekit.geometry import dot, unit
 from posekit.robots.collision import segment_distance
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree.steps import CAPSULES, Step, step
@@ -53,6 +53,7 @@ class Collision:
         read = {point for link in links for ends in CAPSULE_AXES[link] for point in ends}
         return tuple(POINTS[point] for point in sorted(read))
 
+    @cached_property
     def parts(self) -> list[Collision]:
         """Return checks of the pairs of links whose last joint is the same, those of the head apart."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
@@ -83,11 +84,14 @@ class Collision:
         pairs = self._indices(body)
         used = sorted({k for pair in pairs for k in pair})
         place = {k: column for column, k in enumerate(used)}
-        points, count = body.points, len(body)
-        middle, half = np.empty((2, len(used), count, 3))
-        for k, column in place.items():
-            middle[column], axis = capsules[k].place(points)
-            half[column] = axis * capsules[k].half_length
+        # Row 19 is the middle of the head's points.
+        points = np.concatenate([body.points, body.head.mean(axis=1, keepdims=True)], axis=1).swapaxes(0, 1)
+        tops = [capsules[k].start[0] for k in used]
+        ends = [capsules[k].end[0] if len(capsules[k].end) == 1 else len(POINTS) for k in used]
+        axis = unit(points[ends] - points[tops])
+        centre = np.array([capsules[k].center for k in used])[:, None, None]
+        half = np.array([capsules[k].half_length for k in used])[:, None, None] * axis
+        middle, count = points[tops] + centre * axis, len(body)
         one, other = (np.array([place[pair[end]] for pair in pairs], dtype=np.intp) for end in range(2))
         radius = [capsule.radius * _slimness(body, capsule.link) for capsule in capsules]
         radii = np.array([radius[a] + radius[b] for a, b in pairs])

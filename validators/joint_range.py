@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -93,6 +93,7 @@ class JointRange:
         rigid = TORSO if "shoulder" in self.part else (*TORSO, *HIPS[1:])
         return (*rigid, *(JOINTS[k] for k in ends if JOINTS[k] not in rigid))
 
+    @cached_property
     def parts(self) -> list[JointRange]:
         """Return a check for neck, pelvis, and each limb without and with its lower segment."""
         early = [JointRange(part=limb, upper_only=True) for limb in LIMBS]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -108,7 +109,7 @@ def early_checks(settings: Settings) -> list[Check]:
         if getattr(check, "over_time", False):
             continue
         if isinstance(check, RigidParts | JointRange | Collision):
-            found += check.parts()
+            found += check.parts
         else:
             found.append(check if getattr(check, "points", ()) else Pointed(check))
     return found
@@ -149,6 +150,7 @@ class PostureJudge:
             tolerance,
             up,
         )
+        self._unnamed = replace(self.settings, checks=None)
 
     def __call__(self, check: Check, points: Array) -> Judgement:
         """Return the judgement of a check; it has no place where the check cannot be asked."""
@@ -161,12 +163,19 @@ class PostureJudge:
         """Return a check as steps of the compiled tree; None if it has no such form."""
         if not isinstance(check, RigidParts | JointRange | Collision):
             return None
-        none = np.empty((0, len(JOINTS), 3))
-        return check.steps(
-            Body(
-                joints=none, base=self.figure, settings=self.settings, tolerance=self.tolerance, motion=False
-            )
-        )
+        return _steps(check, self.figure, self._unnamed, self.tolerance)
+
+
+@lru_cache(maxsize=128)
+def _steps(
+    check: RigidParts | JointRange | Collision,
+    figure: Figure,
+    settings: ValidateSettings,
+    tolerance: Tolerance | None,
+) -> list[Step] | None:
+    """Return a check of postures of a figure as steps of the compiled tree."""
+    none = np.empty((0, len(JOINTS), 3))
+    return check.steps(Body(joints=none, base=figure, settings=settings, tolerance=tolerance, motion=False))
 
 
 def judge_postures(

@@ -52,6 +52,7 @@ class RigidParts:
         read = {joint for segment in self.segments for joint in segment}
         return tuple(JOINTS[joint] for joint in sorted(read | set(TORSO_POINTS if self.torso else ())))
 
+    @cached_property
     def parts(self) -> list[RigidParts]:
         """Return a check for each rigid segment and the torso: those that lift a joint have their length by design."""
         torso = RigidParts(segments=(), torso=True)

@@ -55,9 +55,9 @@ class Limits:
 
     Parameters
     ----------
-    sign : array (K,)
+    sign : array (K,) or (N, K)
         +1 or -1: the URDF axis is sign times the coordinate axis of the formula.
-    lower, upper : array (K,)
+    lower, upper : array (K,) or (N, K)
         Radians.
     """
 
@@ -67,12 +67,16 @@ class Limits:
 
     def part(self, first: int, count: int) -> Limits:
         """Return the limits of some consecutive revolutes."""
-        rows = slice(first, first + count)
+        part = (..., slice(first, first + count))
+        return Limits(sign=self.sign[part], lower=self.lower[part], upper=self.upper[part])
+
+    def take(self, rows: Flags) -> Limits:
+        """Return the limits of some of N limbs."""
         return Limits(sign=self.sign[rows], lower=self.lower[rows], upper=self.upper[rows])
 
     def clip(self, k: int, angle: Array | float) -> Array:
         """Bring the k-th angle into its limits."""
-        return np.clip(angle, self.lower[k], self.upper[k])
+        return np.clip(angle, self.lower[..., k], self.upper[..., k])
 
     def nearest_turn(self, angles: Array) -> Array:
         """Add full turns so that each angle (..., K) lies within half a turn of the middle of its limits."""
@@ -85,7 +89,7 @@ class Limits:
         the limb is almost straight.
         """
         outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
-        if len(self.sign) == N_LIMB_ANGLES:
+        if self.sign.shape[-1] == N_LIMB_ANGLES:
             outside[..., 2] *= np.abs(np.sin(angles[..., 3]))
         return np.asarray(outside.max(axis=-1))
 
@@ -136,11 +140,20 @@ class ClosedForm:
         angles = np.empty((len(points), len(DOFS)))
         angles[:, :3] = self.neck(R_torso, points[:, 0], points[:, HEAD])
         angles[:, 3:6] = self.pelvis(R_torso, R_hips)
-        for first, (start, middle, end) in LIMBS:
-            R_parent = R_torso if first < LIMBS[2][0] else R_hips
-            upper = rotate_back(R_parent, unit(points[:, middle] - points[:, start]))
-            lower = rotate_back(R_parent, unit(points[:, end] - points[:, middle]))
-            angles[:, first : first + 4] = limb_angles(upper, lower, self._choosing.part(first, 4))
+        # The four limbs one after the other.
+        starts, middles, ends = (
+            list(joints) for joints in zip(*(joints for _, joints in LIMBS), strict=True)
+        )
+        R_parents = np.concatenate([R_torso, R_torso, R_hips, R_hips])
+        lines = (points[:, to] - points[:, of] for of, to in ((starts, middles), (middles, ends)))
+        upper, lower = (rotate_back(R_parents, unit(np.swapaxes(one, 0, 1).reshape(-1, 3))) for one in lines)
+        shape, own = (len(LIMBS), len(points), N_LIMB_ANGLES), self._choosing.part(6, 16)
+        sign, low, high = (
+            np.repeat(one.reshape(len(LIMBS), -1), len(points), axis=0)
+            for one in (own.sign, own.lower, own.upper)
+        )
+        found = limb_angles(upper, lower, Limits(sign=sign, lower=low, upper=high))
+        angles[:, 6:] = np.swapaxes(found.reshape(shape), 0, 1).reshape(len(points), len(DOFS) - 6)
         if self.middle_pelvis:
             self._share_flexion(angles, R_torso, R_hips)
         return angles
@@ -151,7 +164,12 @@ class ClosedForm:
 
     def neck(self, R_torso: Array, neck: Array, head: Array) -> Array:
         """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
-        return ball_angles(relative_rotation(R_torso, self.head_frame(neck, head)), self.limits.part(0, 3))
+        angles = np.full((len(neck), 3), np.nan)
+        seen = np.isfinite(head).all(axis=(1, 2))
+        if seen.any():
+            R_head = self.head_frame(neck[seen], head[seen])
+            angles[seen] = ball_angles(relative_rotation(R_torso[seen], R_head), self.limits.part(0, 3))
+        return angles
 
     def pelvis(self, R_torso: Array, R_hips: Array) -> Array:
         """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
@@ -203,11 +221,11 @@ def ball_angles(R: Array, limits: Limits) -> Array:
     branches = _direction_branches(-R[:, :, 2])
     candidates = []
     for k in range(2):
-        alpha, beta = branches[:, k, 0], branches[:, k, 1]
+        alpha, beta = branches[k, :, 0], branches[k, :, 1]
         # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
         rest = _into_ball(R[:, :, 0], alpha, beta)
         candidates.append(np.stack([alpha, beta, np.arctan2(rest[:, 1], rest[:, 0])], axis=-1))
-    return _least_violating(np.stack(candidates, axis=1) * limits.sign, limits)
+    return _least_violating(np.stack(candidates) * limits.sign, limits)
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
@@ -222,7 +240,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     upper, lower : array (N, 3)
         Unit directions of the two segments in the parent's frame.
     limits : Limits
-        Of the four revolutes: ball joint, then hinge.
+        Of the four revolutes of each limb (N, 4): ball joint, then hinge.
 
     Returns
     -------
@@ -230,20 +248,21 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
         Radians; NaN if a direction is unknown. Rotation and hinge alone are NaN if `lower` is.
     """
     angles = np.full((len(upper), N_LIMB_ANGLES), np.nan)
-    both = np.isfinite(upper).all(axis=1) & np.isfinite(lower).all(axis=1)
-    angles[~both, :2] = _upper_angles(upper[~both], limits.part(0, 2))
-    upper, lower = upper[both], lower[both]
+    both = np.asarray(np.isfinite(upper).all(axis=1) & np.isfinite(lower).all(axis=1))
+    if not both.all():
+        angles[~both, :2] = _upper_angles(upper[~both], limits.part(0, 2).take(~both))
+        upper, lower, limits = upper[both], lower[both], limits.take(both)
     branches = _direction_branches(upper)
     candidates = []
     for k in range(2):
-        alpha, beta = branches[:, k, 0], branches[:, k, 1]
+        alpha, beta = branches[k, :, 0], branches[k, :, 1]
         local = _into_ball(lower, alpha, beta)
         candidates += [_hinge_branch(local, alpha, beta, side, limits) for side in (1.0, -1.0)]
-    found = _least_violating(np.stack(candidates, axis=1), limits)
+    found = _least_violating(np.stack(candidates), limits)
     free = _along_abduction_axis(upper) | _parallel(upper, lower)
     free &= limits.violation(found) > NEGLIGIBLE_VIOLATION_RADIANS
     if free.any():
-        found[free] = _turn_free_angles(upper[free], lower[free], found[free], limits)
+        found[free] = _turn_free_angles(upper[free], lower[free], found[free], limits.take(free))
     angles[both] = found
     return angles
 
@@ -290,20 +309,20 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
     """
     branches = _direction_branches(upper)
     pinned, straight = _along_abduction_axis(upper), _parallel(upper, lower)
-    sign, low, high = limits.sign, limits.lower, limits.upper
+    sign, low, high = limits.sign.T, limits.lower.T, limits.upper.T
     candidates = [angles]
     for k in range(2):
-        beta = branches[:, k, 1]
+        beta = branches[k, :, 1]
         at_zero = _into_ball(lower, np.zeros(len(beta)), beta)
         for side in (1.0, -1.0):
             gamma = np.arctan2(-side * at_zero[:, 1], -side * at_zero[:, 0])
             turned = [sign[0] * limits.clip(0, 0.0), sign[0] * low[0], sign[0] * high[0]]
             turned += [np.sign(np.sin(beta)) * (sign[2] * bound - gamma) for bound in (low[2], high[2])]
-            for alpha in (branches[:, k, 0], *(np.where(pinned, alpha, np.nan) for alpha in turned)):
+            for alpha in (branches[k, :, 0], *(np.where(pinned, alpha, np.nan) for alpha in turned)):
                 branch = _hinge_branch(_into_ball(lower, alpha, beta), alpha, beta, side, limits)
                 branch[:, 2] = np.where(straight, limits.clip(2, branch[:, 2]), branch[:, 2])
                 candidates.append(branch)
-    return _least_violating(np.stack(candidates, axis=1), limits)
+    return _least_violating(np.stack(candidates), limits)
 
 
 def _parallel(upper: Array, lower: Array) -> Flags:
@@ -317,11 +336,11 @@ def _along_abduction_axis(upper: Array) -> Flags:
 
 
 def _direction_branches(upper: Array) -> Array:
-    """Return both (alpha, beta) of a direction, (N, 2, 2)."""
+    """Return both (alpha, beta) of directions (N, 3), (2, N, 2)."""
     alpha = np.arctan2(-upper[:, 0], -upper[:, 2])
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
-    return np.stack([first, other_branch(first)], axis=1)
+    return np.stack([first, other_branch(first)])
 
 
 def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
@@ -333,10 +352,10 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Return the branch (N, K) of (N, B, K) that violates the limits least, the first of those that tie."""
+    """Return the branch (N, K) of (B, N, K) that violates the limits least, the first of those that tie."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)
-    least = violation.min(axis=1, keepdims=True)
-    best = np.argmax(violation <= least + np.where(least > 0, TIED_ANGLES_RADIANS, 0.0), axis=1)
-    return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]
+    least = violation.min(axis=0)
+    best = np.argmax(violation <= least + np.where(least > 0, TIED_ANGLES_RADIANS, 0.0), axis=0)
+    return np.asarray(angles[best, np.arange(len(best))])

@@ -194,7 +194,7 @@ def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -
 def physical_checks() -> Sequence[Check]:
     """Return the checks of §3.2 in the parts that the tree can ask early."""
     distances = [RigidParts(segments=(segment,), torso=False) for segment in RIGID_SEGMENTS]
-    return [*distances, *JointRange().parts(), *Collision().parts()]
+    return [*distances, *JointRange().parts, *Collision().parts]
 
 
 def _judged(check: Check, points: Array) -> Judgement:

@@ -110,7 +110,8 @@ class StudentMixture(Record):
         power = (self.dof + count) / 2
         # Counted from the nearest component, no power vanishes.
         nearest = base.min(axis=1)
-        return np.asarray(np.log((nearest[:, None] / base) ** power @ self.share) - power * np.log(nearest))
+        each = np.exp(power * np.log(nearest[:, None] / base))  # faster than a power
+        return np.asarray(np.log(each @ self.share) - power * np.log(nearest))
 
 
 def digamma(x: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from posekit.geometry import Array, perpendicular, unit
 from posekit.settings import MEASURED, RecoverSettings, Tolerance
 from posekit.skeleton import HIPS, JOINT
 from posekit.solver import Limits
+from posekit.validators.check import Check
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks, judge_postures
 from posekit.validators.ranges import load_ranges
 
@@ -64,8 +66,16 @@ class Certifier:
             for check in chosen_checks(settings, of_robot=False, in_time=False)
             if not getattr(check, "over_time", False)
         ]
-        self.early = early_checks(settings)
-        self.judge = PostureJudge(figure, settings, tolerance, up)
+
+    @cached_property
+    def early(self) -> list[Check]:
+        """The checks as a tree asks them."""
+        return early_checks(self.settings)
+
+    @cached_property
+    def judge(self) -> PostureJudge:
+        """What asks them."""
+        return PostureJudge(self.figure, self.settings, self.tolerance, self.up)
 
     def certify(self, joints: Array, head: Array) -> Certificate:
         """Judge postures (N, 14, 3) with head points (N, 5, 3), NaN where not known."""

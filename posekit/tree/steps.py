@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,6 @@ try:
     compiled: Any = import_module("posekit.tree._compiled")
 except ImportError:
     compiled = None
-
-#: A step as the compiled tree reads it: what is asked, at which level, the number of its first reason, the limb, the
-#: joints that are read (-1 for none), the tolerance, and numbers of its kind.
-STEP: Final = np.dtype(
-    [
-        ("kind", "f8"),
-        ("level", "f8"),
-        ("reason", "f8"),
-        ("limb", "f8"),
-        ("points", "f8", (4,)),
-        ("tolerance", "f8"),
-        ("numbers", "f8", (14,)),
-    ]
-)
 
 #: Kinds of steps. Numbers of a distance: metres; of a torso: its four joints, and whether its mirror image is
 #: undecided; of two capsules: centre and half length of each, both radii, and the distance that they must keep.
@@ -40,13 +26,14 @@ class Step(NamedTuple):
     ----------
     places : tuple of str
         What it judges.
-    record : record of `STEP`
+    numbers : tuple of 21 float
+        Kind, limb, tolerance, the four joints that are read (-1 for none), and the numbers of the kind.
     limits : record, optional
         Joint ranges (`posekit.solver.Limits.numbers`), which limbs and pelvis are judged by.
     """
 
     places: tuple[str, ...]
-    record: NDArray[np.void]
+    numbers: tuple[float, ...]
     limits: NDArray[np.void] | None = None
 
 
@@ -60,9 +47,8 @@ def step(
     limb: int = 0,
     limits: NDArray[np.void] | None = None,
 ) -> Step:
-    """Make a step; parameters are the fields of `STEP`."""
-    record = np.zeros((), dtype=STEP)
-    record["kind"], record["limb"], record["tolerance"], record["points"] = kind, limb, tolerance, -1
-    record["points"][: len(points)] = points
-    record["numbers"][: len(numbers)] = numbers
-    return Step(tuple(places), record, limits)
+    """Make a step; `points` and `numbers` are filled up."""
+    read = (*points, *(-1,) * (4 - len(points)))
+    return Step(
+        tuple(places), (kind, limb, tolerance, *read, *numbers, *(0.0,) * (14 - len(numbers))), limits
+    )

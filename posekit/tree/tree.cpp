@@ -17,9 +17,9 @@ constexpr int PELVIS_READS[] = {0, 1, 2, 3, 4, 5}, TORSO_READS[] = {0, 1, 2, 3};
 constexpr double PARALLEL = 1e-30, NEAR = 0.1;  // as in robots/collision.py and validators/collision.py
 enum Kind { BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES };
 
-// As the dtype STEP of steps.py; all fields are doubles.
+// Level and number of the first reason, then the numbers of steps.py.
 struct Step {
-  double kind, level, reason, limb, points[4], tolerance, numbers[14];
+  double level, reason, kind, limb, tolerance, points[4], numbers[14];
 };
 struct Verdict {
   int place;  // of the first violation; PASSED, or UNKNOWN where it was not asked
@@ -153,8 +153,8 @@ struct Ask {
 };
 
 // Takes nodes, by frame, through consecutive steps; returns the nodes that are left and what was lost.
-py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, py::array steps, Longs frame, Longs code) {
-  if (steps.itemsize() != (py::ssize_t)sizeof(Step)) throw std::invalid_argument("steps of another layout");
+py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Doubles steps, Longs frame, Longs code) {
+  if (steps.shape(1) * sizeof(double) != sizeof(Step)) throw std::invalid_argument("steps of another layout");
   Limits L{};
   if (!ranges.is_none()) {
     const py::array array = py::cast<py::array>(ranges);
@@ -162,7 +162,7 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, py
     std::memcpy(&L, array.data(), sizeof L);
   }
   std::vector<Ask> asks;
-  for (py::ssize_t k = 0; k < steps.size(); ++k) asks.emplace_back(static_cast<const Step*>(steps.data())[k]);
+  for (py::ssize_t k = 0; k < steps.shape(0); ++k) asks.emplace_back(reinterpret_cast<const Step*>(steps.data())[k]);
   std::vector<std::int64_t> left_frame, left_code, lost, nodes, next;
   std::vector<double> numbers;
   const std::int64_t *frames = frame.data(), *codes = code.data();

@@ -125,12 +125,10 @@ class Trees:
     @cached_property
     def levels(self) -> NDArray[np.int64]:
         """Survivors by level (F, 14): distinct beginnings of the remaining codes (section 4.1.B)."""
-        out = np.zeros((self.count, DEPTH + 1), dtype=np.int64)
-        for level in range(DEPTH + 1):
-            key = (self.frame << level) | (self.code >> (DEPTH - level))  # ascending, as the survivors are
-            new = np.diff(key, prepend=-1) > 0
-            out[:, level] = np.bincount(self.frame[new], minlength=self.count)
-        return out
+        shift = DEPTH - np.arange(DEPTH + 1)
+        key = (self.frame[:, None] << DEPTH | self.code[:, None]) >> shift  # ascending, as the survivors are
+        new = np.diff(key, axis=0, prepend=-1) > 0
+        return np.stack([np.bincount(self.frame[one], minlength=self.count) for one in new.T], axis=1)
 
     def pruned(self, frame: int) -> list[tuple[str, str, str, float, float, float, str]]:
         """List every pruned branch of a frame: its code, joint, reason, value, bounds and unit."""
@@ -261,18 +259,18 @@ def _compiled(
     reasons: dict[tuple[str, str], int],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
     """Take nodes through consecutive steps of the compiled tree."""
-    records, limits = [], None
+    rows, limits = [], None
     for planned in plan:
         for one in planned.steps or ():
             places, unit = _branch_reasons(planned.level), "m"
             if planned.check is not None:
                 places, unit = [f"{planned.check.name}/{place}" for place in one.places], planned.check.unit
-            record = one.record.copy()
-            record["level"], record["reason"] = planned.level, _numbered(reasons, places, unit)[0]
-            records.append(record)
+            for place in places:
+                reasons.setdefault((place, unit), len(reasons))
+            rows.append((planned.level, reasons[places[0], unit], *one.numbers))
             limits = limits if one.limits is None else one.limits
     frame, code, whole, numbers = steps.compiled.grow(
-        found.table, found.state, found.excess, limits, np.array(records), frame, code
+        found.table, found.state, found.excess, limits, np.array(rows), frame, code
     )
     return frame, code, Pruned(*whole.reshape(-1, 4).T, *numbers.reshape(-1, 3).T)
 
