@@ -10,7 +10,7 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import pa_mpjpe
 from posekit.recovery import Answer, Frames, Recovery, Survivors
-from posekit.recovery.answer import NARROWED, answer_of, joint_radius, lay, representatives
+from posekit.recovery.answer import answer_of, joint_radius, lay, representatives
 from posekit.recovery.conductor import recover
 from posekit.recovery.scales import likely_scale
 from posekit.samples import samples
@@ -302,7 +302,7 @@ def test_sure_is_the_probability_of_the_samples():
     answer = answer_of(truth, np.ones(1), covariance, LENGTHS)
     from scipy.stats import chi
 
-    assert answer.sure == pytest.approx(chi(3).cdf(0.05 / (NARROWED * sigma)) ** 14, abs=0.1)
+    assert answer.sure == pytest.approx(chi(3).cdf(0.05 / sigma) ** 14, abs=0.1)
     assert answer.survivor == 0 and answer.representatives.tolist() == [0]
     shared = np.tile(np.eye(3), (14, 14)) * 0.2**2 + 1e-6 * np.eye(42)
     assert answer_of(truth, np.ones(1), shared[None], LENGTHS, relative=True).sure == pytest.approx(1.0)

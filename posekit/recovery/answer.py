@@ -31,11 +31,6 @@ COMPARED_AT_ONCE: Final = 50_000
 #: Standard normal numbers, the same for every mode; with their opposites, so that means are exact.
 DRAWS: Final = np.random.default_rng(1985).normal(size=(N_SAMPLES // 2, 42))
 
-#: Deviation within a mode over that of the image and the lengths alone (dimensionless): people's postures vary less.
-#: Chosen over views of CMU's motion and of other skeletons: where lengths are 2 % off `sure` comes true, and where they
-#: are exact it is too modest.
-NARROWED: Final = 0.7
-
 #: Variance (square metres, and relative to the trace) added to every covariance: a given neck has none, and rounding
 #: may leave a little less.
 ROUNDING: Final = 1e-8
@@ -207,7 +202,7 @@ def _draws(shape: Array, covariance: Array | None, weight: Array, relative: bool
     some = (covariance[rows] + covariance[rows].transpose(0, 2, 1)) / 2
     floor = ROUNDING * (1.0 + np.einsum("nii->n", some))
     root = np.linalg.cholesky(some + floor[:, None, None] * np.eye(some.shape[1]))
-    off = NARROWED * (DRAWS @ root.transpose(0, 2, 1)).reshape(len(rows), -1, shape.shape[1], 3)
+    off = (DRAWS @ root.transpose(0, 2, 1)).reshape(len(rows), -1, shape.shape[1], 3)
     off = np.concatenate([off, -off], axis=1)
     found[rows] += off - off[:, :, :1] if relative else off
     return found
