@@ -3,10 +3,11 @@
     python -m benchmarks.people [--data DIR] [--views 96] [--noise 2] [--trial POSE2SIM_FOLDER] [--only NAME,NAME]
 
 Motion is what files have (`--data`), or a walker's. Frames are drawn evenly over its clips, each seen by a
-camera of its own 2.5 to 6 m away; lengths are the medians of each clip. Conditions:
+camera of its own 2.5 to 6 m away; lengths are the medians of each clip, and their deviation is stated. Conditions:
 
 - neck: the neck is given exactly;
 - no neck: neither neck nor head points are given, depth comes from the lengths;
+- taped neck, taped no neck: the same with lengths that are 2 % off in common and 2 % each, and no deviation stated;
 - photograph: the camera is not known either, nor are the lengths;
 - a trial: key points of a detector, with the calibration (TOML) and the motion (TRC) of the same seconds.
   The truth is the TRC's; the person is described by a stature alone, or by the lengths of the frames that
@@ -38,6 +39,9 @@ from posekit.recovery import Recovery
 from posekit.synthesis import forget_camera, mocap_views, with_noise
 
 NEAR_METRES = 0.06
+CLIP_DEVIATION = 0.01
+"""Relative deviation of the medians of a clip: bones are rigid, shoulders and spine hardly."""
+TAPE_DEVIATION = 0.02
 PA = MEASURES.index("pa")
 HEAD = (
     "condition",
@@ -90,12 +94,21 @@ def neck_given(view: View) -> View:
     neck = view.truth[:, 0]
     image = view.image.copy()
     image[:, 0] = view.camera.project(neck)
-    return replace(view, root=neck, image=image)
+    return replace(view, root=neck, image=image, length_deviation=CLIP_DEVIATION)
 
 
 def neck_unknown(view: View) -> View:
     nothing = np.full((len(view), 3), np.nan)
-    return replace(view, root=nothing, head_image=np.full_like(view.head_image, np.nan))
+    head = np.full_like(view.head_image, np.nan)
+    return replace(view, root=nothing, head_image=head, length_deviation=CLIP_DEVIATION)
+
+
+def taped(view: View) -> View:
+    """Return a view with lengths as of a tape: `TAPE_DEVIATION` off in common, and each; none is stated."""
+    rng = np.random.default_rng(len(view))
+    off = TAPE_DEVIATION * (rng.normal() + rng.normal(size=len(view.lengths)))
+    lengths = {name: length * np.exp(x) for (name, length), x in zip(view.lengths.items(), off, strict=True)}
+    return replace(view, lengths=lengths, length_deviation=None)
 
 
 def photograph(view: View) -> View:
@@ -105,6 +118,8 @@ def photograph(view: View) -> View:
 CONDITIONS: dict[str, Callable[[View], View]] = {
     "neck": neck_given,
     "no neck": neck_unknown,
+    "taped neck": lambda view: taped(neck_given(view)),
+    "taped no neck": lambda view: taped(neck_unknown(view)),
     "photograph": photograph,
 }
 

@@ -101,8 +101,13 @@ class Survivors(Table):
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Survivors:
         """Return some rows."""
-        columns = {one.name: getattr(self, one.name)[rows] for one in fields(self) if one.name != "margins"}
-        return Survivors(**columns, margins={name: values[rows] for name, values in self.margins.items()})
+        return Survivors(**self._columns(rows))
+
+    def _columns(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> dict[str, Any]:
+        """Return some rows of every column."""
+        columns = {one.name: getattr(self, one.name) for one in fields(Survivors)}
+        margins = {name: values[rows] for name, values in columns.pop("margins").items()}
+        return {name: values[rows] for name, values in columns.items()} | {"margins": margins}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -241,6 +246,44 @@ class Paths(Table):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Frame(Survivors):
+    """The survivors of one frame, with its entries of `Frames` and of `Answer`: see there.
+
+    Parameters
+    ----------
+    number : int
+        Frame, from 0.
+    picture : str
+        Name of the picture; empty if there is none.
+    answer : array (14, 3)
+        Joints of the answer.
+    """
+
+    number: int
+    time: float
+    picture: str
+    camera: Mapping[str, Any]
+    rejected: Mapping[str, int]
+    levels: Sequence[int]
+    unlisted: int
+    unlisted_probability: float
+    reason: str
+    root: Mapping[str, Any] | None
+    judged: str
+    answer: Array
+    sure: float
+    sure_of: str
+    survivor: int
+    representatives: NDArray[np.intp]
+    represented: Array
+    nearer: NDArray[np.intp]
+    nearer_sure: Array
+
+    def _facts(self) -> list[str]:
+        return [f"frame {self.number}", f"{len(self)} {'posture' if len(self) == 1 else 'postures'}"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Recovery(Record):
     """Every posture behind a view that passes the checks.
 
@@ -300,7 +343,16 @@ class Recovery(Record):
         """Return one frame; negative numbers count from the end."""
         if not -len(self) <= k < len(self):
             raise IndexError(f"frame {k} of {len(self)}")
-        return Frame(recovery=self, number=k % len(self))
+        number = k % len(self)
+        entries: dict[str, Any] = {
+            one.name: getattr(table, one.name)[number]
+            for table in (self.frames, self.answer)
+            for one in fields(table)
+            if one.name not in ("pictures", "joints")
+        }
+        entries["picture"] = self.frames.pictures[number] if self.frames.pictures else ""
+        columns = self.survivors._columns(self.rows(number))
+        return Frame(number=number, answer=self.answer.joints[number], **entries, **columns)
 
     def __iter__(self) -> Iterator[Frame]:
         """Go through the frames."""
@@ -345,7 +397,8 @@ class Recovery(Record):
             return Motion(joints=self.path.joints[0], time=time, **shared)
         rows = np.arange(len(self.survivors))
         if which != "all":
-            first = [self.rows(k).start if self[k].joints.size else -1 for k in range(len(self))]
+            every = [self.rows(k) for k in range(len(self))]
+            first = [own.start if own.stop > own.start else -1 for own in every]
             rows = np.asarray(self.answer.survivor if which == "answer" else first)
         frame = np.arange(len(self)) if which != "all" else self.survivors.frame
         known = rows >= 0
@@ -386,48 +439,3 @@ class Recovery(Record):
             columns[f"{joint}_inferred"] = table.inferred[:, j]  # type: ignore[index]
         columns |= {f"q_{k}": table.q[:, k] for k in range(table.q.shape[1])}
         return pandas.DataFrame(columns)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Frame(Record):
-    """One frame of a recovery: columns of `Survivors` and entries of `Frames` and `Answer`, by name.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    number : int
-        Frame, from 0.
-    """
-
-    recovery: Recovery
-    number: int
-
-    def __len__(self) -> int:
-        """Count the survivors."""
-        rows = self.recovery.rows(self.number)
-        return int(rows.stop) - int(rows.start)
-
-    def __dir__(self) -> list[str]:
-        """List the columns too."""
-        names = Survivors.__dataclass_fields__ | Answer.__dataclass_fields__ | Frames.__dataclass_fields__
-        return [*super().__dir__(), "answer", "picture", *names]
-
-    def __getattr__(self, name: str) -> Any:
-        """Return the frame's part of a column of the tables; ``margins`` by check."""
-        if name.startswith("_"):
-            raise AttributeError(name)
-        recovery, k = self.recovery, self.number
-        rows = recovery.rows(k)
-        if name == "margins":
-            return {check: values[rows] for check, values in recovery.survivors.margins.items()}
-        if name == "answer":
-            return recovery.answer.joints[k]
-        if name == "picture":
-            return recovery.frames.pictures[k] if recovery.frames.pictures else ""
-        for table, place in ((recovery.survivors, rows), (recovery.answer, k), (recovery.frames, k)):
-            if name in table.__dataclass_fields__:
-                return getattr(table, name)[place]
-        raise AttributeError(f"a frame has no {name!r}")
-
-    def _facts(self) -> list[str]:
-        return [f"frame {self.number}", f"{len(self)} {'posture' if len(self) == 1 else 'postures'}"]
