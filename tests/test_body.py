@@ -14,11 +14,11 @@ from posekit.body import (
     UNKNOWN_ADULT,
     Figure,
     LengthUncertainty,
-    angles_of,
     load_figure,
     segment_lengths,
     shoulders_are_behind,
     stature_from_lengths,
+    with_head,
 )
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.body.lengths import HIPS_LENGTHS, TORSO_LENGTHS
@@ -102,7 +102,7 @@ def test_legal_postures_have_legal_configurations(figure):
 
 def test_no_branch_violates_the_limits_less():
     """Try all Euler branches, hinge signs and full turns of every limb against the returned one."""
-    angles = angles_of(FIGURE.forward_kinematics(configurations(FIGURE, 500, outside=1.0)))
+    angles = FIGURE.ik.angles(FIGURE.forward_kinematics(configurations(FIGURE, 500, outside=1.0)))
     lower, upper = FIGURE.limits.lower, FIGURE.limits.upper
     for first in (6, 10, 14, 18):
         a = angles[:, first : first + 4]
@@ -177,15 +177,17 @@ def test_unknown_joints_leave_only_their_angles_unknown():
 
 def test_angles_are_those_of_the_configuration_and_the_limits_choose():
     points = FIGURE.forward_kinematics(configurations(FIGURE))
-    np.testing.assert_array_equal(angles_of(points), FIGURE.configurations(points).q[:, FIGURE.angle_index])
+    np.testing.assert_array_equal(
+        FIGURE.ik.angles(with_head(points)), FIGURE.configurations(points).q[:, FIGURE.angle_index]
+    )
     # Limits on the other side of a quarter turn give the other Euler branch.
     lower, upper = FIGURE.limits.lower.copy(), FIGURE.limits.upper.copy()
     k = DOFS.index("left_hip.abduction")
     lower[k], upper[k] = np.pi / 2, 3 * np.pi / 2
     lower[k - 1], upper[k - 1] = lower[k - 1] + np.pi, upper[k - 1] + np.pi
     lower[k + 1], upper[k + 1] = lower[k + 1] + np.pi, upper[k + 1] + np.pi
-    other = angles_of(points, limits=(lower, upper))
-    np.testing.assert_allclose(other[:, k], np.pi - angles_of(points)[:, k], atol=1e-9)
+    other = FIGURE.ik.with_limits(lower, upper).angles(with_head(points))
+    np.testing.assert_allclose(other[:, k], np.pi - FIGURE.ik.angles(with_head(points))[:, k], atol=1e-9)
 
 
 def test_frames_are_the_papers():

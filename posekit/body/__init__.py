@@ -4,7 +4,6 @@ from posekit.body.angles import ClosedForm as ClosedForm
 from posekit.body.angles import Limits as Limits
 from posekit.body.figure import Configurations as Configurations
 from posekit.body.figure import Figure as Figure
-from posekit.body.figure import angles_of as angles_of
 from posekit.body.figure import load_figure as load_figure
 from posekit.body.figure import with_head as with_head
 from posekit.body.lengths import segment_lengths as segment_lengths

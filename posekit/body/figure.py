@@ -441,35 +441,6 @@ def load_figure(path: str | Path | None = None) -> Figure:
     return Figure(urdf=read_text(path), srdf=_built_in().srdf, source=str(path), shared_srdf=True)
 
 
-def angles_of(
-    joints: Array,
-    head: Array | None = None,
-    *,
-    figure: Figure | None = None,
-    limits: tuple[Array, Array] | None = None,
-) -> Array:
-    """Find the 22 angles of postures: what the range check judges and the solver limits.
-
-    Parameters
-    ----------
-    joints : array (N, 14, 3) or (N, 19, 3)
-        Joints, metres; NaN marks an unknown joint.
-    head : array (N, 5, 3), optional
-        The head's points.
-    figure : Figure, optional
-        Gives the head's shape, the place of the pelvis and the default limits. The built-in one by default.
-    limits : (array (22,), array (22,)), optional
-        Lower and upper limits, radians, that choose among equivalent angles.
-
-    Returns
-    -------
-    array (N, 22)
-        Radians, in the order of `posekit.skeleton.DOFS`; NaN if unknown.
-    """
-    ik = (figure or _built_in()).ik
-    return (ik if limits is None else ik.with_limits(*limits)).angles(with_head(joints, head))
-
-
 def _figure(settings: dict[str, Any]) -> Figure:
     return Figure(**settings)
 

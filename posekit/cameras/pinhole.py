@@ -145,10 +145,6 @@ class PinholeCamera(Camera):
             return normalized
         return lens.undistort(normalized, self.distortion, fisheye=self.fisheye)
 
-    def undistorted(self, image: Array) -> Array:
-        """Turn pixels (..., 2) into the pixels of a camera with the same K and no lens."""
-        return np.asarray(self.normalize(image) @ self.K[:2, :2].T + self.K[:2, 2])
-
     def jacobian(self, normalized: Array) -> Array:
         """Return the derivatives (..., 2, 2) of pixels by ideal image points (..., 2)."""
         scale = self.K[:2, :2]

@@ -4,11 +4,8 @@ Arrays are batches: vectors (..., 3), quaternions (..., 4) in Pinocchio's order 
 NaN marks an unknown value and propagates. A result never depends on the size of the batch.
 """
 
-from posekit.geometry.quaternions import quaternion_conjugate as quaternion_conjugate
-from posekit.geometry.quaternions import quaternion_exp as quaternion_exp
 from posekit.geometry.quaternions import quaternion_from_rotation as quaternion_from_rotation
 from posekit.geometry.quaternions import quaternion_log as quaternion_log
-from posekit.geometry.quaternions import quaternion_product as quaternion_product
 from posekit.geometry.quaternions import quaternion_rotate as quaternion_rotate
 from posekit.geometry.quaternions import rotation_from_quaternion as rotation_from_quaternion
 from posekit.geometry.quaternions import shorter_quaternion as shorter_quaternion

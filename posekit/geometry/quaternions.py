@@ -4,19 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.geometry.vectors import Array, cross, dot
-
-
-def quaternion_product(a: Array, b: Array) -> Array:
-    """Return the Hamilton products (..., 4) of quaternions (..., 4): the rotation b, then a."""
-    vector = a[..., 3:] * b[..., :3] + b[..., 3:] * a[..., :3] + cross(a[..., :3], b[..., :3])
-    scalar = a[..., 3:] * b[..., 3:] - dot(a[..., :3], b[..., :3])[..., None]
-    return np.concatenate([vector, scalar], axis=-1)
-
-
-def quaternion_conjugate(q: Array) -> Array:
-    """Return the quaternions (..., 4) of the inverse rotations."""
-    return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
+from posekit.geometry.vectors import Array, cross
 
 
 def quaternion_rotate(q: Array, vectors: Array) -> Array:
@@ -24,13 +12,6 @@ def quaternion_rotate(q: Array, vectors: Array) -> Array:
     axis, w = q[..., :3], q[..., 3:]
     twice = 2.0 * cross(axis, vectors)
     return np.asarray(vectors + w * twice + cross(axis, twice))
-
-
-def quaternion_exp(vectors: Array) -> Array:
-    """Turn rotation vectors (..., 3), axis times angle in radians, into unit quaternions (..., 4)."""
-    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    half = np.sinc(angle / (2 * np.pi)) / 2  # sin(angle / 2) / angle, which is 1/2 at zero
-    return np.concatenate([half * vectors, np.cos(angle / 2)], axis=-1)
 
 
 def quaternion_log(q: Array) -> Array:
