@@ -297,40 +297,34 @@ def write(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
         raise refusal(path, "", f"cameras for {shown(suffix)}", "a .toml or a .json file", "rename it")
     if suffix == ".json":
         return json_file.write(path, {name: camera.fields() for name, camera in cameras.items()})
-    write_bytes(path, "".join(f"{line}\n" for line in _toml(path, cameras)).encode())
+    write_bytes(path, _toml(path, cameras).encode())
 
 
-def _toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> list[str]:
+def _toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> str:
     ups = {camera.up for camera in cameras.values()}
     if len(ups) > 1:
         got = f"worlds that point up along {', '.join(map(shown, sorted(ups)))}"
         raise refusal(path, "up", got, "one world", "write one file each")
-    lines: list[str] = []
+    tables: dict[str, dict[str, Any]] = {}
     for number, (name, camera) in enumerate(cameras.items(), start=1):
-        lines += [f"[cam_{number:02d}]", f"name = {_quoted(name)}"]
+        if one_line(name) != name:
+            raise refusal("camera", "name", shown(name), "characters that print", "rename it")
+        table = tables[f"cam_{number:02d}"] = {"name": name}
         if camera.size is not None:
-            lines.append(f"size = {_listed(camera.size)}")
-        lines.append(f"matrix = [ {', '.join(_listed(row) for row in camera.K)}]")
+            table["size"] = [float(side) for side in camera.size]
         lens = np.zeros(4) if camera.distortion is None else camera.distortion
-        lines.append(f"distortions = {_listed(lens)}")
+        table |= {"matrix": camera.K.tolist(), "distortions": lens.tolist()}
         if camera.R is not None and camera.t is not None:
-            lines.append(f"rotation = {_listed(vector_from_rotation(camera.R))}")
-            lines.append(f"translation = {_listed(camera.t)}")
-        lines.append(f"fisheye = {'true' if camera.fisheye else 'false'}")
+            table |= {"rotation": vector_from_rotation(camera.R).tolist(), "translation": camera.t.tolist()}
+        table["fisheye"] = camera.fisheye
         if camera.deviation:
-            lines += [f"how = {_quoted(camera.how)}", f"deviation = {camera.deviation!r}"]
-        lines.append("")
-    lines += ["[metadata]", "adjusted = false", "error = 0.0"]
+            table |= {"how": camera.how, "deviation": camera.deviation}
+    tables["metadata"] = {"adjusted": False, "error": 0.0}
     if ups - {"", "+z"}:
-        lines.append(f'up = "{ups.pop()}"')
-    return lines
-
-
-def _quoted(word: str) -> str:
-    if one_line(word) != word:
-        raise refusal("camera", "name", shown(word), "characters that print", "rename it")
-    return json.dumps(word, ensure_ascii=False)
-
-
-def _listed(values: Any) -> str:
-    return "[ " + ", ".join(repr(float(value)) for value in values) + "]"
+        tables["metadata"]["up"] = ups.pop()
+    lines = []
+    for title, table in tables.items():
+        # TOML spells these values as JSON does.
+        entries = (f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in table.items())
+        lines.append(f"[{title}]\n{''.join(entries)}")
+    return "\n".join(lines)

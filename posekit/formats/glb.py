@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from posekit.errors import refusal
 from posekit.files import write_bytes
@@ -205,13 +206,10 @@ def _capsule(start: Array, end: Array, radius: float) -> tuple[Array, Array, Int
     below = half - 2 * np.sin(lift)[:, None, None] * axis
     normals = np.concatenate([-axis[None], *below[::-1], *half, axis[None]])
     centres = np.where(np.arange(len(normals))[:, None] < len(normals) // 2, start, end)
-    k = np.arange(RING_CORNERS)
-    after, last = (k + 1) % RING_CORNERS, 1 + 2 * HALF_SPHERE_RINGS * RING_CORNERS
-    faces = [np.stack([np.zeros_like(k), 1 + after, 1 + k], axis=-1)]
-    for low in range(1, last - RING_CORNERS, RING_CORNERS):
-        high = low + RING_CORNERS
-        faces.append(np.stack([low + k, low + after, high + after], axis=-1))
-        faces.append(np.stack([low + k, high + after, high + k], axis=-1))
-    top = last - RING_CORNERS
-    faces.append(np.stack([top + k, top + after, np.full_like(k, last)], axis=-1))
-    return centres + radius * normals, normals, np.concatenate(faces)
+    vertices = centres + radius * normals
+    hull = ConvexHull(vertices)
+    faces, corners = hull.simplices.astype(np.intp), vertices[hull.simplices]
+    outward = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    turned = (outward * hull.equations[:, :3]).sum(axis=1) < 0
+    faces[turned] = faces[turned, ::-1]
+    return vertices, normals, faces

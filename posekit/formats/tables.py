@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, Final
 
@@ -120,14 +120,12 @@ class Table:
 
     def checked(self, name: str) -> Array:
         """Return a column as numbers (N,), or refuse a cell that is neither a number nor empty."""
-        values = self.column(name)
-        if not self._columns and np.isnan(values).any():
-            place = self.names.index(name)
-            for k in np.flatnonzero(np.isnan(values)).tolist():
-                if (cell := self.cells[k][place]).casefold() not in MISSING:
-                    where = f"line {self.numbers_of_lines[len(self.head) + k]}, {name}"
-                    raise refusal(self.source, where, shown(cell), "a number, or nothing", "correct the cell")
-        return values
+        if self._columns:
+            return self.column(name)
+        start = len(self.head)
+        return checked(
+            self.texts(name), self.source, lambda k: f"line {self.numbers_of_lines[start + k]}, {name}"
+        )
 
 
 def parse(data: bytes, source: str) -> Table:
@@ -148,6 +146,15 @@ def numbers(cells: list[str]) -> Array:
         return np.array(cells, dtype=np.float64)
     except ValueError:
         return np.array([_number(cell) for cell in cells], dtype=np.float64)
+
+
+def checked(cells: list[str], source: str, place: Callable[[int], str]) -> Array:
+    """Turn cells into numbers (N,), or refuse one that is neither a number nor empty, by its place in the file."""
+    values = numbers(cells)
+    for k in np.flatnonzero(np.isnan(values)).tolist():
+        if cells[k].casefold() not in MISSING:
+            raise refusal(source, place(k), shown(cells[k]), "a number, or nothing", "correct the cell")
+    return values
 
 
 def _number(cell: str) -> float:

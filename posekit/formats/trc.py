@@ -19,7 +19,7 @@ from posekit.errors import refusal, shown
 from posekit.files import write_bytes
 from posekit.formats.body_checks import UNIT_WORDS, points_motion, times
 from posekit.formats.options import Options
-from posekit.formats.tables import MISSING, Table, numbers
+from posekit.formats.tables import Table, checked, numbers
 from posekit.geometry import Array
 
 if TYPE_CHECKING:
@@ -134,17 +134,13 @@ def _rows(table: Table, start: int, width: int, path: str) -> Array:
         cells += row
     if not cells:
         raise refusal(path, "", "no frames", "a row a frame", "check how it was written")
-    values = numbers(cells).reshape(-1, width)
+    lines = table.numbers_of_lines[start:]
+    values = checked(cells, path, lambda k: f"line {lines[k // width]}, column {k % width + 1}").reshape(
+        -1, width
+    )
     if np.isinf(values).any():
-        row_index = int(np.argmax(np.isinf(values).any(axis=1)))
-        where = f"line {table.numbers_of_lines[start + row_index]}"
+        where = f"line {lines[int(np.argmax(np.isinf(values).any(axis=1)))]}"
         raise refusal(path, where, "an infinite number", "finite numbers, or nothing", "correct the cell")
-    unread = np.isnan(values)
-    if unread.any():
-        for place in np.flatnonzero(unread.ravel()).tolist():
-            if cells[place].casefold() not in MISSING:
-                where = f"line {table.numbers_of_lines[start + place // width]}, column {place % width + 1}"
-                raise refusal(path, where, shown(cells[place]), "a number, or nothing", "correct the cell")
     return values
 
 
