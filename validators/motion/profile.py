@@ -18,24 +18,15 @@ PROFILE_SCHEMA: Final = "posekit.profile/1"
 #: Profiles that come with the package.
 BUILT_IN: Final = ("posekit", "phuma", "protomotions", "holomotion", "skating")
 
-#: Checks over time by name, in the order in which they are reported.
+#: Modules with checks over time, in the order in which their checks are reported.
+_MODULES: Final = (orientation, frames, speed, standing, sliding, published, walking_phases)
+
+#: Checks over time by name.
 MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
     one.name: one
-    for one in (
-        *(
-            orientation.orientation,
-            frames.timing,
-            frames.frozen,
-            frames.repeated,
-            frames.swap,
-            frames.teleport,
-        ),
-        *(speed.speed, speed.acceleration, speed.jerk, published.root_jerk, frames.jitter, frames.drift),
-        *(speed.joint_velocity, standing.penetration, standing.floating, standing.support, sliding.sliding),
-        *(standing.balance_still, published.skating, published.contact_share, published.root_height),
-        *(published.support_distance, published.above_ground, published.root_speed, published.body_speed),
-        walking_phases.walking_phases,
-    )
+    for module in _MODULES
+    for one in vars(module).values()
+    if isinstance(one, FunctionCheck) and one.over_time
 }
 
 #: Checks over time with their thresholds, in the order of `MOTION_CHECKS`.
@@ -79,7 +70,6 @@ def _check_thresholds(one: FunctionCheck, thresholds: dict[str, Any], source: st
     for key, value in thresholds.items():
         if key not in known:
             raise refusal(source, field, cut(key), f"some of {', '.join(known)}", nearest(key, known))
-        kinds = (int, float) if type(known[key]) in (int, float) else (type(known[key]),)
-        if type(value) not in kinds:
-            expected = f"a {type(known[key]).__name__}"
-            raise refusal(source, f"{field}.{key}", shown(value), expected, "correct it")
+        kind = type(known[key])
+        if type(value) is not kind and (kind is not float or type(value) is not int):
+            raise refusal(source, f"{field}.{key}", shown(value), f"a {kind.__name__}", "correct it")
