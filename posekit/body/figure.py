@@ -350,6 +350,13 @@ class Figure(Robot):
             Have no effect: the closed form needs no start, and depends on no other frame.
         """
         points = with_head(joints, head)
+        q = self.inverse_kinematics(points)
+        gap = np.linalg.norm(self.points(q) - points[:, : len(JOINTS)], axis=-1)
+        placed = np.isfinite(q[:, :7]).all(axis=1)
+        return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
+
+    def inverse_kinematics(self, points: Array) -> Array:
+        """Return the configurations (N, nq) of postures (N, 19, 3) alone: see `configurations`."""
         R_torso = _completed_frames(points, torso_frame(*(points[:, JOINT[joint]] for joint in TORSO)))
         q = np.full((len(points), self.model.nq), np.nan)
         q[:, :3] = points[:, 0]
@@ -361,9 +368,7 @@ class Figure(Robot):
         neutral = np.clip(0.0, self.limits.lower, self.limits.upper)
         angles[whole] = np.where(np.isnan(angles[whole]), neutral, angles[whole])
         q[:, self.angle_index] = angles
-        gap = np.linalg.norm(self.points(q) - points[:, : len(JOINTS)], axis=-1)
-        placed = np.isfinite(q[:, :7]).all(axis=1)
-        return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
+        return q
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
         """Return the five head points in the head link's frame, some of them replaced."""

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, unit
+from posekit.geometry import Array, dot, unit
 from posekit.skeleton import PARENTS, SEGMENTS, TREE_SEGMENTS
 
 #: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
@@ -150,10 +150,10 @@ def representatives(shape: Array, weight: Array, hold: float) -> tuple[NDArray[n
         Probability of each and of what it stands for.
     """
     order = np.argsort(-weight, kind="stable")[:MAX_COMPARED]
-    # |a - b|^2 = |a|^2 + |b|^2 - 2 a.b, of each joint about its mean; an unknown joint is far from none.
-    place = shape[order].transpose(1, 0, 2)
-    place = np.nan_to_num(place - place.mean(axis=1, keepdims=True))
-    square = (place**2).sum(axis=2)
+    # |a - b|^2 = |a|^2 + |b|^2 - 2 a.b, counted from the likeliest; an unknown joint is far from none.
+    place = (shape[order] - shape[order[:1]]).transpose(1, 0, 2)
+    place = np.where(np.isnan(place), 0.0, place)
+    square = dot(place, place)
     within = (square - WITHIN_METRES**2) / 2
     near = np.ones((len(order), len(order)), dtype=np.bool_)
     step = 1 + COMPARED_AT_ONCE // near.size
@@ -210,8 +210,8 @@ def _draws(shape: Array, covariance: Array | None, weight: Array, relative: bool
 
 def _nearer(draws: Array, weight: Array, unlisted: float) -> tuple[NDArray[np.intp], Array]:
     """Return for each segment whether its outer end is nearer (1), farther (-1) or neither, and how sure that is."""
-    ends = np.arange(1, len(PARENTS))
-    gap = draws[:, :, ends, 2] - draws[:, :, list(PARENTS[1:]), 2]
+    depth = draws[..., 2]
+    gap = depth[..., 1:] - depth[..., PARENTS[1:]]
     near, far = weight @ np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES]).mean(axis=2)
     each = np.stack([1.0 - near - far, near, far])
     best = each.argmax(axis=0)

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from posekit.body import Figure
+from posekit.body import Figure, with_head
 from posekit.cameras import View
 from posekit.recovery.answer import FrameAnswer
 from posekit.recovery.recovery import Answer, Frames, Recovery, Survivors
@@ -99,7 +99,7 @@ def gathered(
     columns = stacked([{k: v for k, v in one.items() if k != "margins"} for one in tables]) or empty
     survivors = Survivors(
         frame=np.repeat(np.arange(len(found)), counts),
-        q=person.configurations(columns["joints"], columns["head"]).q,
+        q=person.inverse_kinematics(with_head(columns["joints"], columns["head"])),
         margins=margins,
         **columns,
     )
