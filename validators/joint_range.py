@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,15 +107,15 @@ class JointRange:
         if body.tolerance is None or printed or self.part == "neck":
             return None
         limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
+        given: dict[str, Any] = {
+            "points": [JOINT[name] for name in self.points],
+            "tolerance": body.angle_tolerance(),
+            "limits": limits.numbers,
+        }
         if self.part == "pelvis":
-            return [step(PELVIS, DOFS[3:6], tolerance=body.angle_tolerance(), limits=limits.numbers)]
+            return [step(PELVIS, DOFS[3:6], **given)]
         limb = LIMBS.index(self.part)
-        points = (
-            (STARTS[limb], MIDDLES[limb]) if self.upper_only else (STARTS[limb], MIDDLES[limb], ENDS[limb])
-        )
-        places, _ = _places(limits, limb)
-        tolerance = body.angle_tolerance()
-        return [step(LIMB, places, points=points, tolerance=tolerance, limb=limb, limits=limits.numbers)]
+        return [step(LIMB, _places(limits, limb)[0], limb=limb, **given)]
 
     def judge(self, body: Body) -> Judgement:
         """Measure the angles of the parts."""

@@ -75,7 +75,7 @@ class RigidParts:
         if self.torso:
             torso = [*body.figure.neutral_points[TORSO_POINTS].ravel(), float(not body.figure.side_known)]
             tolerance = body.rigid_tolerance(RIGID_SEGMENTS[0])
-            found.append(step(TORSO_STEP, ["torso"], tolerance=tolerance, numbers=torso))
+            found.append(step(TORSO_STEP, ["torso"], points=TORSO_POINTS, tolerance=tolerance, numbers=torso))
         return found
 
     def judge(self, body: Body) -> Judgement:

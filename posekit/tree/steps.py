@@ -26,8 +26,8 @@ class Step(NamedTuple):
     ----------
     places : tuple of str
         What it judges.
-    numbers : tuple of 21 float
-        Kind, limb, tolerance, the four joints that are read (-1 for none), and the numbers of the kind.
+    numbers : tuple of 25 float
+        Kind, limb, tolerance, the joints that are read (eight, -1 for none), and the numbers of the kind.
     limits : record, optional
         Joint ranges (`posekit.solver.Limits.numbers`), which limbs and pelvis are judged by.
     """
@@ -48,7 +48,7 @@ def step(
     limits: NDArray[np.void] | None = None,
 ) -> Step:
     """Make a step; `points` and `numbers` are filled up."""
-    read = (*points, *(-1,) * (4 - len(points)))
+    read = (*points, *(-1,) * (8 - len(points)))
     return Step(
         tuple(places), (kind, limb, tolerance, *read, *numbers, *(0.0,) * (14 - len(numbers))), limits
     )

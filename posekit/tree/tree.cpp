@@ -13,13 +13,13 @@ namespace py = pybind11;
 namespace {
 
 constexpr int PARENT[J] = {-1, 0, 0, 0, 3, 3, 1, 2, 6, 7, 4, 5, 10, 11};
-constexpr int PELVIS_READS[] = {0, 1, 2, 3, 4, 5}, TORSO_READS[] = {0, 1, 2, 3};
+constexpr int FIRST[J] = {0, 1, 3, 5, 7, 11, 15, 19, 23, 31, 39, 47, 55, 71};  // column of each joint's first candidate
 constexpr double PARALLEL = 1e-30, NEAR = 0.1;  // as in robots/collision.py and validators/collision.py
 enum Kind { BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES };
 
 // Level and number of the first reason, then the numbers of steps.py.
 struct Step {
-  double level, reason, kind, limb, tolerance, points[4], numbers[14];
+  double level, reason, kind, limb, tolerance, points[8], numbers[14];
 };
 struct Verdict {
   int place;  // of the first violation; PASSED, or UNKNOWN where it was not asked
@@ -27,28 +27,12 @@ struct Verdict {
 };
 constexpr int PASSED = -1, UNKNOWN = -2;
 
-// The branches on which a joint depends, and the column of its first candidate.
-struct Places {
-  int first[J + 1], path[J][4], depth[J];
-  Places() {
-    first[0] = 0;
-    for (int j = 0; j < J; ++j) {
-      depth[j] = 0;
-      if (j) {
-        const int p = PARENT[j];
-        for (; depth[j] < depth[p]; ++depth[j]) path[j][depth[j]] = path[p][depth[j]];
-        path[j][depth[j]++] = j;
-      }
-      first[j + 1] = first[j] + (1 << depth[j]);
-    }
-  }
-  int column(int joint, int level, std::int64_t code) const {
-    int bits = 0;
-    for (int k = 0; k < depth[joint]; ++k) bits = bits << 1 | (code >> (level - path[joint][k]) & 1);
-    return first[joint] + bits;
-  }
-};
-const Places PLACES;
+// Column of a joint's position at a node; its own branch is the lowest bit of the candidate.
+int column_of(int joint, int level, std::int64_t code) {
+  int candidate = 0;
+  for (int j = joint, k = 0; j > 0; j = PARENT[j]) candidate |= (code >> (level - j) & 1) << k++;
+  return FIRST[joint] + candidate;
+}
 
 // Distance between segments g + t b and s a, s and t in [-1, 1] (robots/collision.py).
 double segment_distance(Vec g, Vec a, Vec b) {
@@ -85,9 +69,9 @@ Verdict judged(const Step& s, const Limits& L, const double x[J][3]) {
     if (found.place == PASSED && std::min(value - lower, upper - value) < -tolerance)
       found = {place, value, lower, upper};
   };
-  const int p[4] = {(int)s.points[0], (int)s.points[1], (int)s.points[2], (int)s.points[3]};
+  auto point = [&](int k) { return vec(x[(int)s.points[k]]); };
   switch ((int)s.kind) {
-    case DISTANCE: test(0, norm(vec(x[p[1]]) - vec(x[p[0]])), n[0], n[0], s.tolerance); break;
+    case DISTANCE: test(0, norm(point(1) - point(0)), n[0], n[0], s.tolerance); break;
     case TORSO: {
       const Frame R = torso_of(x);
       double value = placement(R, x, n, 1);
@@ -97,9 +81,9 @@ Verdict judged(const Step& s, const Limits& L, const double x[J][3]) {
     }
     case PELVIS: {
       const Pelvis angles = pelvis_of(torso_of(x), hips_of(x, L.between_hips > 0));
-      const double degree = 180 / M_PI;
+      const double unit = 180 / M_PI;
       for (int k = 0; k < 3; ++k)
-        test(k, angles.g[k] * PELVIS_SIGN[k] * degree, L.pelvis[k][0] * degree, L.pelvis[k][1] * degree, s.tolerance);
+        test(k, angles.g[k] * PELVIS_SIGN[k] * unit, L.pelvis[k][0] * unit, L.pelvis[k][1] * unit, s.tolerance);
       break;
     }
     case LIMB: {
@@ -114,7 +98,7 @@ Verdict judged(const Step& s, const Limits& L, const double x[J][3]) {
     case CAPSULES: {
       Vec middle[2], half[2];
       for (int k = 0; k < 2; ++k) {
-        const Vec start = vec(x[p[2 * k]]), along = vec(x[p[2 * k + 1]]) - start;
+        const Vec start = point(2 * k), along = point(2 * k + 1) - start;
         const Vec axis = (1 / norm(along)) * along;
         middle[k] = start + n[2 * k] * axis, half[k] = n[2 * k + 1] * axis;
       }
@@ -138,14 +122,11 @@ struct Ask {
   std::vector<int> reads, support;
   std::vector<Verdict> known;
   explicit Ask(const Step& one) : step(&one) {
-    const int kind = (int)one.kind, m = (int)one.limb;
-    if (kind == TORSO) reads.assign(TORSO_READS, TORSO_READS + 4);
-    else if (kind == PELVIS || kind == LIMB) reads.assign(PELVIS_READS, PELVIS_READS + (kind == LIMB && m < 2 ? 4 : 6));
-    for (double point : one.points)
-      if (point >= 0 && kind != TORSO && kind != PELVIS) reads.push_back((int)point);
     bool on[J] = {};
-    for (int joint : reads)
-      for (int k = 0; k < PLACES.depth[joint]; ++k) on[PLACES.path[joint][k]] = true;
+    for (double point : one.points) {
+      if (point >= 0) reads.push_back((int)point);
+      for (int j = (int)point; j > 0; j = PARENT[j]) on[j] = true;
+    }
     for (int j = 1; j < J; ++j)
       if (on[j]) support.push_back(j);
     known.resize(std::size_t(1) << support.size());
@@ -166,8 +147,7 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
   std::vector<std::int64_t> left_frame, left_code, lost, nodes, next;
   std::vector<double> numbers;
   const std::int64_t *frames = frame.data(), *codes = code.data();
-  double x[J][3];
-  for (double* one = x[0]; one < x[0] + 3 * J; ++one) *one = NAN;
+  double x[J][3] = {};
   for (py::ssize_t at = 0, end = 0; at < frame.size(); at = end) {
     const std::int64_t f = frames[at];
     for (nodes.clear(); end < frame.size() && frames[end] == f; ++end) nodes.push_back(codes[end]);
@@ -186,7 +166,7 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
       for (std::int64_t node : nodes) {
         if ((int)s.kind == BRANCH) {
           for (std::int64_t child = node << 1, last = child + 1; child <= last; ++child) {
-            const int column = PLACES.column(level, level, child), kind = states[column];
+            const int column = column_of(level, level, child), kind = states[column];
             if (kind == 0) next.push_back(child);
             else lose(child, kind - 1, shortfall[column], -INFINITY, kind == 1 ? 0.0 : INFINITY);
           }
@@ -196,9 +176,8 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
         for (int joint : ask.support) key = key << 1 | (node >> (level - joint) & 1);
         Verdict& found = ask.known[key];
         if (found.place == UNKNOWN) {
-          for (int joint : ask.reads) std::memcpy(x[joint], positions[PLACES.column(joint, level, node)], sizeof x[joint]);
-          if ((int)s.kind == LIMB && s.points[2] < 0)
-            for (double& one : x[END[(int)s.limb]]) one = NAN;
+          for (double& one : x[END[(int)s.limb]]) one = NAN;  // the lower segment may not be read
+          for (int joint : ask.reads) std::memcpy(x[joint], positions[column_of(joint, level, node)], sizeof x[joint]);
           found = judged(s, L, x);
         }
         if (found.place == PASSED) next.push_back(node);
