@@ -21,7 +21,7 @@ from posekit.body import (
     with_head,
 )
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.body.lengths import HIPS_LENGTHS, TORSO_LENGTHS
+from posekit.body.lengths import HIPS_LENGTHS, TORSO_LENGTHS, torso_points
 from posekit.errors import InputError
 from posekit.robots import Robot, load_robot
 from posekit.skeleton import DOFS, JOINT, POINTS, SEGMENT_NAMES, SEGMENTS
@@ -279,6 +279,47 @@ def test_lengths_that_do_not_close_become_the_nearest_that_do(changed, part):
     count = 4 if part == TORSO_LENGTHS else 3
     found = [minimize(lambda x: cost(distances(x)), rng.normal(0, 0.3, 3 * count)).fun for _ in range(8)]
     assert cost([figure.lengths[name] for name in part]) <= min(found) * (1 + 1e-4) + 1e-9
+
+
+@pytest.mark.parametrize(("share", "possible"), [(0.999, True), (1.001, False)])
+def test_the_width_that_a_torso_can_have_is_said(share, possible):
+    lengths = dict(FIGURES["uneven"].lengths)
+    with pytest.raises(InputError) as error:
+        torso_points({**lengths, "right_shoulder-left_shoulder": 0.6})
+    low, high = (float(one) for one in re.findall(r"expected ([\d.]+) to ([\d.]+) m", str(error.value))[0])
+    assert low < lengths["right_shoulder-left_shoulder"] < high
+    lengths["right_shoulder-left_shoulder"] = share * high
+    if not possible:
+        with pytest.raises(InputError, match="right_shoulder-left_shoulder"):
+            torso_points(lengths)
+        return
+    ends = dict(
+        zip(("neck", "right_shoulder", "left_shoulder", "pelvis"), torso_points(lengths), strict=True)
+    )
+    for name in TORSO_LENGTHS:
+        a, b = name.split("-")
+        assert np.linalg.norm(ends[a] - ends[b]) == pytest.approx(lengths[name])
+
+
+#: de Leva 1996, table 4, women and men: mass and centre (%), radii of gyration (%): sagittal, transverse, longitudinal.
+DE_LEVA = {
+    "upper_arm": ("shoulder-left_elbow", (2.55, 57.54, 27.8, 26.0, 14.8), (2.71, 57.72, 28.5, 26.9, 15.8)),
+    "thigh": ("hip-left_knee", (14.78, 36.12, 36.9, 36.4, 16.2), (14.16, 40.95, 32.9, 32.9, 14.9)),
+}
+
+
+@pytest.mark.parametrize("link", DE_LEVA)
+def test_limbs_have_the_inertia_of_the_literature(link):
+    segment, *tables = DE_LEVA[link]
+    length = FIGURE.lengths[f"left_{segment}"]
+    mass, centre, *radii = np.mean(tables, axis=0) / 100
+    model = FIGURE.model
+    inertia = model.inertias[model.frames[model.getFrameId(f"left_{link}")].parentJoint]
+    body = 22.33 * stature_from_lengths(FIGURE.lengths) ** 2
+    assert inertia.mass == pytest.approx(mass * body, rel=2e-3)
+    assert np.linalg.norm(inertia.lever) == pytest.approx(centre * length, rel=1e-3)
+    moments = inertia.mass * (np.array(radii) * length) ** 2
+    np.testing.assert_allclose(np.diag(inertia.inertia), moments, rtol=5e-3)
 
 
 def test_capsules_are_pinocchios():

@@ -638,6 +638,17 @@ def test_the_up_axis_is_told_by_how_bodies_stand(tmp_path: Path, up: str) -> Non
     np.savez(tmp_path / "stated.npz", **arrays, up="+y")
     stated = posekit.open(tmp_path / "stated.npz")
     assert stated.up == "+y" and bool(stated.warnings) == (up != "+y")
+    assert posekit.open(tmp_path / "stated.npz", up=up).up == up
+    assert posekit.open(tmp_path / "stated.npz", up=up[1:]).up == f"+{up[1:]}"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"up": "w"}, {"up": "y+"}, {"unit": "km"}, {"rate": 0.0}, {"rate": np.inf}]
+)
+def test_wrong_options_are_refused_by_name(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    file = npz(tmp_path, walking().joints)
+    with pytest.raises(posekit.InputError, match=f"{next(iter(wrong))}: got"):
+        posekit.open(file, **wrong)
 
 
 def test_a_person_on_the_head_is_said_in_formats_with_a_custom(tmp_path: Path) -> None:

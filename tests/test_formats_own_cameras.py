@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +165,22 @@ def test_millimetres_are_told_by_their_size(tmp_path: Path) -> None:
     (tmp_path / "cm.toml").write_text(TOML.replace(str(T), str([100 * one for one in T])))
     with pytest.raises(InputError, match=r"a camera 351 from the origin.*--unit cm or mm"):
         posekit.open(tmp_path / "cm.toml")
+
+
+@pytest.mark.parametrize(("far", "unit"), [(99.0, 1.0), (101.0, None), (999.0, None), (1001.0, 1e-3)])
+def test_the_unit_of_a_camera_is_told_up_to_100_and_from_1000(
+    far: float, unit: float | None, tmp_path: Path
+) -> None:
+    t = [0.6 * far, 0.0, 0.8 * far]
+    (tmp_path / "c.toml").write_text(TOML.replace(str(T), str(t)))
+    if unit is None:
+        with pytest.raises(InputError, match=f"a camera {far:.0f} from the origin"):
+            posekit.open(tmp_path / "c.toml")
+        return
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        camera = posekit.open(tmp_path / "c.toml")["left"]
+    assert camera.t == pytest.approx([unit * one for one in t]) and len(told) == (unit < 1)
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2, 3])

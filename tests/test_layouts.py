@@ -97,6 +97,10 @@ def test_a_users_layout_is_a_toml_file(tmp_path: Path) -> None:
         ('[landmarks]\nleft_knee = "a"\nright_knee = "a"', "points of its own"),
         ('points = ["a", "A "]\n[landmarks]\n', "letters or digits"),
         ("[landmarks", "TOML"),
+        ('[landmarks]\nneck = ["a", "a"]', "a name twice"),
+        ('points = ["a", "b"]\n[landmarks]\nneck = ["a", "c"]', "different names of its points"),
+        ("[landmarks]\nneck = []", "a list of names"),
+        ("[landmarks]\nneck = [1]", "a list of names"),
         ('source = "x"', "landmarks"),
     ],
 )

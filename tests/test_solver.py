@@ -473,12 +473,17 @@ def test_trunks_with_hidden_joints_start_with_the_figures_shape(hidden):
         assert np.median(nearest) < 0.12
 
 
-def test_residuals_are_the_deviations_of_points_lengths_and_priors():
-    problem = observed(length_deviation=0.02, size_deviation=0.03, root_covariance=0.05**2 * np.eye(3))
+@pytest.mark.parametrize(
+    "camera", [CAMERA, ScaledOrthographicCamera(scale=250.0)], ids=["pinhole", "orthographic"]
+)
+def test_residuals_are_the_deviations_of_points_lengths_and_priors(camera):
+    seen = camera.project(TRUTH) + 2.0 * NOISE
+    known = {"length_deviation": 0.02, "size_deviation": 0.03, "root_covariance": 0.05**2 * np.eye(3)}
+    problem = observed(image=seen, camera=camera, **known)
     modes = solve(problem)
     found = modes.residuals()
     joints, frame = modes.joints, modes.frame
-    image = np.linalg.norm(CAMERA.project(joints) - (IMAGE + 2.0 * NOISE)[frame], axis=2) / 2.0
+    image = np.linalg.norm(camera.project(joints) - seen[frame], axis=2) / 2.0
     near = image < 3  # the image is linearised at the observed point
     for j, name in enumerate(JOINTS):
         np.testing.assert_allclose(

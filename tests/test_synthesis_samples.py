@@ -13,7 +13,7 @@ from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCame
 from posekit.errors import InputError
 from posekit.motion import Motion
 from posekit.robots import load_robot
-from posekit.samples import ELBOW_BACK, JUMP_FRAME, ROBOT_MISTAKES, SAMPLE_FILES, samples
+from posekit.samples import ELBOW_BACK, JUMP_FRAME, ROBOT_MISTAKES, SAMPLE_FILES, WALK_FRAMES, samples
 from posekit.skeleton import JOINT
 
 
@@ -55,6 +55,15 @@ def test_key_points_lie_at_the_projections_of_the_walk(folder: Path) -> None:
     found = seen.points[:, [list(seen.names).index(name) for name in ("right_wrist", "left_ankle")]]
     assert found.shape == pixels.shape
     assert np.abs(found - pixels).max() < 9 and np.std(found - pixels) == pytest.approx(2, rel=0.4)
+
+
+def test_the_walk_stands_on_the_ground_in_step_with_its_rate(folder: Path) -> None:
+    walk = posekit.open(folder / "walk.npz")
+    ankles = walk.points(("right_ankle", "left_ankle"))
+    assert ankles[..., 1].min() == pytest.approx(0.08) and ankles[..., 1].max() < 0.5
+    assert walk.rate == pytest.approx(30.0) and len(walk) == WALK_FRAMES and walk.time[0] == 0
+    speed = np.diff(walk.points(("pelvis",))[:, 0], axis=0) * walk.rate
+    assert 0.8 < np.linalg.norm(speed.mean(axis=0)) < 1.6 and abs(speed.mean(axis=0)[1]) < 0.02
 
 
 def test_the_jump_has_a_cut_and_an_elbow_that_bends_backward(folder: Path) -> None:
