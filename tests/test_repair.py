@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -220,6 +221,111 @@ def test_a_bvh_file_keeps_every_line_that_needs_no_change(
             assert moved <= {"RightArm", "RightForeArm"}
     if fault == "frozen":
         assert f"{len(frames)} frames interpolated" in done.notes
+
+
+def test_a_lifted_span_is_put_back_and_all_other_lines_stay(clean_bvh: Path, tmp_path: Path) -> None:
+    lines = [line.split() for line in motion_lines(clean_bvh)]
+    for frame in range(SPAN.start, SPAN.stop):
+        lines[frame][1] = f"{float(lines[frame][1]) + 10:.6f}"
+    broken, target = tmp_path / "broken.bvh", tmp_path / "repaired.bvh"
+    head = clean_bvh.read_text().split("MOTION")[1].splitlines()[:3]
+    broken.write_text(hierarchy(clean_bvh) + "MOTION" + "\n".join([*head, *map(" ".join, lines)]) + "\n")
+    done = posekit.repair(broken, target)
+    assert posekit.validate(target).ok.all(), done.notes
+    pairs = zip(motion_lines(broken), motion_lines(target), strict=True)
+    assert {k for k, (a, b) in enumerate(pairs) if a != b} == set(range(SPAN.start, SPAN.stop))
+
+
+def test_a_first_frame_at_rest_becomes_part_of_the_motion(clean: posekit.Motion) -> None:
+    joints = np.asarray(clean.joints).copy()
+    rest = np.asarray(posekit.load_figure().neutral_points[:14])
+    joints[0] = rest @ np.diag([-1.0, -1.0, 1.0]) + [0.3, 0.2, 1.4 - rest[0, 2]]  # faces the other way
+    broken = replace(clean, joints=joints)
+    assert not Validator().check(broken).ok[0]
+    done = repair(broken)
+    assert done.report.ok.all(), done.notes
+    assert "1 frame continued to an end of the clip" in done.notes
+    assert done.motion is not None
+    np.testing.assert_array_equal(np.asarray(done.motion.joints)[1:], joints[1:])
+
+
+@pytest.mark.parametrize("ending", ["trc", "csv", "npz"])
+def test_points_that_are_no_joints_keep_their_columns(
+    clean: posekit.Motion, tmp_path: Path, ending: str
+) -> None:
+    """Of a file in millimetres with a sword only the joints move, and only where they jumped."""
+    path, target = tmp_path / f"given.{ending}", tmp_path / f"repaired.{ending}"
+    names = [*JOINTS, "sword"]
+    joints = jumped(np.asarray(clean.joints))
+    points = 1000 * np.concatenate([joints, np.full((FRAMES, 1, 3), 0.125)], axis=1)
+    if ending == "npz":
+        np.savez(path, joints=points, joint_names=np.array(names), fps=RATE, unit="mm", up="z", mine=[1, 2])
+    elif ending == "trc":
+        head = [
+            "PathFileType\t4\t(X/Y/Z)\tgiven.trc",
+            "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
+            f"{RATE}\t{RATE}\t{FRAMES}\t{len(names)}\tmm",
+            "Frame#\tTime\t" + "\t\t\t".join(names),
+            "\t\t" + "\t".join(f"{axis}{k + 1}" for k in range(len(names)) for axis in "XYZ"),
+        ]
+        rows = [
+            "\t".join([str(k + 1), f"{k / RATE:.6f}", *(f"{v:.4f}" for v in row.ravel())])
+            for k, row in enumerate(points)
+        ]
+        path.write_text("\r\n".join([*head, "", *rows]) + "\r\n", newline="")
+    else:
+        head = ["time", *(f"{name}_{axis}" for name in names for axis in "xyz"), "remark"]
+        rows = [
+            ",".join([f"{k / RATE:.6f}", *(f"{v:.4f}" for v in row.ravel()), "so"])
+            for k, row in enumerate(points)
+        ]
+        path.write_text("\n".join([",".join(head), *rows]) + "\n")
+    facts = {"unit": "mm", "up": "+z"}
+    assert not posekit.validate(path, **facts).ok.all()
+    done = repair(path, target, **facts)
+    assert posekit.validate(target, **facts).ok.all(), done.notes
+    if ending == "npz":
+        old, new = np.load(path), np.load(target)
+        assert new.files == old.files
+        np.testing.assert_array_equal(new["mine"], old["mine"])
+        changed = np.argwhere((new["joints"] != old["joints"]).any(axis=2))
+        assert set(changed[:, 0].tolist()) == {40}
+        assert len(names) - 1 not in changed[:, 1]
+    else:
+        pairs = list(zip(path.read_bytes().splitlines(), target.read_bytes().splitlines(), strict=True))
+        [(before, after)] = [pair for pair in pairs if pair[0] != pair[1]]
+        assert b"125.0000" in after
+        assert len(after.split(b".")) == len(before.split(b"."))
+
+
+def test_a_robots_pickle_keeps_its_keys_and_says_what_does_not_follow(tmp_path: Path) -> None:
+    robot = posekit.load_figure()
+    count = len(robot.configuration_names) - 7
+    angles = np.zeros((FRAMES, count), dtype=np.float32)
+    names = list(robot.configuration_names)[7:]
+    t = np.arange(FRAMES) / RATE
+    angles[:, names.index("right_elbow_flexion")] = 0.7 + 0.3 * np.sin(3 * t)
+    angles[:, names.index("left_knee_flexion")] = 0.35
+    angles[SPAN, names.index("right_elbow_flexion")] = 3.05
+    held = {
+        "fps": RATE,
+        "root_pos": np.tile(np.float32([0, 0, 1.3]), (FRAMES, 1)),
+        "root_rot": np.tile(np.float32([0, 0, 0, 1]), (FRAMES, 1)),
+        "dof_pos": angles,
+        "local_body_pos": np.random.default_rng(0).normal(size=(FRAMES, 5, 3)).astype(np.float32),
+        "link_body_list": ["a", "b", "c", "d", "e"],
+    }
+    path, target = tmp_path / "walk.pkl", tmp_path / "repaired.pkl"
+    path.write_bytes(pickle.dumps(held))
+    assert not posekit.validate(path, urdf=robot).ok.all()
+    done = repair(path, target, urdf=robot)
+    assert posekit.validate(target, urdf=robot).ok.all(), done.notes
+    found = pickle.loads(target.read_bytes())
+    assert list(found) == list(held)
+    for name in ("root_pos", "root_rot", "local_body_pos"):
+        np.testing.assert_array_equal(found[name], held[name])
+    assert found["dof_pos"].dtype == np.float32
+    assert any("local_body_pos" in note for note in done.notes)
 
 
 def test_a_mirrored_bvh_file_gets_its_names_exchanged(clean_bvh: Path, tmp_path: Path) -> None:

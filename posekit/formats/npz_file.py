@@ -52,7 +52,7 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
                 return _zip(data, source)
             if data[:6] == b"\x93NUMPY":
                 return _named(_npy(io.BytesIO(data), source))
-            found = _unpickled(io.BytesIO(_unpacked(data)), source)
+            found = unpickled(data, source)
     except InputError:
         raise
     except _DAMAGED as error:
@@ -239,6 +239,11 @@ class _Plain(pickle._Unpickler):
         self.stack[-1] = target.build(state, self.stream)
 
     dispatch[pickle.BUILD[0]] = load_build
+
+
+def unpickled(data: bytes, source: str) -> Any:
+    """Return what a pickle holds, as it nests it, with lists in place of tuples; no code of it is run."""
+    return _unpickled(io.BytesIO(_unpacked(data)), source)
 
 
 def _unpickled(file: io.BytesIO, source: str, extra: Named | None = None, load: Any = None) -> Any:

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final, Self
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
-from posekit.geometry import Array, runs, unit
+from posekit.geometry import Array, unit
 from posekit.motion.motion import NAMES, Motion
-from posekit.motion.repair.nearest import nearest
-from posekit.motion.repair.pieces import interpolated
-from posekit.motion.repair.postures import TIED_SWEEPS, PostureBounds, nearest_valid, straightened, tied
+from posekit.motion.repair.legal import (
+    TIED_SWEEPS,
+    Configurations,
+    PostureBounds,
+    nearest_valid,
+    straightened,
+    tied,
+)
+from posekit.motion.repair.pieces import between, interpolated
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.body import Body
 from posekit.validators.check import Check, Judgement, NotAskedError, judged
@@ -22,22 +32,12 @@ from posekit.validators.robot import sole_points
 
 Bools = NDArray[np.bool_]
 
-#: Frames that are smoothed at once.
-BLOCK_FRAMES: Final = 240
 #: Motion whose acceleration changes evenly is not changed by smoothing.
-THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
+THIRD_DIFFERENCE: Final = (-1.0, 3.0, -3.0, 1.0)
+#: Weight of a frame that stays, beside that of one that is smoothed.
+STAYS: Final = 1e9
 #: Times that postures are sought again: the person's lengths may be those of the repaired postures.
 ROUNDS: Final = 3
-#: Distance inside its limits to which a joint is brought, radians or metres.
-INSIDE_LIMITS: Final = 2e-6
-#: Distance beyond their margin to which bodies are moved apart; depths of meshes are known to 1e-5.
-KEPT_APART_METRES: Final = 5e-5
-#: Distance up to which a pair of bodies is watched.
-WATCHED_METRES: Final = 0.02
-#: Shares of the way to the neutral configuration of other starts: bodies deep in each other have no way out.
-TOWARD_NEUTRAL: Final = (0.25, 0.5, 1.0)
-#: Configurations of a batch.
-ROBOTS_AT_ONCE: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,10 +92,6 @@ class Clip:
         """Return the number of frames."""
         return len(self.state)
 
-    def with_state(self, state: Array, **changes: Any) -> Self:
-        """Return the clip with another state."""
-        return replace(self, state=state, **changes)
-
     def as_motion(self) -> Motion:
         """Return the clip as a motion with the points of the recording."""
         columns = [NAMES.index(name) for name in self.motion.joint_names]
@@ -124,44 +120,38 @@ class Clip:
                     continue
         return found
 
-    @property
-    def sweeps(self) -> int:
-        """Times that neighbouring frames are tied."""
-        return TIED_SWEEPS if self.motion.in_time else 0
-
     def points(self) -> Array:
         """Return the points (T, P, 3) in the order of `NAMES`, metres."""
         return self.state
 
     def taken(self, order: NDArray[np.intp], time: Array) -> Self:
         """Return the clip with its frames in another order, at some times."""
-        return self.with_state(self.state[order], rows=self.rows[order], filled=self.filled[order], time=time)
-
-    def with_gaps(self, gaps: NDArray[np.intp], step: float) -> Self:
-        """Insert frames before each frame (T,), and interpolate them."""
-        before = np.maximum(np.repeat(np.arange(len(self)), gaps + 1) - 1, 0)
-        own = np.cumsum(gaps + 1) - 1
-        before[own] = np.arange(len(self))
-        inserted = np.ones(len(before), dtype=np.bool_)
-        inserted[own] = False
-        time = self.time[before].copy()
-        for first, stop in runs(inserted):
-            time[first:stop] = time[first - 1] + step * np.arange(1, stop - first + 1)
-        wide = self.with_state(
-            self.state[before],
-            time=time,
-            rows=np.where(inserted, -1, self.rows[before]),
-            filled=self.filled[before],
+        return replace(
+            self, state=self.state[order], rows=self.rows[order], filled=self.filled[order], time=time
         )
-        return wide.interpolated(inserted)
+
+    def with_gaps(self, gaps: NDArray[np.intp]) -> Self:
+        """Insert frames before each frame (T,), evenly in time, and interpolate them."""
+        own = np.cumsum(gaps + 1) - 1
+        inserted = np.ones(own[-1] + 1, dtype=np.bool_)
+        inserted[own] = False
+        wide = self.taken(
+            np.repeat(np.arange(len(self)), gaps + 1), np.interp(np.arange(len(inserted)), own, self.time)
+        )
+        return replace(wide, rows=np.where(inserted, -1, wide.rows)).interpolated(inserted)
 
     def interpolated(self, bad: Bools) -> Self:
-        """Put frames between the good ones around them."""
-        return self.with_state(interpolated(self.state, bad), filled=self.filled | bad)
+        """Put frames between the good ones around them; a few at an end of the clip continue the motion."""
+        return replace(self, state=interpolated(self.state, bad), filled=self._filled(bad))
+
+    def _filled(self, bad: Bools) -> Bools:
+        filled = self.filled.copy()
+        filled[between(bad)[0]] = True
+        return filled
 
     def shifted(self, by: Array) -> Self:
         """Move the body by (T, 3), metres."""
-        return self.with_state(self.state + by[:, None])
+        return replace(self, state=self.state + by[:, None])
 
     def smoothed(self, loose: Bools, places: Sequence[str], strength: float) -> Self:
         """Smooth the points that `places` name, where they are loose (T, K)."""
@@ -176,13 +166,13 @@ class Clip:
                 continue
             if rows.any() and np.isfinite(out[:, column]).all():
                 out[:, column] = smoothed(out[:, column], rows, strength)
-        return self.with_state(out)
+        return replace(self, state=out)
 
     def legal(self) -> Self:
         """Return the clip with the nearest postures that the checks of postures pass, tied over time."""
         given, out = self.state, self.state.copy()
         for _ in range(ROUNDS):
-            now = self.with_state(out)
+            now = replace(self, state=out)
             found = now.judged(over_time=False)
             bad = np.flatnonzero(rejected(one for _, one in found.values()))
             if not bad.size:
@@ -193,12 +183,12 @@ class Clip:
             bounds = PostureBounds([check for check, _ in found.values()], now.body())
             changed = np.flatnonzero((np.nan_to_num(out - given) != 0).any(axis=(1, 2)))
             out = tied(
-                lambda aim, start, bounds=bounds: nearest_valid(aim, bounds, start),
+                partial(nearest_valid, bounds),
                 target,
                 np.union1d(bad, changed),
-                self.sweeps,
+                TIED_SWEEPS if self.motion.in_time else 0,
             )
-        return self.with_state(out)
+        return replace(self, state=out)
 
 
 def rejected(judgements: Any) -> Bools:
@@ -212,24 +202,13 @@ def smoothed(values: Array, loose: Bools, strength: float) -> Array:
     Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the loose frames (Whittaker 1923; Eilers 2003, *A perfect
     smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
     """
-    out, width = values.copy(), len(THIRD_DIFFERENCE)
-    every = np.flatnonzero(loose)
-    for shift in (0, BLOCK_FRAMES // 2):
-        for rows in np.split(every, np.searchsorted(every, np.arange(shift, len(values), BLOCK_FRAMES))):
-            if not rows.size:
-                continue
-            low, high = max(rows[0] - width + 1, 0), min(rows[-1] + width, len(out))
-            if high - low < width:
-                continue
-            window, count = out[low:high].copy(), high - low
-            window[rows - low] = 0.0
-            difference = np.zeros((count - width + 1, count))
-            for k, factor in enumerate(THIRD_DIFFERENCE):
-                difference[np.arange(count - width + 1), np.arange(count - width + 1) + k] = factor
-            own = difference[:, rows - low]
-            normal = np.eye(len(rows)) + strength * own.T @ own
-            out[rows] = np.linalg.solve(normal, values[rows] - strength * own.T @ (difference @ window))
-    return out
+    count = len(values)
+    if count < len(THIRD_DIFFERENCE):
+        return values
+    difference = sparse.diags_array(THIRD_DIFFERENCE, offsets=range(4), shape=(count - 3, count))
+    weight = sparse.diags_array(np.where(loose, 1.0, STAYS))
+    found = spsolve((weight + strength * difference.T @ difference).tocsc(), weight @ values)
+    return np.where(loose[:, None], found.reshape(values.shape), values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,22 +244,17 @@ class RobotClip(Clip):
 
     def interpolated(self, bad: Bools) -> Self:
         """Put frames between the good ones around them, along the geodesic of the configurations."""
-        import pinocchio as pin
-
         out = self.state.copy()
-        for first, stop in runs(bad):
-            if first > 0 and stop < len(out):
-                for row in range(first, stop):
-                    share = (row - first + 1) / (stop - first + 1)
-                    out[row] = pin.interpolate(self.robot.model, out[first - 1], out[stop], share)
-        return self.with_state(out, filled=self.filled | bad)
+        for row, before, after, share in zip(*between(bad), strict=True):
+            out[row] = pin.interpolate(self.robot.model, out[before], out[after], share[0])
+        return replace(self, state=out, filled=self._filled(bad))
 
     def shifted(self, by: Array) -> Self:
         """Move the root by (T, 3), metres; a robot with a fixed root stays."""
         out = self.state.copy()
         if self.robot.free_flyer:
             out[:, :3] += by
-        return self.with_state(out)
+        return replace(self, state=out)
 
     def smoothed(self, loose: Bools, places: Sequence[str], strength: float) -> Self:
         """Smooth all joints, and the root, in the frames in which something is loose (T, K)."""
@@ -293,7 +267,7 @@ class RobotClip(Clip):
         out[:, at] = smoothed(out[:, at], rows, strength)
         if self.robot.free_flyer:
             out[rows, 3:7] = unit(out[rows, 3:7])
-        return self.with_state(np.where(rows[:, None], out, self.state))
+        return replace(self, state=np.where(rows[:, None], out, self.state))
 
     def legal(self) -> Self:
         """Return the clip with the nearest configurations inside their limits whose bodies keep apart."""
@@ -301,116 +275,6 @@ class RobotClip(Clip):
         bad = np.flatnonzero(rejected(one for _, one in found.values()))
         if not bad.size:
             return self
-        problem_of = _Limits(self.robot, found, self.validator.settings.contact_margin)
-        return self.with_state(tied(problem_of.nearest, self.state, bad, self.sweeps))
-
-
-class _Limits:
-    """Configurations (N, nq) within limits and apart; `posekit.motion.repair.nearest.Problem`. The root stays."""
-
-    penalty, settled = 1e3, 1e-4
-
-    def __init__(self, robot: Any, found: dict[str, tuple[Check, Judgement]], margin: float) -> None:
-        self.robot, self.margin = robot, margin
-        self.root = 6 if robot.free_flyer else 0
-        self.size = robot.model.nv - self.root
-        self.lower, self.upper = (np.full(robot.model.nq, sign * np.inf) for sign in (-1, 1))
-        names = list(robot.configuration_names)
-        for name, factor in (("joint-range", float(np.degrees(1.0))), ("joint-travel", 1.0)):
-            if name in found:
-                one = found[name][1]
-                at = [names.index(place) for place in one.places]
-                self.lower[at] = np.broadcast_to(one.lower, one.value.shape)[0] / factor + INSIDE_LIMITS
-                self.upper[at] = np.broadcast_to(one.upper, one.value.shape)[0] / factor - INSIDE_LIMITS
-        self.pairs = len(robot.collision_pairs) if "collision" in found else 0
-        self.target = np.zeros((0, robot.model.nq))
-        self.data = robot.model.createData()
-        self.hulls: Any = None if robot.geometry is None else _hulls(robot.geometry)
-
-    def nearest(self, target: Array, start: Array | None) -> Array:
-        """Return the nearest configurations."""
-        import pinocchio as pin
-
-        out = self._inside(target if start is None else start)
-        for first in range(0, len(out), ROBOTS_AT_ONCE):
-            rows = slice(first, first + ROBOTS_AT_ONCE)
-            self.target = np.array([pin.normalize(self.robot.model, q) for q in target[rows]])
-            found, _ = nearest(self, out[rows])
-            every = self.target
-            for share in TOWARD_NEUTRAL:
-                left = np.flatnonzero((self.margins(found) < -KEPT_APART_METRES / 2).any(axis=1))
-                if not left.size:
-                    break
-                step = [pin.difference(self.robot.model, q, self.robot.neutral) for q in found[left]]
-                begin = self.moved(found[left], share * np.array(step)[:, self.root :])
-                self.target = every[left]
-                found[left], _ = nearest(self, begin)
-            out[rows] = found
-        return out
-
-    def _inside(self, q: Array) -> Array:
-        q = np.clip(q, self.lower, self.upper)
-        return np.asarray(self.robot.with_mimics(q) if getattr(self.robot, "mimics", ()) else q)
-
-    def moved(self, state: Array, step: Array) -> Array:
-        import pinocchio as pin
-
-        whole = np.hstack([np.zeros((len(step), self.root)), step])
-        out = [pin.integrate(self.robot.model, q, d) for q, d in zip(state, whole, strict=True)]
-        return self._inside(np.array(out))
-
-    def residuals(self, rows: NDArray[np.intp], state: Array) -> tuple[Array, Array]:
-        import pinocchio as pin
-
-        model = self.robot.model
-        gap = [pin.difference(model, a, b) for a, b in zip(self.target[rows], state, strict=True)]
-        residual = np.array(gap)[:, self.root :]
-        return residual, np.tile(np.eye(self.size), (len(state), 1, 1))
-
-    def margins(self, state: Array) -> Array:
-        out = np.full((len(state), self.pairs), np.inf)
-        if self.pairs:
-            found = self.robot.collisions(state, margin=max(self.margin, 0.0) + WATCHED_METRES)
-            out[found.frame, found.pair] = found.distance - self.margin - KEPT_APART_METRES
-        return out
-
-    def slopes(self, state: Array, value: Array, chosen: NDArray[np.intp]) -> Array:
-        """Differentiate distances: each end moves by its joint's Jacobian, and only along the normal of the hulls."""
-        import pinocchio as pin
-
-        slope = np.zeros((*value.shape, self.size))
-        if not self.pairs:
-            return slope
-        model, data, hulls = self.robot.model, self.data, self.hulls
-        placed = hulls.createData()
-        for row, q in enumerate(state):
-            pin.computeJointJacobians(model, data, q)
-            pin.updateGeometryPlacements(model, data, hulls, placed)
-            for k in np.flatnonzero(np.isfinite(value[row])).tolist():
-                pair = hulls.collisionPairs[int(chosen[row, k])]
-                found = pin.computeDistance(hulls, placed, int(chosen[row, k]))
-                points = found.getNearestPoint1(), found.getNearestPoint2()
-                ends = []
-                for body, point in zip((pair.first, pair.second), points, strict=True):
-                    joint = hulls.geometryObjects[body].parentJoint
-                    J = np.zeros((6, model.nv))  # of what is fixed to the world
-                    if joint:
-                        J = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
-                    ends.append(J[:3] - pin.skew(np.asarray(point) - data.oMi[joint].translation) @ J[3:])
-                slope[row, k] = np.nan_to_num(np.asarray(found.normal) @ (ends[1] - ends[0]))[self.root :]
-        return slope
-
-
-def _hulls(geometry: Any) -> Any:
-    """Return the bodies with the convex hulls of meshes: meshes themselves have no depth."""
-    import coal
-
-    hulls = geometry.copy()
-    for body in hulls.geometryObjects:
-        if isinstance(body.geometry, coal.BVHModelBase):
-            try:
-                body.geometry.buildConvexHull(True, "Qt")
-            except RuntimeError:  # a flat mesh has no hull
-                continue
-            body.geometry = body.geometry.convex or body.geometry
-    return hulls
+        problem = Configurations(self.robot, found, self.validator.settings.contact_margin)
+        sweeps = TIED_SWEEPS if self.motion.in_time else 0
+        return replace(self, state=tied(problem.nearest, self.state, bad, sweeps))

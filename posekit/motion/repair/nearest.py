@@ -74,24 +74,20 @@ def nearest(problem: Problem, start: Array) -> tuple[Array, Array]:
     cost : array (N,)
         With the penalty for what is still violated.
     """
-    state, count = start.copy(), len(start)
-    damping = np.full(count, DAMPING[0])
-    rows = np.arange(count)
+    state, damping = start.copy(), np.full(len(start), DAMPING[0])
+    rows = np.arange(len(start))
     cost, *model = _linearised(problem, rows, state)
-    active = np.ones(count, dtype=np.bool_)
     for _ in range(STEPS):
-        rows = np.flatnonzero(active)
         if not len(rows):
             break
-        step = _step(problem, [part[rows] for part in model], damping[rows])
-        trial = problem.moved(state[rows], step)
+        trial = problem.moved(state[rows], _step(problem, [part[rows] for part in model], damping[rows]))
         new = _cost(problem, problem.residuals(rows, trial)[0], problem.margins(trial))
         better = new < cost[rows]
         small = cost[rows] - new < problem.settled * cost[rows] + 1e-13
-        damping[rows] = np.clip(damping[rows] * np.where(better, DAMPING[3], DAMPING[4]), *DAMPING[1:3])
-        active[rows[(better & small) | (~better & (damping[rows] >= DAMPING[2]))]] = False
+        damping[rows] = np.clip(damping[rows] * np.where(better, *DAMPING[3:]), *DAMPING[1:3])
         moved = rows[better]
         state[moved] = trial[better]
+        rows = rows[~np.where(better, small, damping[rows] >= DAMPING[2])]
         if len(moved):
             cost[moved], *fresh = _linearised(problem, moved, state[moved])
             for part, one in zip(model, fresh, strict=True):
@@ -108,21 +104,13 @@ def _linearised(problem: Problem, rows: NDArray[np.intp], state: Array) -> tuple
     """Return cost (N,), normal matrix, gradient, the smallest margins (N, M) and their slopes (N, M, size)."""
     residual, jacobian = problem.residuals(rows, state)
     margin = problem.margins(state)
-    kept = min(MOST_ROWS, margin.shape[1])
-    chosen = np.argpartition(margin, kept - 1, axis=1)[:, :kept] if kept else np.zeros((len(state), 0), int)
-    value = np.take_along_axis(margin, chosen, axis=1)
+    chosen = np.argsort(margin, axis=1)[:, :MOST_ROWS]
+    value = np.minimum(np.take_along_axis(margin, chosen, axis=1), NEAR)
     slope = problem.slopes(state, value, chosen)
-    away = ~(value < NEAR)
-    slope[away] = 0.0
+    slope[value == NEAR] = 0.0
     transposed = jacobian.swapaxes(1, 2)
     gradient = (transposed @ residual[..., None])[..., 0]
-    return (
-        _cost(problem, residual, margin),
-        transposed @ jacobian,
-        gradient,
-        np.where(away, NEAR, value),
-        slope,
-    )
+    return _cost(problem, residual, margin), transposed @ jacobian, gradient, value, slope
 
 
 def differences(problem: Problem, step: float, state: Array, value: Array, chosen: NDArray[np.intp]) -> Array:
@@ -134,10 +122,8 @@ def differences(problem: Problem, step: float, state: Array, value: Array, chose
         steps = np.repeat(step * np.eye(problem.size), len(near), axis=0)
         there = problem.margins(problem.moved(state[every], steps))
         there = np.take_along_axis(there, chosen[every], axis=1).reshape(problem.size, *value[near].shape)
-        with np.errstate(invalid="ignore"):
-            change = (there - value[near]) / step
-        change[~(np.abs(change) < MAX_SLOPE)] = 0.0
-        slope[near] = np.moveaxis(change, 0, -1)
+        change = (there - value[near]) / step
+        slope[near] = np.moveaxis(np.where(np.abs(change) < MAX_SLOPE, change, 0.0), 0, -1)
     return slope
 
 

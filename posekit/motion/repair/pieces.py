@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from posekit.geometry import (
     Array,
+    Ints,
     best_rotation,
     cross_matrix,
     rotation_between,
     rotation_from_vector,
-    runs,
     unit,
     vector_from_rotation,
 )
@@ -40,6 +40,8 @@ PIECE_PARENTS: Final = (
     *(JOINT[f"{NAMES[foot].split('_')[0]}_ankle"] for foot in FEET),
 )
 
+#: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
+MOST_CONTINUED: Final = 3
 #: Joints without which nothing of a posture can be placed.
 TRUNK: Final = tuple(JOINT[name] for name in (*TORSO, *HIPS[1:]))
 
@@ -118,24 +120,36 @@ def turns_between(start: Array, end: Array) -> Array:
     return R
 
 
+def between(bad: Bools) -> tuple[Ints, Ints, Ints, Array]:
+    """Return bad frames, the good ones before and after each, and the share of the way (n, 1) between them.
+
+    At an end of the clip a few frames go on as the two nearest good ones do, with shares below 0 or above 1; more of
+    them stay as they are.
+    """
+    good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
+    if len(good) < 2:
+        return rows[:0], rows[:0], rows[:0], np.empty((0, 1))
+    rows = rows[(rows > good[0]) | (good[0] <= MOST_CONTINUED)]
+    rows = rows[(rows < good[-1]) | (len(bad) - 1 - good[-1] <= MOST_CONTINUED)]
+    place = np.clip(np.searchsorted(good, rows), 1, len(good) - 1)
+    before, after = good[place - 1], good[place]
+    return rows, before, after, ((rows - before) / (after - before))[:, None]
+
+
 def interpolated(points: Array, bad: Bools) -> Array:
-    """Put postures (T, P, 3) between the good frames around them; those at an end of the clip stay.
+    """Put postures (T, P, 3) between the good frames around them.
 
     Each piece of the body turns evenly, and the neck moves evenly, from the one good frame to the other.
     """
     out = points.copy()
-    good = ~bad & np.isfinite(points[:, list(TRUNK)]).all(axis=(1, 2))
-    for first, after in runs(~good):
-        before = first - 1
-        if before < 0 or after >= len(points) or not bad[first:after].any():
-            continue
-        share = (np.arange(first, after) - before)[:, None] / (after - before)
-        count = after - first
-        ways = []
-        for start, end, part in ((before, after, share), (after, before, 1 - share)):
-            step = np.zeros((1, N_UNKNOWNS))
-            step[0, :3] = points[end, 0] - points[start, 0]
-            step[0, 3:] = vector_from_rotation(turns_between(points[[start]], points[[end]])[0]).ravel()
-            ways.append(moved(np.repeat(points[[start]], count, axis=0), part * step))
-        out[first:after] = (1 - share[..., None]) * ways[0] + share[..., None] * ways[1]
+    known = np.isfinite(points[:, list(TRUNK)]).all(axis=(1, 2))
+    rows, before, after, share = between(bad | ~known)
+    ways = []
+    for start, end, part in ((before, after, share), (after, before, 1 - share)):
+        turn = vector_from_rotation(turns_between(points[start], points[end])).reshape(
+            len(rows), 3 * N_PIECES
+        )
+        ways.append(moved(points[start], part * np.hstack([points[end, 0] - points[start, 0], turn])))
+    out[rows] = (1 - share[..., None]) * ways[0] + share[..., None] * ways[1]
+    out[~bad] = points[~bad]
     return out

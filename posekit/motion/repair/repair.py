@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,12 +12,17 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal
+from posekit.files import write_bytes
+from posekit.formats.bvh import Bvh
+from posekit.formats.options import Options
 from posekit.geometry import Record
 from posekit.motion.motion import PER_FRAME, Motion
 from posekit.motion.repair.clip import Clip, RobotClip
-from posekit.motion.repair.files import in_bvh, in_table
+from posekit.motion.repair.own_bvh import in_bvh
+from posekit.motion.repair.own_file import in_own_file
 from posekit.motion.repair.time import mended
 from posekit.motion.validation import files_of, in_order, names_below
 from posekit.progress import watched
@@ -28,8 +34,10 @@ from posekit.validators.report import Report, joined, plural
 ROUNDS: Final = 3
 #: Change of a frame that counts, metres or radians.
 SEEN: Final = 1e-7
-#: Endings of a robot's tables of text.
-TABLES: Final = (".csv", ".tsv", ".txt")
+#: Start of the note of what is left.
+LEFT: Final = "left: "
+#: From the name of a robot to its validator.
+Judges = Callable[[str], Validator]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -44,21 +52,21 @@ class Repaired(Record):
         What checks say of the given motion, and of the repaired one as it is read again.
     notes : tuple of str
         What was invented, and what is left, one sentence each.
-    text : str
-        The repaired table of a robot, in its own columns; empty for other motion.
+    data : bytes
+        The repaired table or arrays with the user's own columns; empty for other files.
     """
 
     motion: Motion | None
     before: Report
     report: Report
     notes: tuple[str, ...]
-    text: str = ""
+    data: bytes = b""
 
     def _facts(self) -> list[str]:
         return list(self.notes)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the repaired motion: a BVH file with its own hierarchy, a robot's table with its own columns.
+        """Write the repaired motion: in the format of its own file with the file's own names and columns.
 
         Raises
         ------
@@ -75,10 +83,8 @@ class Repaired(Record):
         same = source.is_file() and source.suffix.lower() == path.suffix.lower()
         if same and bool(self.before.ok.all()):
             shutil.copyfile(source, path)
-        elif self.text and path.suffix.lower() in TABLES:
-            from posekit.files import write_bytes
-
-            write_bytes(path, self.text.encode())
+        elif same and self.data:
+            write_bytes(path, self.data)
         else:
             posekit.save(self.motion, path)
 
@@ -101,7 +107,11 @@ def repair(
     Over time, frames are put in order, sides exchanged back, lengths of limbs restored, jumps and frozen frames
     interpolated, trembling smoothed by as little as helps, the body shifted to the ground, and standing feet held. Then
     each posture that is rejected is replaced by the nearest one inside all bounds, with changes that are alike in
-    neighbouring frames. Frames that need no change stay as they are, byte for byte in BVH files and in a robot's table.
+    neighbouring frames. A first frame from which the body jumps, such as a T-pose, is replaced by one from which the
+    motion goes on as it does after it.
+
+    Frames that need no change stay as they are, byte for byte in BVH files and in tables. A file that is written is
+    judged as it is read again.
 
     Parameters
     ----------
@@ -132,26 +142,28 @@ def repair(
     >>> bool(posekit.repair(standing).report.ok.all())
     True
     """
-    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
 
     @cache
     def judge(robot: str) -> Validator:
         """Return the validator of the given body, else of the robot that a file names."""
         return Validator(urdf or robot or "figure", settings, **changes)
 
+    name = str(getattr(urdf, "name", urdf) or "")
+    name = "" if name in ("figure", "stick_figure") else name
+    given = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
+    facts = {key: one for key, one in given.items() if one is not None} | {"urdf": name}
     paths = isinstance(source, str | PathLike) or (
         isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source)
     )
-    if not paths:
-        done = _repaired(_given(source, judge(""), up, rate), judge, facts)
-    else:
+    if paths:
         files = list(files_of(source))
         if len(files) > 1 or not Path(files[0]).samefile(str(source)):
-            return _folder(files, target, judge, facts, urdf)
-        done = _file(files[0], judge, facts, urdf)
-    if target is not None:
-        done.save(target)
-    return done
+            return _folder(files, target, judge, facts)
+        source = _opened(files[0], facts)
+    else:
+        source = _given(source, judge(""), up, rate)
+    done = _repaired(source, judge, facts)
+    return done if target is None else _written(done, Path(target), judge, facts)
 
 
 def _given(source: Any, validator: Validator, up: str | None, rate: float | None) -> Motion:
@@ -162,26 +174,38 @@ def _given(source: Any, validator: Validator, up: str | None, rate: float | None
     return replace(motion, **fields)
 
 
-def _file(path: Path, judge: Callable[[str], Validator], facts: dict[str, Any], urdf: Any) -> Repaired:
+def _opened(path: Path, facts: dict[str, Any]) -> Motion:
     import posekit
 
-    name = str(getattr(urdf, "name", urdf) or "")
-    held = posekit.open(
-        path,
-        **{key: value for key, value in facts.items() if value is not None},
-        urdf="" if name in ("figure", "stick_figure") else name,
-    )
+    held = posekit.open(path, **facts)
     if not isinstance(held, Motion):
         raise refusal(path, "", f"a {type(held).__name__}", "postures or motion", "give a file of motion")
-    return _repaired(held, judge, facts)
+    return held
+
+
+def _written(done: Repaired, path: Path, judge: Judges, facts: dict[str, Any]) -> Repaired:
+    """Write a repaired motion, and judge the file as it is read again."""
+    done.save(path)
+    same = Path(getattr(done.motion, "source", "")).suffix.lower() == path.suffix.lower()
+    if not same or done.report is done.before:
+        return done
+    report = _judged(_opened(path, facts), judge)
+    return replace(done, report=report, notes=_with_left(done.notes, report))
+
+
+def _with_left(notes: Sequence[str], report: Report) -> tuple[str, ...]:
+    """Return notes with the spans of a report that are not valid."""
+    left = [str(span) for span in report.spans if span.verdict == "invalid"]
+    more = f"; {len(left) - 3} more" if len(left) > 3 else ""
+    own = [note for note in notes if not note.startswith(LEFT)]
+    return (*own, *([f"{LEFT}{'; '.join(left[:3])}{more}"] if left else []))
 
 
 def _folder(
     files: Sequence[Path],
     target: str | PathLike[str] | None,
-    judge: Callable[[str], Validator],
+    judge: Judges,
     facts: dict[str, Any],
-    urdf: Any,
 ) -> Repaired:
     """Repair files into a new folder; a file that cannot be read or written is named."""
     folder = None if target is None else Path(target)
@@ -193,11 +217,11 @@ def _folder(
     refused: list[str] = []
     for path in watched(files, "repairing"):
         try:
-            one = _file(path, judge, facts, urdf)
+            one = _repaired(_opened(path, facts), judge, facts)
             if folder is not None:
                 place = folder / names[str(path)]
                 place.parent.mkdir(parents=True, exist_ok=True)
-                one.save(place)
+                one = _written(one, place, judge, facts)
             done.append(one)
             if not one.before.ok.all():
                 notes.append(f"{names[str(path)]}: {'; '.join(one.notes)}")
@@ -213,68 +237,92 @@ def _folder(
     return Repaired(motion=None, before=before, report=report, notes=(first, *notes, *refused))
 
 
-def _repaired(motion: Motion, judge: Callable[[str], Validator], facts: dict[str, Any]) -> Repaired:
-    """Repair every recording of a motion."""
+def _of_points(motion: Motion, validator: Validator) -> bool:
+    return validator.robot is None and motion.joints is not None
+
+
+def _judged(motion: Motion, judge: Judges) -> Report:
+    """Judge a motion as it is repaired: points by themselves, configurations in the order of their robot."""
     validator = judge(motion.robot)
-    of_points = validator.robot is None and motion.joints is not None
-    if not of_points and motion.q is None:
+    if _of_points(motion, validator):
+        return validator.check(replace(motion, q=None, q_names=(), robot=""))
+    if motion.q is None:
         got, remedy = "positions of a person", "leave --urdf out, or convert the file first"
         raise refusal(motion.source or "repair", "urdf", got, "configurations of the robot", remedy)
-    if of_points and motion.q is not None:
-        motion = replace(motion, q=None, q_names=(), robot="")
-    names, own = tuple(motion.q_names), motion
-    if not of_points:
-        motion = in_order(motion, validator)
-    before = validator.check(motion)
+    return validator.check(in_order(motion, validator))
+
+
+def _repaired(motion: Motion, judge: Judges, facts: dict[str, Any]) -> Repaired:
+    """Repair every recording of a motion."""
+    validator, before = judge(motion.robot), _judged(motion, judge)
     if before.ok.all():
-        return Repaired(motion=own, before=before, report=before, notes=(_changed(0, len(motion)),))
-    parts = []
+        return Repaired(motion=motion, before=before, report=before, notes=(_changed(0, len(motion)),))
+    if _of_points(motion, validator):
+        own = motion = replace(motion, q=None, q_names=(), robot="")
+    else:
+        own, motion = motion, in_order(motion, validator)
+    parts, rows = [], []
     notes: list[str] = []
-    text = ""
-    for name, recording in motion.recordings():
-        done, own_notes, clip = _recording(recording, validator, facts)
+    for k, (name, recording) in enumerate(motion.recordings()):
+        done, own_notes, own_rows = _recording(recording, validator, facts)
         parts.append(done)
+        rows.append(np.flatnonzero(np.unique(np.asarray(motion.clip), return_inverse=True)[1] == k)[own_rows])
         notes += [f"{name}: {note}" if name else note for note in own_notes]
-        if not of_points and len(before.files) == 1 and Path(own.source).suffix.lower() in TABLES:
-            text = in_table(_as_in_file(clip, names), np.asarray(own.q), own.source, own.layout)
     repaired = parts[0] if len(parts) == 1 else _concatenated(parts, motion)
-    report = validator.check(repaired)
-    left = [str(span) for span in report.spans if span.verdict == "invalid"]
-    if left:
-        notes.append(f"left: {'; '.join(left[:3])}" + (f"; {len(left) - 3} more" if len(left) > 3 else ""))
-    return Repaired(motion=repaired, before=before, report=report, notes=tuple(notes), text=text)
+    report, data = validator.check(repaired), b""
+    if repaired.document is None and len(before.files) == 1 and Path(own.source).is_file():
+        after = repaired if own is motion else _as_in_file(repaired, own, np.concatenate(rows))
+        written, lost = in_own_file(own.source, own, after, np.concatenate(rows))
+        if written is not None:
+            with tempfile.TemporaryDirectory() as folder:
+                place = Path(folder) / Path(own.source).name
+                write_bytes(place, written)
+                again = _judged(_opened(place, facts), judge)
+            if int(again.ok.sum()) >= int(report.ok.sum()):
+                data, report = written, again
+                notes += lost
+            else:
+                notes.append(
+                    f"the columns of {Path(own.source).name} cannot hold the repair; joints are written"
+                )
+    return Repaired(motion=repaired, before=before, report=report, notes=_with_left(notes, report), data=data)
 
 
-def _as_in_file(clip: Clip, names: tuple[str, ...]) -> Clip:
-    """Return configurations in the order of a file's columns."""
-    body: Any = clip.validator.robot or clip.validator.figure
-    own = [name.removesuffix("_joint").lower() for name in body.configuration_names]
-    order = [own.index(name.removesuffix("_joint").lower()) for name in names if names]
-    return clip.with_state(clip.state[:, order]) if names else clip
+def _as_in_file(motion: Motion, own: Motion, rows: NDArray[np.intp]) -> Motion:
+    """Return configurations in the order of a file's columns; those that the robot lacks stay."""
+    if not own.q_names:
+        return motion
+    place = {_plain(name): k for k, name in enumerate(motion.q_names)}
+    q = np.array(own.q)[rows]
+    for column, name in enumerate(own.q_names):
+        if _plain(name) in place:
+            q[:, column] = np.asarray(motion.q)[:, place[_plain(name)]]
+    return replace(motion, q=q, q_names=own.q_names)
 
 
-def _recording(motion: Motion, validator: Validator, facts: dict[str, Any]) -> tuple[Motion, list[str], Clip]:
-    """Repair one recording; return it, what was done, and the clip.
+def _plain(name: str) -> str:
+    return name.removesuffix("_joint").lower()
+
+
+def _recording(
+    motion: Motion, validator: Validator, facts: dict[str, Any]
+) -> tuple[Motion, list[str], NDArray[np.intp]]:
+    """Repair one recording; return it, what was done, and the given frame of each frame.
 
     Where remedies do not suffice, the rejected frames are interpolated first.
     """
-    kind = Clip if validator.robot is None and motion.joints is not None else RobotClip
-    given = kind.of(motion, validator)
-    found = _searched(given, facts)
+    given = (Clip if _of_points(motion, validator) else RobotClip).of(motion, validator)
+    options = Options(**{key: facts.get(key, "") for key in ("layout", "unit", "up")})
+    found = _searched(given, options)
     if found[0] and motion.in_time:
         bad = np.convolve(~validator.check(motion).ok, np.ones(3), mode="same") > 0
-        other = _searched(given.interpolated(bad), facts)
-        found = other if other[0] < found[0] else found
+        found = min(found, _searched(given.interpolated(bad), options), key=lambda one: one[0])
     _, best, clip, done = found
-    return best, _told(given, clip, done), clip
+    return best, _told(given, clip, done), np.maximum.accumulate(clip.rows)
 
 
-def _searched(start: Clip, facts: dict[str, Any]) -> tuple[int, Motion, Clip, list[str]]:
+def _searched(start: Clip, options: Options) -> tuple[int, Motion, Clip, list[str]]:
     """Repair a clip; return the number of frames that are not valid, the motion, the clip, and the remedies."""
-    from posekit.formats.bvh import Bvh
-    from posekit.formats.options import Options
-
-    options = Options(layout=facts["layout"], unit=facts["unit"] or "", up=facts["up"] or "")
     motion, validator = start.motion, start.validator
     clip = total = start
     document = motion.document
@@ -288,8 +336,9 @@ def _searched(start: Clip, facts: dict[str, Any]) -> tuple[int, Motion, Clip, li
         clip = clip if motion.in_time else clip.legal()
         if isinstance(document, Bvh) and not isinstance(clip, RobotClip) and len(clip) == len(motion):
             now = in_bvh(clip, document, options)
-            total = clip.with_state(
-                clip.state_of(now),
+            total = replace(
+                clip,
+                state=clip.state_of(now),
                 motion=motion,
                 rows=total.rows[clip.rows],
                 filled=total.filled[clip.rows] | clip.filled,
@@ -313,8 +362,13 @@ def _told(given: Clip, clip: Clip, done: Sequence[str]) -> list[str]:
     notes = [_changed(int(changed.sum()), len(clip))]
     if inserted.any():
         notes.append(f"{plural(int(inserted.sum()), 'missing frame')} inserted")
-    if (filled & ~inserted).any():
-        notes.append(f"{plural(int((filled & ~inserted).sum()), 'frame')} interpolated")
+    ends = filled & (np.logical_and.accumulate(filled) | np.logical_and.accumulate(filled[::-1])[::-1])
+    for rows_made, how in (
+        (filled & ~inserted & ~ends, "interpolated"),
+        (ends, "continued to an end of the clip"),
+    ):
+        if rows_made.any():
+            notes.append(f"{plural(int(rows_made.sum()), 'frame')} {how}")
     if clip.mirrored:
         notes.append("right and left exchanged in all frames")
     elif "exchanged" in done:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
 
 from posekit.geometry import Array, runs
 from posekit.motion.motion import NAMES
@@ -33,6 +33,8 @@ TREMBLING_FRAMES: Final = 10
 WIDER_FRAMES: Final = (3, 10)
 #: Share of the largest displacement that remains of a step that lasts.
 LASTING_SHARE: Final = 0.5
+#: Share of the largest displacement below which a body that stepped aside and back is where it was.
+SAME_PLACE_SHARE: Final = 0.15
 #: Frames from an end of a clip within which neighbours do not tell which frame is off.
 NEAR_END_FRAMES: Final = 4
 #: Frames a second of motion whose rate is not known.
@@ -141,7 +143,7 @@ def _reorder(clip: Clip, found: Rejected) -> Iterator[Clip]:
             yield clip.taken(np.argsort(np.arange(len(clip)) + sign * place, kind="stable"), clip.time)
     gaps = np.round(np.nan_to_num(one.value[:, one.places.index("missing")])).astype(np.intp)
     if (gaps > 0).any():
-        yield clip.with_gaps(np.maximum(gaps, 0), float(np.median(step[step > 0])))
+        yield clip.with_gaps(np.maximum(gaps, 0))
 
 
 def _exchange(clip: Clip, found: Rejected) -> Iterator[Clip]:
@@ -153,9 +155,9 @@ def _exchange(clip: Clip, found: Rejected) -> Iterator[Clip]:
     for k, pair in enumerate(SIDE_PAIRS):
         order = _exchanged_order(PARTS_OF_PAIRS.get(pair, (pair,)))
         out[pairs[:, k]] = out[pairs[:, k]][:, order]
-    yield clip.with_state(out, mirrored=bool(pairs.all()) != clip.mirrored)
+    yield replace(clip, state=out, mirrored=bool(pairs.all()) != clip.mirrored)
     every = clip.state[:, _exchanged_order((*SIDE_PAIRS, *FEET_AND_HEAD))]
-    yield clip.with_state(every, mirrored=not clip.mirrored)
+    yield replace(clip, state=every, mirrored=not clip.mirrored)
 
 
 def _exchanged_order(parts: Sequence[str]) -> NDArray[np.intp]:
@@ -184,7 +186,7 @@ def _lengthen(clip: Clip, found: Rejected) -> Iterator[Clip]:
             if point == end or PIECE_PARENTS[point] in behind:
                 behind.add(point)
                 out[off, point] += way
-    yield clip.with_state(out)
+    yield replace(clip, state=out)
 
 
 def _step_back(clip: Clip, found: Rejected) -> Iterator[Clip]:
@@ -209,8 +211,15 @@ def _step_back(clip: Clip, found: Rejected) -> Iterator[Clip]:
             aside[start:stop] += off
             aside[stop:] += off[-1]
     if aside.any():
-        _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
-        yield clip.shifted(aside[where[np.argmax(count)]] - aside)
+        far = np.linalg.norm(aside, axis=1)
+        aside[far < SAME_PLACE_SHARE * far.max()] = 0.0
+        yield clip.shifted(_most_stay(aside))
+
+
+def _most_stay(aside: Array) -> Array:
+    """Return the shift (T, 3) that undoes displacements, such that as many frames as possible stay."""
+    _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
+    return np.asarray(aside[where[np.argmax(count)]] - aside)
 
 
 def _jumped(way: Array, start: int, stop: int) -> tuple[int, int]:
@@ -232,7 +241,7 @@ def _interpolate(clip: Clip, found: Rejected) -> Iterator[Clip]:
     jumps = found.places(JOINTS, "teleport")
     if jumps is None:
         return
-    for bad in (jumps, jumps & np.roll(jumps, -1, axis=0), jumps & ~np.roll(jumps, 1, axis=0)):
+    for bad in (jumps & ~np.roll(jumps, 1, axis=0), jumps & np.roll(jumps, -1, axis=0), jumps):
         rows = np.asarray(bad.any(axis=1))
         if rows.any():
             whole = clip.interpolated(rows)
@@ -241,7 +250,7 @@ def _interpolate(clip: Clip, found: Rejected) -> Iterator[Clip]:
                 some = clip.state.copy()
                 own = np.concatenate([bad, np.zeros((len(bad), len(NAMES) - len(JOINTS)), bool)], axis=1)
                 some[own] = whole.state[own]
-                yield clip.with_state(some)
+                yield replace(clip, state=some)
 
 
 def _smooth(clip: Clip, found: Rejected) -> Iterator[Clip]:
@@ -264,8 +273,7 @@ def _smooth(clip: Clip, found: Rejected) -> Iterator[Clip]:
 
 def _wider(frames: Bools, half: int, count: int) -> Bools:
     """Return frames (T,) and those up to `half` from them, for `count` places (T, K)."""
-    near = np.convolve(frames, np.ones(2 * half + 1), mode="same") > 0
-    return np.repeat(near[:, None], count, axis=1)
+    return np.repeat(binary_dilation(frames, iterations=half)[:, None], count, axis=1)
 
 
 def _shift(clip: Clip, found: Rejected) -> Iterator[Clip]:
@@ -289,7 +297,7 @@ def _shift(clip: Clip, found: Rejected) -> Iterator[Clip]:
     for start, stop in runs(height != 0):
         span = height[start:stop]
         if np.abs(np.median(span)) <= MOST_SHIFT_METRES:
-            smooth = _over(np.mean, _over(np.median, span, width), width)
+            smooth = uniform_filter1d(median_filter(span, width, mode="nearest"), width, mode="nearest")
             even = np.full(len(span), span[np.argmax(np.abs(span))])
             ways[:, start:stop] = -np.stack([smooth, even, span, excess[start:stop]])
     yield from (clip.shifted(one[:, None] * up) for one in ways)
@@ -298,16 +306,10 @@ def _shift(clip: Clip, found: Rejected) -> Iterator[Clip]:
         yield clip.shifted(np.full((len(clip), 1), whole) * up)
 
 
-def _over(function: Callable[..., Array], values: Array, width: int) -> Array:
-    """Return a function of an odd number of values around each of (T,); the outer ones stand for those beyond."""
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(function(sliding_window_view(padded, width), axis=1))
-
-
 def _hold(clip: Clip, found: Rejected) -> Iterator[Clip]:
     """Move the body along the ground against the slide of standing feet, evenly or frame by frame.
 
-    The frames after the slide go on from where it then ends.
+    The frames after the slide go on from where it then ends, or those before it lead to where it begins.
     """
     up = clip.body().up
     if found.frames("sliding", "skating") is None or up is None:
@@ -332,7 +334,7 @@ def _hold(clip: Clip, found: Rejected) -> Iterator[Clip]:
     even = np.zeros_like(slow)
     for start, stop in runs(np.asarray(bad.any(axis=1))):
         even[start:stop] = np.median(slow[start:stop], axis=0)
-    yield from (clip.shifted(-np.cumsum(step, axis=0)) for step in (even, slow))
+    yield from (clip.shifted(_most_stay(np.cumsum(step, axis=0))) for step in (even, slow))
 
 
 #: In the order in which they are tried: order and labels first, then single frames, then spans.

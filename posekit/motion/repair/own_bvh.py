@@ -1,11 +1,10 @@
-"""Repaired motion in the user's own file: of BVH only the rotations that move, of tables only the cells that change."""
+"""Repaired motion in the user's own BVH file: only the rotations that move."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,13 +14,12 @@ from posekit.geometry import (
     Array,
     coordinate_rotation,
     rotation_from_vector,
-    runs,
     turned_near,
     vector_from_rotation,
 )
 from posekit.motion.motion import NAMES, Motion
 from posekit.motion.repair.clip import Clip
-from posekit.motion.repair.pieces import HEAD_PIECE, HIPS_PIECE, TORSO_PIECE, TRUNK, turns_between
+from posekit.motion.repair.pieces import HEAD_PIECE, HIPS_PIECE, TORSO_PIECE, TRUNK, between, turns_between
 from posekit.skeleton import JOINTS, LIMB_JOINTS, other_side
 
 if TYPE_CHECKING:
@@ -34,13 +32,6 @@ SAME_METRES: Final = 1e-6
 STAYS_METRES: Final = 1e-7
 #: Change of a channel below which its text stays, file's unit.
 TINY: Final = 1e-10
-DEGREES: Final = float(np.degrees(1.0))
-#: Entries of q whose columns have one unit, and the numbers of a table for one metre or radian.
-GROUPS: Final = ((slice(0, 3), (1.0, 100.0, 1000.0)), (slice(3, 7), (1.0,)), (slice(7, None), (1.0, DEGREES)))
-#: Largest difference of a column from an entry of q that it is: quaternions in files are off length 1.
-MATCH: Final = 0.02
-#: Decimals of changed cells.
-DECIMALS: Final = 9
 
 
 def in_bvh(clip: Clip, document: Bvh, options: Options) -> Motion:
@@ -212,108 +203,36 @@ def _turned(
 def _filled(document: Bvh, values: Array, filled: NDArray[np.bool_]) -> Array:
     """Interpolate the channels of frames between those around them."""
     values = values.copy()
-    for first, stop in runs(filled):
-        if first == 0 or stop >= len(values):
-            continue
-        share = (np.arange(first, stop) - first + 1)[:, None] / (stop - first + 1)
-        start, end = values[first - 1], values[stop]
-        values[first:stop] = start + share * (end - start)
-        for node, channels in enumerate(document.channels):
-            if sum(rotates for rotates, _ in channels) == 3:
-                R = _local_rotations(document, np.stack([start, end]), node)
-                vector = vector_from_rotation((R[0].T @ R[1])[None])
-                turns = R[0] @ rotation_from_vector(share * vector)
-                values[first:stop] = _with_rotation(document, values[first:stop], node, turns)
+    rows, before, after, share = between(filled)
+    start, end = values[before], values[after]
+    values[rows] = start + share * (end - start)
+    for node, channels in enumerate(document.channels):
+        if rows.size and sum(rotates for rotates, _ in channels) == 3:
+            first, last = (_local_rotations(document, one, node) for one in (start, end))
+            turn = share * vector_from_rotation(first.swapaxes(1, 2) @ last)
+            values[rows] = _with_rotation(document, values[rows], node, first @ rotation_from_vector(turn))
     return values
 
 
 def _renamed(document: Bvh, nodes: Mapping[str, int]) -> Bvh:
     """Return the file with the names of right and left exchanged: of points, and of all that hangs on limbs."""
-    other: dict[str, str] = {}
-    for name, node in nodes.items():
-        if (twin := nodes.get(other_side(name), node)) != node:
-            ways = [_above(document, one) for one in (node, twin)]
-            tops = [[one for one in way if one not in set(ways[0]) & set(ways[1])][-1] for way in ways]
-            below = [[k for k in range(len(document.names)) if top in _above(document, k)] for top in tops]
-            for a, b in zip(*below, strict=False):
-                if not document.sites[a] and not document.sites[b]:
-                    other |= {document.names[a]: document.names[b], document.names[b]: document.names[a]}
-    head, mark, rest = re.split(r"(^[ \t]*MOTION)", document.text, maxsplit=1, flags=re.M | re.I)
-
-    def renamed(match: re.Match[str]) -> str:
-        name = " ".join(match[2].split())
-        return match[1] + other.get(name, match[2]) + match[3]
-
-    head = re.sub(r"((?:ROOT|JOINT)[ \t]+)([^{}\r\n]*?)([ \t]*[\r\n{])", renamed, head, flags=re.I)
     from posekit.formats.bvh import parse
 
-    return replace(parse((head + mark + rest).encode(), ""), values=document.values)
-
-
-def in_table(clip: Clip, given: Array, path: str | Path, layout: str) -> str:
-    """Return the text of a robot's table with the cells of changed entries of q.
-
-    Columns are found by their numbers: a column is an entry of q times a factor. Equal ones are taken in order.
-
-    Parameters
-    ----------
-    clip : Clip
-        Configurations in the order of the file.
-    given : array (T, nq)
-        Configurations as they were read.
-    path : path
-        The file.
-    layout : str
-        Name of the file's layout.
-    """
-    from scipy.spatial.transform import Rotation
-
-    from posekit.files import read_bytes
-    from posekit.formats.layout import load_layout
-    from posekit.formats.tables import parse
-
-    table = parse(read_bytes(path), str(path))
-    numbers, names, head = table.numbers, list(table.names), len(table.head)
-    turn = load_layout(layout).fields.get("rotation", {}) if layout else {}
-    angles = [names.index(name) for name in turn["each"] if name in names] if "euler" in turn else []
-    free = [column for column in range(numbers.shape[1]) if column not in angles]
-    entries: dict[int, tuple[int, float]] = {}
-    for group, factors in GROUPS:
-        own = given[:, group]
-        off, factor = min(
-            ((_apart(numbers[:, free] / factor, own), factor) for factor in factors),
-            key=lambda one: float(one[0].min(axis=0, initial=MATCH).sum()),
-        )
-        for place, entry in enumerate(range(given.shape[1])[group]):
-            best = int(np.argmin(off[:, place])) if free else 0
-            if free and off[best, place] < MATCH:
-                entries[free.pop(best)] = entry, factor
-                off = np.delete(off, best, axis=0)
-
-    def written(q: Array) -> Array:
-        """Return the numbers (T, C) of configurations; NaN in columns that hold none of them."""
-        out = np.full((len(q), numbers.shape[1]), np.nan)
-        for column, (entry, factor) in entries.items():
-            out[:, column] = factor * q[:, entry]
-        if angles:
-            own = Rotation.from_quat(q[:, 3:7]).as_euler(turn["euler"].upper(), turn.get("unit") == "deg")
-            out[:, angles] = np.array(turn.get("signs", (1.0, 1.0, 1.0))) * own
-        return out
-
-    rows = np.where(clip.rows < 0, np.maximum.accumulate(clip.rows), clip.rows)
-    new = written(clip.state)
-    changed = np.abs(new - written(given)[rows]) > TINY
-    lines = [table.lines[head + row] for row in rows.tolist()]
-    for k in np.flatnonzero(changed.any(axis=1)).tolist():
-        cells = list(table.parted(lines[k]))
-        for column in np.flatnonzero(changed[k]).tolist():
-            cells[column] = f"{new[k, column]:.{DECIMALS}f}"
-        lines[k] = (table.delimiter or " ").join(cells)
-    return "\n".join([*table.lines[:head], *lines]) + "\n"
-
-
-def _apart(columns: Array, entries: Array) -> Array:
-    """Return the largest differences (C, K) of columns (T, C) from entries (T, K)."""
-    return np.array(
-        [np.fmax.reduce(np.abs(one[:, None] - entries), axis=0, initial=0.0) for one in columns.T]
+    other: dict[str, str] = {}
+    for name, node in nodes.items():
+        twin = nodes.get(other_side(name), node)
+        ways = _above(document, node), _above(document, twin)
+        tops = [[one for one in way if one not in ways[1 - k]][-1:] for k, way in enumerate(ways)]
+        below = [
+            [k for k, site in enumerate(document.sites) if not site and set(top) & set(_above(document, k))]
+            for top in tops
+        ]
+        other |= {document.names[a]: document.names[b] for a, b in zip(*below, strict=False)}
+    head, mark, rest = re.split(r"(^[ \t]*MOTION)", document.text, maxsplit=1, flags=re.M | re.I)
+    head = re.sub(
+        r"((?:ROOT|JOINT)[ \t]+)([^{}\r\n]*?)(?=[ \t]*[\r\n{])",
+        lambda match: match[1] + other.get(" ".join(match[2].split()), match[2]),
+        head,
+        flags=re.I,
     )
+    return replace(parse((head + mark + rest).encode(), ""), values=document.values)

@@ -1,0 +1,253 @@
+"""Repaired numbers in the user's own table or arrays: only columns that hold what moved, only where it moved."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from posekit.files import read_bytes, text
+from posekit.formats.layout import load_layout
+from posekit.formats.npz_file import unpickled
+from posekit.formats.open import parsed
+from posekit.formats.tables import Table, numbers
+from posekit.geometry import Array, turned_near
+from posekit.motion.motion import Motion
+
+#: From numbers (T, C) and the names of their columns to repaired numbers (T', C).
+Change = Callable[[Array, list[str]], Array]
+
+#: Numbers of a file for one unit of an entry, and the largest difference of a column from an entry that it holds:
+#: frame numbers and seconds, metres, quaternions (in files they are off length 1), radians.
+COUNTS: Final = ((1.0,), 1e-6)
+LENGTHS: Final = ((1.0, 100.0, 1000.0, 1 / 0.0254), 1e-4)
+QUATERNIONS: Final = ((1.0, -1.0), 0.02)
+ANGLES: Final = ((1.0, float(np.degrees(1.0))), 1e-3)
+#: Frames by which columns are recognised.
+SAMPLE: Final = 40
+#: Change of an entry below which its numbers stay, metres or radians.
+TINY: Final = 1e-10
+#: Least significant digits of a changed number: fewer would round a posture over its bounds.
+DIGITS: Final = 7
+
+
+def in_own_file(
+    path: str | Path, before: Motion, after: Motion, rows: NDArray[np.intp]
+) -> tuple[bytes | None, list[str]]:
+    """Return a table or arrays with the numbers that a repair changed.
+
+    Columns are found by their numbers: a column, or the mean of two markers, is an entry of the motion times a factor.
+    It moves by the change of the entry; all other columns, names and numbers stay.
+
+    Parameters
+    ----------
+    path : path
+        File from which `before` was read.
+    before, after : Motion
+        Before and after the repair, in the order of the file.
+    rows : int array (T',)
+        Frame of `before` that each frame of `after` was made from.
+
+    Returns
+    -------
+    data : bytes or None
+        The file; None if its container is not changed in place.
+    notes : list of str
+        What could not follow the repair.
+    """
+    groups = _groups(before, after)
+    steps = [np.nan_to_num(new - old[rows]) for old, new, _ in groups]
+    stale: list[str] = []
+
+    def change(columns: Array, names: list[str]) -> Array:
+        out, free = columns[rows], np.arange(columns.shape[1])
+        angles = [names.index(name) for name in _euler(before).get("each", ()) if name in names]
+        if angles:
+            out[:, angles] += _turned(before, after, rows)
+            free = np.delete(free, angles)
+        for (old, _, kind), step in zip(groups, steps, strict=True):
+            found, factor = _columns_of(columns[:, free], old, *kind)
+            for entry, places in found.items():
+                moving = np.abs(step[:, entry]) > TINY
+                for place in places:
+                    out[moving, free[place]] += factor * step[moving, entry]
+            free = np.delete(free, [place for places in found.values() for place in places])
+        if len(free) > len(names) / 2 and before.q is not None:
+            stale.extend(dict.fromkeys(names))
+        return out
+
+    def change_array(name: str, value: Any) -> Any:
+        numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim
+        first = (len(before),) if numeric and value.shape[0] == len(before) else (1, len(before))
+        if not numeric or value.shape[: len(first)] != first:
+            return value
+        flat = value.reshape(len(before), -1).astype(np.float64)
+        new = change(flat, [name] * flat.shape[1])
+        return new.astype(value.dtype).reshape(*first[:-1], len(rows), *value.shape[len(first) :])
+
+    data, (container, document) = read_bytes(path), parsed(path)
+    if isinstance(document, Table) and not document.about:
+        written = _in_lines(text(data, str(path)), document, len(before), rows, change)
+    elif container == "arrays":
+        written = _in_arrays(data, str(path), change_array)
+    else:
+        return None, []
+    following = f"left as they were, although they may follow from q: {', '.join(stale)}"
+    return written, [following] if stale else []
+
+
+def _groups(before: Motion, after: Motion) -> list[tuple[Array, Array, Any]]:
+    """Return old and new values (T, K), and kind, of entries whose columns have one unit."""
+    counted = (_counted(before), _counted(after), COUNTS)
+    if before.q is None:
+        old, new = (np.asarray(one.joints).reshape(-1, 3 * len(one.joint_names)) for one in (before, after))
+        return [counted, (old, new, LENGTHS)]
+    old, new = np.asarray(before.q), np.asarray(after.q)
+    root = 7 if not before.q_names or before.q_names[0] == "x" else 0
+    parts = (slice(0, min(root, 3)), LENGTHS), (slice(3, root), QUATERNIONS), (slice(root, None), ANGLES)
+    return [counted, *((old[:, own], new[:, own], kind) for own, kind in parts)]
+
+
+def _counted(motion: Motion) -> Array:
+    frame = np.arange(len(motion), dtype=np.float64)
+    return np.stack([frame, frame + 1, np.asarray(motion.time)], axis=1)
+
+
+def _columns_of(
+    columns: Array, entries: Array, factors: tuple[float, ...], most: float
+) -> tuple[dict[int, list[int]], float]:
+    """Return the columns (of C) of each entry (of K), and the factor of all, by which most of them are found."""
+    some = slice(None, None, max(1, len(columns) // SAMPLE))
+    best: tuple[dict[int, list[int]], float] = {}, 1.0
+    for factor in factors:
+        values = columns[some] / factor
+        off = _apart(values[..., None], entries[some, None])
+        found: dict[int, list[int]] = {}
+        for entry in range(entries.shape[1] if len(off) else 0):
+            place = int(np.argmin(off[:, entry]))  # of equal columns the first that is free
+            if off[place, entry] < most:
+                found[entry] = [place]
+                off[place] = np.inf
+        best = max(best, (found, factor), key=lambda one: len(one[0]))
+    found, factor = best
+    free = np.setdiff1d(np.arange(columns.shape[1]), [place for places in found.values() for place in places])
+    if factors is LENGTHS[0] and found and free.size:  # joints between two markers
+        values = columns[some][:, free] / factor
+        for entry in set(range(entries.shape[1])) - set(found):
+            off = _apart((values[:, :, None] + values[:, None]) / 2, entries[some, entry, None, None])
+            one, other = np.unravel_index(int(np.argmin(off)), off.shape)
+            if off[one, other] < most:
+                found[entry] = [int(free[one]), int(free[other])]
+    return found, factor
+
+
+def _apart(values: Array, wanted: Array) -> Array:
+    """Return the largest difference over the frames where something is known; infinite where nothing is."""
+    known = np.broadcast_to(
+        np.isfinite(wanted), values.shape[:1] + np.broadcast_shapes(values.shape[1:], wanted.shape[1:])
+    )
+    off = np.where(known, np.nan_to_num(np.abs(values - wanted), nan=np.inf), 0.0).max(axis=0, initial=0.0)
+    return np.where(known.any(axis=0), off, np.inf)
+
+
+def _euler(motion: Motion) -> dict[str, Any]:
+    """Return how a robot's table writes the rotation of the root as angles; empty if it does not."""
+    turn = (
+        load_layout(motion.layout).fields.get("rotation", {})
+        if motion.q is not None and motion.layout
+        else {}
+    )
+    return turn if "euler" in turn else {}
+
+
+def _turned(before: Motion, after: Motion, rows: NDArray[np.intp]) -> Array:
+    """Return the change (T', 3) of the angles of the root, in the unit of the file."""
+    turn = _euler(before)
+    degrees = turn.get("unit") == "deg"
+    old, new = (
+        Rotation.from_quat(np.asarray(one.q)[:, 3:7]).as_euler(turn["euler"].upper(), degrees)
+        for one in (before, after)
+    )
+    step = turned_near(new - old[rows], 0.0, half_turn=180.0 if degrees else np.pi)
+    signs = np.array(turn.get("signs", (1.0, 1.0, 1.0)))
+    return np.asarray(np.where(np.abs(step) > TINY, step, 0.0) * signs)
+
+
+def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], change: Change) -> bytes | None:
+    """Return a text whose last `count` lines with numbers are changed; None if they are not one a frame."""
+    lines = whole.splitlines(keepends=True)
+    at = [number - 1 for number in table.numbers_of_lines[-count:]]
+    apart = table.delimiter or r"\s+"
+    parted = [re.split(f"({apart})", lines[k].rstrip("\r\n")) for k in at]
+    cells = [[k for k in range(0, len(one), 2) if table.delimiter or one[k]] for one in parted]
+    width = max(map(len, cells))
+    values = np.full((count, width), np.nan)
+    for k, (parts, places) in enumerate(zip(parted, cells, strict=True)):
+        values[k, : len(places)] = numbers([parts[place].strip() for place in places])
+    if len(table.lines) < count or np.isnan(values).all(axis=1).any():
+        return None
+    new = change(values, [*table.names, *[""] * (width - len(table.names))][:width])
+    changed = (new != values[rows]) & np.isfinite(new)
+    made = []
+    for k, row in enumerate(rows.tolist()):
+        parts = list(parted[row])
+        for column in np.flatnonzero(changed[k]).tolist():
+            old = parts[cells[row][column]]
+            parts[cells[row][column]] = old.replace(old.strip(), _like(old.strip(), float(new[k, column])))
+        end = lines[at[row]]
+        made.append("".join(parts) + end[len(end.rstrip("\r\n")) :])
+    return "".join([*lines[: at[0]], *made, *lines[at[-1] + 1 :]]).encode()
+
+
+def _like(cell: str, value: float) -> str:
+    """Write a number as a cell is written: its decimals, its decimal comma, its exponent."""
+    mantissa, exponent, _ = cell.lower().replace(",", ".").partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    if not decimals and value.is_integer():
+        return f"{value:.0f}"
+    before_point = 1 if exponent else len(f"{abs(value):.0f}")
+    written = f"{value:.{max(decimals, DIGITS - before_point)}{exponent or 'f'}}"
+    return written.replace(".", ",") if "," in cell else written
+
+
+def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> bytes | None:
+    """Return arrays of NPZ, NPY or a pickle with changed ones; what does not change keeps its bytes in an NPZ."""
+    file = io.BytesIO()
+    if data[:6] == b"\x93NUMPY":
+        np.save(file, change("", np.load(io.BytesIO(data), allow_pickle=False)))
+        return file.getvalue()
+    if data[:2] != b"PK":
+        return pickle.dumps(_in_tree(unpickled(data, source), change))
+    with zipfile.ZipFile(io.BytesIO(data)) as given, zipfile.ZipFile(file, "w") as made:
+        for member in given.infolist():
+            held = given.read(member)
+            if member.filename.endswith("data.pkl"):  # tensors of PyTorch
+                return None
+            try:
+                array = np.load(io.BytesIO(held), allow_pickle=False)
+            except ValueError:  # of objects, or no array
+                array = None
+            new = change(member.filename.removesuffix(".npy"), array)
+            if new is not array:
+                changed = io.BytesIO()
+                np.save(changed, new)
+                held = changed.getvalue()
+            made.writestr(member, held)
+    return file.getvalue()
+
+
+def _in_tree(value: Any, change: Callable[[str, Any], Any], name: str = "") -> Any:
+    """Change the arrays of nested dicts and lists."""
+    if isinstance(value, dict):
+        return {key: _in_tree(one, change, str(key)) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_in_tree(one, change, name) for one in value]
+    return change(name, value)
