@@ -15,7 +15,9 @@ from posekit.following import Tracker, follow
 from posekit.following.kalman import DENSITY, Moving, smooth, steps
 from posekit.following.lines import answers
 from posekit.following.paths import SKIP, Candidates, Trellis, _usual_step, candidates, step_costs
+from posekit.formats.layout import load_layout
 from posekit.recovery import Answer, Frames, Recovery, Survivors
+from posekit.skeleton import JOINTS
 
 FIGURE = load_figure()
 STANDING = FIGURE.neutral_points[:14] + np.array([0.0, 0.0, 4.0])
@@ -193,6 +195,30 @@ def test_tracker_tells_what_recover_finds(walk):
         alone = posekit.recover(view)
         np.testing.assert_allclose(one.joints, alone.answer.joints[0], atol=1e-9)
         assert np.linalg.norm(one.joints - points[k], axis=1).mean() < 0.25
+
+
+def test_tracker_tells_of_a_detectors_points_what_recover_finds(walk):
+    _, image = walk
+    layout = load_layout("coco_17")
+    points = np.full((17, 3), np.nan)
+    for k, name in enumerate(layout.points):
+        if name in JOINTS:
+            points[k] = [*image[0, JOINTS.index(name)], 0.9]
+    live = tracker(layout="coco_17")
+    told = live.update(points, time=0.0)
+    names, seen, _ = layout.seen((), points[None, :, :2])
+    detections = posekit.Detections(
+        points=seen,
+        names=names,
+        frame=[0],
+        confidence=np.where(np.isnan(seen[..., 0]), np.nan, 0.9),
+    )
+    view = replace(detections.view(live.camera, deviation=1.0), lengths=LENGTHS)
+    np.testing.assert_allclose(told.joints, posekit.recover(view).answer.joints[0], atol=1e-9)
+    points[layout.points.index("left_shoulder")] = np.nan
+    hidden = live.update(points, time=0.1)
+    assert "neck" in hidden.reason
+    assert np.isnan(hidden.joints).all()
 
 
 def test_tracker_goes_on_without_a_person(walk):

@@ -181,14 +181,17 @@ class Tracker:
             raise refusal(
                 "Tracker", "time", f"{time:g}", f"seconds after {self._last:g}", "give every picture its time"
             )
-        view = self._view(np.array(points, dtype=np.float64), float(time), root)
-        recovery, reason = None, "the neck is not seen"
-        if view is not None:
-            try:
-                recovery = recover(view, self.settings)
-                reason = recovery.frames.reason[0]
-            except PosekitError as error:
-                reason = str(error)
+        table = np.array(points, dtype=np.float64)
+        counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
+        if table.ndim != 2 or len(table) not in counts or table.shape[1] not in (2, 3):
+            expected = f"({' or '.join(map(str, counts))}, 2) or 3 columns"
+            raise refusal("Tracker", "points", f"shape {table.shape}", expected, "give NaN for gaps")
+        recovery = None
+        try:
+            recovery = recover(self._view(table, float(time), root), self.settings)
+            reason = recovery.frames.reason[0]
+        except PosekitError as error:
+            reason = str(error)
         frame = Candidates(time, np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS), 3, 3)), np.empty(0))
         if recovery is not None:
             frame = candidates(recovery, 0)._replace(time=float(time))
@@ -218,49 +221,24 @@ class Tracker:
         self._trellis.stages.pop(0)
         return PathPosture(number, frame.time, joints)
 
-    def _view(self, points: Array, time: float, root: ArrayLike | None) -> View | None:
-        """Make the view of one picture; None where it shows no neck."""
-        counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
-        if points.ndim != 2 or len(points) not in counts or points.shape[1] not in (2, 3):
-            wanted = " or ".join(str(count) for count in counts)
-            raise refusal(
-                "Tracker",
-                "points",
-                f"shape {points.shape}",
-                f"({wanted}, 2) or 3 columns",
-                "give NaN for gaps",
-            )
-        image = np.where(np.isnan(points[:, :2]).any(axis=1, keepdims=True), np.nan, points[:, :2])
-        confidence = points[:, 2:] if points.shape[1] == 3 else np.full((len(points), 1), np.nan)
+    def _view(self, points: Array, time: float, root: ArrayLike | None) -> View:
+        """Make the view of one picture; raise `PosekitError` if it does not show the neck."""
+        missing = np.isnan(points[:, :2]).any(axis=1, keepdims=True)
+        image = np.where(missing, np.nan, points[:, :2])[None]
+        confidence = np.where(missing, np.nan, points[:, 2:] if points.shape[1] == 3 else np.nan)[None]
+        names = POINTS[: len(points)]
         if self.layout:
-            names, seen, _ = self.layout.seen((), image[None])
-            unsure = np.where(np.isnan(image[:, :1]), np.nan, confidence)
-            _, sure, _ = self.layout.seen((), unsure[None])
-            kept = [k for k, name in enumerate(names) if name in POINTS]
-            detections = Detections(
-                points=seen[:, kept],
-                confidence=sure[:, kept, 0],
-                names=tuple(names[k] for k in kept),
-                frame=np.zeros(1, dtype=np.intp),
-                time=np.array([time]),
-                layout=self.layout.name,
-            )
-            if not np.isfinite(detections.points).any():
-                return None
-            view = replace(detections.view(self.camera), **self._known)
-        else:
-            every = np.full((len(POINTS), 3), np.nan)
-            every[: len(image)] = np.concatenate([image, confidence], axis=1)
-            if np.isnan(every[0, 0]):
-                return None
-            view = View(
-                camera=self.camera,
-                time=np.array([time]),
-                image=every[None, : len(JOINTS), :2],
-                head_image=every[None, len(JOINTS) :, :2],
-                confidence=every[None, :, 2],
-                **self._known,
-            )
-        if np.isnan(view.image[0, 0, 0]):
-            return None
+            names, image, _ = self.layout.seen((), image)
+            confidence = self.layout.seen((), confidence)[1]
+        kept = [k for k, name in enumerate(names) if name in POINTS]
+        detections = Detections(
+            points=image[:, kept],
+            confidence=confidence[:, kept, 0],
+            names=tuple(names[k] for k in kept),
+            frame=np.zeros(1, dtype=np.intp),
+            time=np.array([time]),
+        )
+        if "neck" not in names or np.isnan(image[0, names.index("neck")]).any():
+            raise PosekitError("the neck is not seen")
+        view = replace(detections.view(self.camera), **self._known)
         return view if root is None else replace(view, root=np.asarray(root, dtype=np.float64)[None])
