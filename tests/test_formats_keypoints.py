@@ -423,7 +423,7 @@ SIDES_OF = {"arms": [5, 6, 7, 8, 9, 10], "legs": [11, 12, 13, 14, 15, 16]}
     ("jumps", "said"),
     [
         ({"arms": (7, 8), "legs": (7, 8)}, "left and right jump in 2 pictures: 7, 8"),
-        ({"arms": (4,), "legs": (4,)}, "left and right jump in 1 pictures: 4"),
+        ({"arms": (4,), "legs": (4,)}, "left and right jump in 1 picture: 4"),
         ({"legs": (9, 10, 11)}, "left and right jump in 3 pictures: 9, 10, 11"),
         ({"arms": (6,), "legs": (12,)}, "left and right jump in 2 pictures: 6, 12"),
         ({"arms": tuple(range(5, 12))}, "left and right jump in 7 pictures: 5, 6, 7, 8, 9, …"),

@@ -84,7 +84,8 @@ def side_warnings(points: Array, confidence: Array, frame: Ints, detections: Det
         ]
         if names:
             listed = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
-            found.append(f"{detections.source}: left and right jump in {len(names)} pictures: {listed}")
+            pictures = "1 picture" if len(names) == 1 else f"{len(names)} pictures"
+            found.append(f"{detections.source}: left and right jump in {pictures}: {listed}")
     evidence = _opposed(body, confidence, around)
     total = sum(evidence.values())
     if "shoulders against hips" in evidence or total > SURE:
