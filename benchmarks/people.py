@@ -105,7 +105,7 @@ def neck_unknown(view: View) -> View:
 
 def taped(view: View) -> View:
     """Return a view with lengths as of a tape: `TAPE_DEVIATION` off in common, and each; none is stated."""
-    rng = np.random.default_rng(len(view))
+    rng = np.random.default_rng(int(1e6 * abs(view.image[0, 0, 0])))  # another tape for each view
     off = TAPE_DEVIATION * (rng.normal() + rng.normal(size=len(view.lengths)))
     lengths = {name: length * np.exp(x) for (name, length), x in zip(view.lengths.items(), off, strict=True)}
     return replace(view, lengths=lengths, length_deviation=None)

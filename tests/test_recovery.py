@@ -300,9 +300,13 @@ def test_sure_is_the_probability_of_the_samples():
     sigma = 0.03
     covariance = np.broadcast_to(sigma**2 * np.eye(42), (1, 42, 42))
     answer = answer_of(truth, np.ones(1), covariance, LENGTHS)
-    from scipy.stats import chi
+    from scipy.stats import chi, chi2, norm, t
 
-    assert answer.sure == pytest.approx(chi(3).cdf(0.05 / sigma) ** 14, abs=0.1)
+    # A t distribution of 4 degrees of freedom is a normal one whose deviation varies with the root of 4 / chi2.
+    deviation = (
+        sigma * norm.ppf(0.975) / t(4).ppf(0.975) * np.sqrt(4 / chi2(4).ppf((np.arange(1000) + 0.5) / 1000))
+    )
+    assert answer.sure == pytest.approx(np.mean(chi(3).cdf(0.05 / deviation) ** 14), abs=0.1)
     assert answer.survivor == 0 and answer.representatives.tolist() == [0]
     shared = np.tile(np.eye(3), (14, 14)) * 0.2**2 + 1e-6 * np.eye(42)
     assert answer_of(truth, np.ones(1), shared[None], LENGTHS, relative=True).sure == pytest.approx(1.0)

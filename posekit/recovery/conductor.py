@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, LengthUncertainty
+from posekit.body import Figure, LengthUncertainty, segment_lengths
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
 from posekit.geometry import Array
@@ -133,16 +133,9 @@ CLIP_DEVIATION: Final = 0.02
 
 
 def _clip_lengths(recovery: Recovery) -> dict[str, float]:
-    """Return the lengths of one person over all frames: medians of the probability-weighted means of each frame."""
-    table = recovery.survivors
-    start, end = np.array(SEGMENTS).T
-    each = np.linalg.norm(table.joints[:, start] - table.joints[:, end], axis=2)
-    weight = np.asarray(table.probability)[:, None]
-    count = len(recovery)
-    sums = np.stack([np.bincount(table.frame, weight[:, 0] * one, count) for one in each.T], axis=1)
-    total = np.bincount(table.frame, weight[:, 0], count)
-    means = sums[total > 0] / total[total > 0, None]
-    return dict(zip(SEGMENT_NAMES, np.median(means, axis=0).tolist(), strict=True))
+    """Return the lengths of one person over all frames: medians over the survivors nearest to the answers."""
+    nearest = np.asarray(recovery.answer.survivor)
+    return segment_lengths(recovery.survivors.joints[nearest[nearest >= 0]])
 
 
 class _Conductor:
@@ -393,8 +386,14 @@ class _Conductor:
             return Found(
                 {}, None, rejected, judged, f"no posture passes: most fail {worst.replace('/', ' at ')}"
             )
-        table: dict[str, Any] = {name: values[rows] for name, values in columns.items()}
-        table |= {"probability": probability, "margins": {n: v[rows] for n, v in verdict.margins.items()}}
+        count = len(rows)
+        table: dict[str, Any] = {"chi2": np.zeros(count), "branch": np.full(count, "")}
+        table |= {
+            "radius": np.zeros((count, len(JOINTS))),
+            "inferred": np.zeros((count, len(JOINTS)), np.bool_),
+        }
+        table |= {name: values[rows] for name, values in columns.items()} | {"probability": probability}
+        margins = {name: values[rows] for name, values in verdict.margins.items()}
         given = bool(self.sight.given[self.sight.frame == k].all())
         answer = answer_of(
             table["joints"],
@@ -413,7 +412,7 @@ class _Conductor:
             table["radius"] = joint_radius(np.einsum("njajb->njab", block))
         if self.settings.group is not None:
             table["group"] = group_of(table["joints"], self.settings.group)
-        return Found(table, answer, rejected, judged, unlisted=unlisted, unlisted_probability=rest)
+        return Found(table, answer, rejected, judged, "", (), unlisted, rest, margins)
 
     def _answer_lengths(self, joints: Array, probability: Array) -> Array:
         """Return the lengths of the answer: the person's, in the mean size of the survivors."""

@@ -21,13 +21,15 @@ class Found(NamedTuple):
     Attributes
     ----------
     columns : mapping of str to array
-        Columns of `Survivors`, the likeliest first; ``margins`` by check.
+        Columns of `Survivors`, the likeliest first.
     answer : FrameAnswer or None
     rejected : mapping
     judged, reason : str
     levels : sequence of int
     unlisted : int
     unlisted_probability : float
+    margins : mapping of str to array
+        Of each check.
     """
 
     columns: Mapping[str, Any]
@@ -38,6 +40,7 @@ class Found(NamedTuple):
     levels: Sequence[int] = ()
     unlisted: int = 0
     unlisted_probability: float = 0.0
+    margins: Mapping[str, Any] = {}
 
     @property
     def size(self) -> int:
@@ -79,24 +82,15 @@ def gathered(
     counts = [one.size for one in found]
     starts = np.concatenate([[0], np.cumsum(counts)])
     tables = [one.columns for one in found if one.size]
-    gaps: dict[str, Any] = {"chi2": 0.0, "branch": "", "group": -1, "inferred": False, "radius": 0.0}
-    empty: dict[str, Any] = {
+    columns: dict[str, Any] = {
         "joints": np.empty((0, len(JOINTS), 3)),
         "head": np.empty((0, len(HEAD_POINTS), 3)),
     }
-    sizes = [one.size for one in found if one.size]
-
-    def stacked(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        """Put columns of frames one after the other; a frame that lacks one gets its fill."""
-        out = {}
-        for name, like in {name: np.asarray(one) for part in parts for name, one in part.items()}.items():
-            shape, fill = like.shape[1:], gaps.get(name, np.nan)
-            held = zip(parts, sizes, strict=True)
-            out[name] = np.concatenate([part.get(name, np.full((n, *shape), fill)) for part, n in held])
-        return out
-
-    margins = stacked([one["margins"] for one in tables])
-    columns = stacked([{k: v for k, v in one.items() if k != "margins"} for one in tables]) or empty
+    margins: dict[str, Any] = {}
+    if tables:
+        columns = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
+        judged = [one.margins for one in found if one.size]
+        margins = {name: np.concatenate([one[name] for one in judged]) for name in judged[0]}
     survivors = Survivors(
         frame=np.repeat(np.arange(len(found)), counts),
         q=person.inverse_kinematics(with_head(columns["joints"], columns["head"])),
