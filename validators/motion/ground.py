@@ -49,8 +49,6 @@ USUAL_STATURE: Final = 1.7
 #: Speed below which a point rests, metres a second: parts of a foot are slower in stance and faster in a swing.
 REST_SPEED: Final = 0.25
 
-HEELS_OF_SIDES: Final = (FEET_POINTS.index("right_heel"), FEET_POINTS.index("left_heel"))
-
 #: Height of a resting point above the body's lowest point up to which it carries the body, metres.
 NEAR_METRES: Final = 0.30
 
@@ -193,10 +191,8 @@ def ground_of(body: Body) -> Ground:
     lifted = line.of_frames(lifted_by(line.spread(height), legs, body.rate, body.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
     over_ground = feet @ up - over
-    for side in range(len(SIDES)):
-        # The ankle of a foot whose heel is not known is its heel: it is down when the toes are up.
-        if np.isfinite(over_ground[:, HEELS_OF_SIDES[side]]).any():
-            over_ground[:, len(FEET_POINTS) + side] = np.nan
+    # The ankle of a foot whose heel is not known is its heel: it is down when the toes are up.
+    over_ground[:, 4:][:, np.isfinite(over_ground[:, 2:4]).any(axis=0)] = np.nan
     sole = np.fmin.reduce(over_ground, axis=1)
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES

@@ -45,22 +45,16 @@ def hints(body: Body, found: Mapping[str, Judgement], frame: NDArray[np.intp]) -
                 )
     slides = found["sliding"].violated if "sliding" in found else np.zeros((1, 2), dtype=np.bool_)
     if slides.any(axis=1).mean() > BELT_SHARE:
-        speed, travel = _backward(body, slides)
+        hips, feet, up = body.joints[:, both("hip")], soles(body)[0], up_of(body)
+        forward = unit(cross(-up, np.nanmedian(hips[:, 1] - hips[:, 0], axis=0)))
+        backward = -dot(np.gradient(feet, body.dt, axis=0), forward)
+        # Points of feet are right and left in turn.
+        speed = known_median(backward[np.tile(slides, feet.shape[1] // 2)])
+        middle = perpendicular(hips.mean(axis=1), up)
+        travel = float(norm(np.nanmax(middle, axis=0) - np.nanmin(middle, axis=0)))
         if speed > BELT_SPEED and travel < IN_PLACE_SHARE * speed * len(body) * body.dt:
             said.append(
                 f"Feet go backward at {speed:.2g} m/s under a body that stays in place, as on a treadmill: judge it "
                 "by a profile without sliding (--profile FILE.toml), or add the way of the belt to all points."
             )
     return said
-
-
-def _backward(body: Body, slides: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return how fast sliding feet (T, 2) go backward, metres a second, and how far the hips travel, metres."""
-    hips, up = body.joints[:, both("hip")], up_of(body)
-    forward = unit(cross(-up, np.nanmedian(hips[:, 1] - hips[:, 0], axis=0)))
-    middle = perpendicular(hips.mean(axis=1), up)
-    travel = float(norm(np.nanmax(middle, axis=0) - np.nanmin(middle, axis=0)))
-    feet = soles(body)[0]
-    velocity = np.gradient(feet, body.dt, axis=0)
-    # Points of feet are right and left in turn.
-    return -known_median(dot(velocity, forward)[np.tile(slides, feet.shape[1] // 2)]), travel

@@ -29,6 +29,14 @@ _PAIR_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
 #: Pairs that a segment of a limb joins.
 _LIMB_LINKS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
 
+#: Sign of each evidence in each state (7, 64): that two pairs belong together, where hips face, and where shoulders do.
+_AS_LABELLED: Final = np.array(
+    [
+        *(1 - 2 * (_PAIR_STATES[:, a] != _PAIR_STATES[:, b]) for a, b in (*_LIMB_LINKS, (0, 3))),
+        *(1 - 2 * _PAIR_STATES[:, k] for k in (3, 0)),
+    ]
+)
+
 #: Difference of fit that is full evidence of how two pairs belong together, as a share of the length.
 LENGTH_SHARE: Final = 0.1
 
@@ -76,22 +84,15 @@ def exchanged_pairs(
     if not count:
         return np.zeros((0, 6), dtype=np.bool_)
     across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
-    together, hips, shoulders = _evidence(joints, across, feet, head, NOISE_FACTOR * noise)
+    evidence = _evidence(joints, across, feet, head, NOISE_FACTOR * noise)
     continuity = _continuity(joints, across)
     known = np.isfinite(across[..., 0])
     gap = ~((known[1:] & known[:-1]).any(axis=1) & follows)
     continuity[gap] = 0.0
     firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | gap]))
-    sums = [np.add.reduceat(one, firsts, axis=0) for one in (together, hips, shoulders)]
     lengths = np.diff(np.append(firsts, count))
-    relations = [
-        _PAIR_STATES[:, first] != _PAIR_STATES[:, second] for first, second in (*_LIMB_LINKS, (0, 3))
-    ]
     energy = EXCHANGED_COST * lengths[:, None] * _PAIR_STATES.sum(axis=1)
-    for k, apart in enumerate(relations):
-        energy = energy + sums[0][:, k, None] * np.where(apart, -1.0, 1.0)
-    energy = energy - sums[1][:, None] * np.where(_PAIR_STATES[:, 3], -1.0, 1.0)
-    energy = energy - sums[2][:, None] * np.where(_PAIR_STATES[:, 0], -1.0, 1.0)
+    energy = energy - np.add.reduceat(evidence, firsts, axis=0) @ _AS_LABELLED
     chosen = _least(energy, continuity[firsts[1:] - 1])
     return np.asarray(np.repeat(_PAIR_STATES[chosen].astype(np.bool_), lengths, axis=0))
 
@@ -106,10 +107,8 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
     return mended
 
 
-def _evidence(
-    joints: Array, across: Array, feet: Array, head: Array, unsure: float
-) -> tuple[Array, Array, Array]:
-    """Return the evidence, -1 to 1, that pairs are as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
+def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: float) -> Array:
+    """Return the evidence, -1 to 1, that pairs are as labelled (T, 7): five relations, hips, shoulders."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
@@ -121,23 +120,21 @@ def _evidence(
         )
         length = _length(straight, crossed, TORN_METRES + unsure / 2.0)
         off, off_crossed = (np.abs(one - length).sum(axis=1) for one in (straight, crossed))
-        together[:, k] = _sure((off - off_crossed) / np.fmax(LENGTH_SHARE * length, unsure + 1e-9))
+        together[:, k] = _sure((off_crossed - off) / np.fmax(LENGTH_SHARE * length, unsure + 1e-9))
     trunk = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
     across_shoulders, across_hips = across[:, 0], across[:, 3]
     sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
-    together[:, 4] = _sure(-dot(across_shoulders, across_hips) / sizes * 2.0)
+    together[:, 4] = _sure(dot(across_shoulders, across_hips) / sizes * 2.0)
     forward = unit(cross(trunk, across_hips))
-    bends = []
-    for right in (RIGHT_JOINTS, LEFT_JOINTS):
-        hip, knee, ankle = (joints[:, right[k]] for k in (3, 4, 5))
-        # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
-        bends.append(dot(knee - (hip + ankle) / 2.0, forward))
+    # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
+    legs = (joints[:, both("hip")] + joints[:, both("ankle")]) / 2.0
+    bends = dot(joints[:, both("knee")] - legs, forward[:, None])
     toes = dot(feet[:, :2] - joints[:, both("ankle")], forward[:, None])
-    hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
+    hips = _sure(bends.sum(axis=1) / (2 * max(BEND_METRES, unsure)))
     hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
     facing = unit(cross(trunk, across_shoulders))
     nose = dot(head[:, 0] - (head[:, 3] + head[:, 4]) / 2.0, facing)
-    return together, hips, _sure(nose / max(BEND_METRES, unsure))
+    return np.column_stack([together, hips, _sure(nose / max(BEND_METRES, unsure))])
 
 
 def _length(straight: Array, crossed: Array, torn: float) -> float:
