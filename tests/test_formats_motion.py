@@ -220,6 +220,10 @@ def test_position_channels_may_stand_in_place_of_offsets(tmp_path: Path) -> None
         ("Zrotation", "Wrotation", "channels"),
         ("OFFSET", "OFSET", "OFFSET"),
         ("HIERARCHY", "HIERACHY", "HIERARCHY"),
+        *(
+            ("Frames: 24", f"Frames: {count}", "positive whole number")
+            for count in ("0", "-24", "x", "24.0", "²4")
+        ),
         ("\t}\n}\nMOTION", "\t}\nMOTION", "}"),
     ],
 )

@@ -197,6 +197,9 @@ def test_a_mocap_view_has_the_camera_in_the_world_and_the_lengths_of_the_clip() 
 def test_mocap_views_share_frames_evenly_over_the_clips() -> None:
     views = mocap_views(walking(3, 30), 8, np.random.default_rng(0))
     assert [len(view) for view in views] == [3, 3, 2]
+    short = walking(3, 30).take(np.r_[0:2, 30:90])
+    assert [len(view) for view in mocap_views(short, 9, np.random.default_rng(0))] == [2, 4, 3]
+    assert [len(view) for view in mocap_views(short, 62, np.random.default_rng(0))] == [2, 30, 30]
     for view in views:
         assert np.isfinite(view.image).all()
 
