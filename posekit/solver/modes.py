@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -86,12 +85,8 @@ class Modes:
 
         :math:`-\chi^2 / 2 - \ln \det H / 2`.
         """
-        return np.asarray(-self.chi2 / 2 - self._summaries[0] / 2)
-
-    @cached_property
-    def _summaries(self) -> tuple[Array, Array]:
-        logdet, covariance = run("summaries", self.problem, self.frame, self.x, KNOWN)
-        return logdet, covariance
+        found = run("log_determinants", self.problem, self.frame, self.x, KNOWN)
+        return np.asarray(-self.chi2 / 2 - found / 2)
 
     def covariance(self, rows: Ints | slice = slice(None)) -> Array:
         """Return the covariance of all joint positions of some modes (K, 42, 42), square metres."""

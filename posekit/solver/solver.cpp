@@ -378,56 +378,6 @@ void inform(Normal& n, const Problem& p, const double* at, const double known[3]
     }
 }
 
-// Logarithm of the determinant of the information, and every joint's covariance.
-double summarize(Normal& n, double covariance[J][3][3]) {
-  double add_l[4][6], add_t[T], inverse[T][T] = {}, logdet = 0;
-  if (!eliminate(n, 0, 31, add_l, add_t)) return NAN;
-  for (int c = 0; c < T; ++c) {  // inverse of the trunk's factor, then of the trunk's matrix
-    for (int i = c; i < T; ++i) {
-      double s = i == c;
-      for (int k = c; k < i; ++k) s -= n.H[k][i] * inverse[k][c];
-      inverse[i][c] = s / n.H[i][i];
-    }
-    logdet += 2 * std::log(n.H[c][c]);
-  }
-  double S[T][T] = {};
-  for (int k = 0; k < T; ++k)
-    for (int i = 0; i <= k; ++i)
-      for (int j = 0; j <= k; ++j) S[i][j] += inverse[k][i] * inverse[k][j];
-  for (int j = 0; j < TRUNK; ++j)
-    for (int i = 0; i < 9; ++i) covariance[j][i / 3][i % 3] = S[3 * j + i / 3][3 * j + i % 3];
-  for (int m = 0; m < 4; ++m) {
-    double U[6][6] = {}, K[6][T], M[6][T];  // U: inverse of the limb's factor; K = U' C
-    for (int c = 0; c < 6; ++c) {
-      for (int i = c; i < 6; ++i) {
-        double s = i == c;
-        for (int k = c; k < i; ++k) s -= n.L[m][k][i] * U[k][c];
-        U[i][c] = s / n.L[m][i][i];
-      }
-      logdet += 2 * std::log(n.L[m][c][c]);
-    }
-    for (int i = 0; i < 6; ++i)
-      for (int c = 0; c < T; ++c) {
-        K[i][c] = 0;
-        for (int k = i; k < 6; ++k) K[i][c] += U[k][i] * n.C[m][k][c];
-      }
-    for (int i = 0; i < 6; ++i)
-      for (int c = 0; c < T; ++c) {
-        M[i][c] = 0;
-        for (int k = 0; k < T; ++k) M[i][c] += K[i][k] * S[k][c];
-      }
-    for (int e = 0; e < 2; ++e)
-      for (int i = 3 * e; i < 3 * e + 3; ++i)
-        for (int j = 3 * e; j < 3 * e + 3; ++j) {
-          double s = 0;
-          for (int k = std::max(i, j); k < 6; ++k) s += U[k][i] * U[k][j];
-          for (int c = 0; c < T; ++c) s += M[i][c] * K[j][c];
-          covariance[e ? END[m] : MID[m]][i - 3 * e][j - 3 * e] = s;
-        }
-  }
-  return logdet;
-}
-
 // The matrix of the normal equations, dense, in the order of the unknowns.
 void spread(const Normal& n, double H[N][N]) {
   int trunk[T];
@@ -489,36 +439,41 @@ py::tuple descend_all(py::array problems, py::object limits, Longs which, Double
   return py::make_tuple(x, chi2, steps);
 }
 
-// Information on the unknowns of whole bodies as dense matrices (M, 43, 43).
-py::array_t<double> information(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+// Hands the information on the unknowns of each body to `take`.
+template <typename Take>
+void informed(const py::array& problems, const py::object& limits, const Longs& which, const Doubles& at,
+              const Doubles& known, Take take) {
   const Problem* p = problems_of(problems);
   const Limits* L = limits_of(limits);
-  const py::ssize_t count = which.size();
-  py::array_t<double> matrix({count, (py::ssize_t)N, (py::ssize_t)N});
   Normal n;
-  for (py::ssize_t k = 0; k < count; ++k) {
+  for (py::ssize_t k = 0; k < which.size(); ++k) {
     const double* x = at.data() + k * N;
     evaluate(p[which.data()[k]], L, x, 31, &n);
     inform(n, p[which.data()[k]], x, known.data());
-    spread(n, reinterpret_cast<double(*)[N]>(matrix.mutable_data() + k * N * N));
+    take(k, n);
   }
-  return matrix;
 }
 
-// Logarithms of determinants (M,) of the information, and covariances (M, 14, 3, 3) of joints.
-py::tuple summaries(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
-  const Problem* p = problems_of(problems);
-  const Limits* L = limits_of(limits);
-  const py::ssize_t count = which.size();
-  py::array_t<double> logdet(count), covariance({count, (py::ssize_t)J, (py::ssize_t)3, (py::ssize_t)3});
-  Normal n;
-  for (py::ssize_t k = 0; k < count; ++k) {
-    const double* x = at.data() + k * N;
-    evaluate(p[which.data()[k]], L, x, 31, &n);
-    inform(n, p[which.data()[k]], x, known.data());
-    logdet.mutable_data()[k] = summarize(n, reinterpret_cast<double(*)[3][3]>(covariance.mutable_data() + k * J * 9));
-  }
-  return py::make_tuple(logdet, covariance);
+// As dense matrices (M, 43, 43).
+py::array_t<double> information(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+  py::array_t<double> found({which.size(), (py::ssize_t)N, (py::ssize_t)N});
+  informed(problems, limits, which, at, known, [&](py::ssize_t k, const Normal& n) {
+    spread(n, reinterpret_cast<double(*)[N]>(found.mutable_data() + k * N * N));
+  });
+  return found;
+}
+
+// Logarithms of the determinants (M,); NaN where one is not positive.
+py::array_t<double> log_determinants(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+  py::array_t<double> found(which.size());
+  informed(problems, limits, which, at, known, [&](py::ssize_t k, Normal& n) {
+    double add_l[4][6], add_t[T], total = eliminate(n, 0, 31, add_l, add_t) ? 0 : NAN;
+    for (int c = 0; c < T; ++c) total += 2 * std::log(n.H[c][c]);
+    for (int m = 0; m < 4; ++m)
+      for (int c = 0; c < 6; ++c) total += 2 * std::log(n.L[m][c][c]);
+    found.mutable_data()[k] = total;
+  });
+  return found;
 }
 
 // For bodies by frame, the best first, whether each differs from all that are kept before: see modes.py.
@@ -610,7 +565,7 @@ py::array_t<double> stated_all(py::object limits, int limb, Doubles bodies, doub
 PYBIND11_MODULE(_compiled, m) {
   m.def("descend", &descend_all);
   m.def("information", &information);
-  m.def("summaries", &summaries);
+  m.def("log_determinants", &log_determinants);
   m.def("separate", &separate);
   m.def("distinct", &distinct);
   m.def("stated", &stated_all);
