@@ -39,7 +39,7 @@ from posekit.tree import Trees, grow
 
 #: Frames that are recovered together, under noise and where points may be exact: enough to spread NumPy's overhead. The
 #: result does not depend on them.
-FRAMES_AT_ONCE, EXACT_FRAMES_AT_ONCE = 64, 512
+FRAMES_AT_ONCE, EXACT_FRAMES_AT_ONCE = 64, 128
 
 #: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
 MANY: Final = 3000
