@@ -206,7 +206,6 @@ struct Stated {
 // it open, a rotation is not known (validators/joint_range.py; all in degrees).
 Stated stated(const Limits& L, int limb, const double g[4], double tolerance, double straight) {
   constexpr double RADIAN = M_PI / 180, UNSEEN = 45;
-  const bool arm = limb < 2 && L.by_elevation > 0;
   const double sine = std::fabs(std::sin(g[3])), least = std::max(tolerance * RADIAN / M_PI, 2.2250738585072014e-308);
   const double turn = tolerance / std::max(std::isnan(sine) ? 1.0 : sine, least);
   const bool open = turn > UNSEEN || sine < std::sin(straight * RADIAN);
@@ -215,17 +214,17 @@ Stated stated(const Limits& L, int limb, const double g[4], double tolerance, do
     const Written w = written(L, limb, g, reading, way, tolerance * RADIAN);
     double worst = NAN;
     for (int i = 0; i < 4; ++i) {
-      const double value = i == 2 && open ? NAN : w.value[i] / RADIAN, allowed = i == 2 ? turn : tolerance;
-      const double low = w.bound[0][i] / RADIAN, high = w.bound[1][i] / RADIAN;
-      out.row[0][i] = value, out.row[1][i] = low, out.row[2][i] = high, out.row[3][i] = allowed;
-      worst = std::fmax(worst, std::max(low - value, value - high) - allowed);
+      out.row[0][i] = i == 2 && open ? NAN : w.value[i] / RADIAN, out.row[3][i] = i == 2 ? turn : tolerance;
+      out.row[1][i] = w.bound[0][i] / RADIAN, out.row[2][i] = w.bound[1][i] / RADIAN;
+      const double away = std::max(out.row[1][i] - out.row[0][i], out.row[0][i] - out.row[2][i]);
+      worst = std::fmax(worst, away - out.row[3][i]);
     }
     return worst;
   };
   Stated best, other;
   if (!(state(limb < 2, best) > 0)) return best;
   double least_worst = INFINITY;
-  for (int way = 0; way < (arm ? 2 : 4); ++way) {
+  for (int way = 0; way < (limb < 2 && L.by_elevation > 0 ? 2 : 4); ++way) {
     const double worst = state(way, other);
     if (worst < least_worst) least_worst = worst, best = other;
   }

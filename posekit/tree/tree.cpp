@@ -36,8 +36,7 @@ int column_of(int joint, int level, std::int64_t code) {
 
 // Distance between segments g + t b and s a, s and t in [-1, 1] (robots/collision.py).
 double segment_distance(Vec g, Vec a, Vec b) {
-  const double ab = dot(a, b), ag = dot(a, g), bg = dot(b, g);
-  const double aa = dot(a, a), bb = dot(b, b);
+  const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ag = dot(a, g), bg = dot(b, g);
   const Vec normal = cross(a, b);
   const double determinant = dot(normal, normal), da = aa > 0 ? aa : 1, db = bb > 0 ? bb : 1;
   auto clip = [](double x) { return std::min(std::max(x, -1.0), 1.0); };
@@ -146,11 +145,10 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
   for (py::ssize_t k = 0; k < steps.shape(0); ++k) asks.emplace_back(reinterpret_cast<const Step*>(steps.data())[k]);
   std::vector<std::int64_t> left_frame, left_code, lost, nodes, next;
   std::vector<double> numbers;
-  const std::int64_t *frames = frame.data(), *codes = code.data();
   double x[J][3] = {};
   for (py::ssize_t at = 0, end = 0; at < frame.size(); at = end) {
-    const std::int64_t f = frames[at];
-    for (nodes.clear(); end < frame.size() && frames[end] == f; ++end) nodes.push_back(codes[end]);
+    const std::int64_t f = frame.data()[at];
+    for (nodes.clear(); end < frame.size() && frame.data()[end] == f; ++end) nodes.push_back(code.data()[end]);
     const double(*positions)[3] = reinterpret_cast<const double(*)[3]>(table.data() + f * table.shape(1) * 3);
     const std::int8_t* states = state.data() + f * state.shape(1);
     const double* shortfall = excess.data() + f * state.shape(1);
