@@ -20,7 +20,6 @@ from posekit.motion.repair.legal import (
     Configurations,
     PostureBounds,
     nearest_valid,
-    straightened,
     tied,
 )
 from posekit.motion.repair.pieces import between, interpolated
@@ -177,14 +176,11 @@ class Clip:
             bad = np.flatnonzero(rejected(one for _, one in found.values()))
             if not bad.size:
                 break
-            target = given
-            if "joint-range" in found:
-                target = straightened(given, found["joint-range"][1])
             bounds = PostureBounds([check for check, _ in found.values()], now.body())
             changed = np.flatnonzero((np.nan_to_num(out - given) != 0).any(axis=(1, 2)))
             out = tied(
                 partial(nearest_valid, bounds),
-                target,
+                given,
                 np.union1d(bad, changed),
                 TIED_SWEEPS if self.motion.in_time else 0,
             )

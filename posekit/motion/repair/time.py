@@ -35,8 +35,6 @@ WIDER_FRAMES: Final = (3, 10)
 LASTING_SHARE: Final = 0.5
 #: Share of the largest displacement below which a body that stepped aside and back is where it was.
 SAME_PLACE_SHARE: Final = 0.15
-#: Frames from an end of a clip within which neighbours do not tell which frame is off.
-NEAR_END_FRAMES: Final = 4
 #: Frames a second of motion whose rate is not known.
 USUAL_RATE: Final = 30.0
 #: Frames before and after a span over which a length may have drifted there.
@@ -192,8 +190,7 @@ def _lengthen(clip: Clip, found: Rejected) -> Iterator[Clip]:
 def _step_back(clip: Clip, found: Rejected) -> Iterator[Clip]:
     """Take out steps of the whole body that last: between their frames there is nothing to interpolate.
 
-    The body goes on where it went before, and as many frames as possible stay. Near an end of the clip the other side
-    of the step says how it went on.
+    The body goes on where it went before, and as many frames as possible stay.
     """
     if found.frames("teleport") is None:
         return
@@ -201,8 +198,7 @@ def _step_back(clip: Clip, found: Rejected) -> Iterator[Clip]:
     bad = np.asarray(one.violated[:, one.places.index("body")])
     way, aside = np.zeros((len(clip), 3)), np.zeros((len(clip), 3))
     way[1:] = np.nan_to_num(np.nanmedian(np.diff(clip.points()[:, : len(JOINTS)], axis=0), axis=1))
-    for span in runs(bad):
-        start, stop = _jumped(way, *span)
+    for start, stop in runs(bad):
         known = [way[k] for k in (start - 1, stop) if 1 <= k < len(clip)]
         if not known:
             continue
@@ -220,17 +216,6 @@ def _most_stay(aside: Array) -> Array:
     """Return the shift (T, 3) that undoes displacements, such that as many frames as possible stay."""
     _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
     return np.asarray(aside[where[np.argmax(count)]] - aside)
-
-
-def _jumped(way: Array, start: int, stop: int) -> tuple[int, int]:
-    """Return the frames in which a body jumped."""
-    first = 1 if start <= NEAR_END_FRAMES else start
-    after = len(way) if stop >= len(way) - NEAR_END_FRAMES else max(stop, first + 1)
-    if (first, after) == (start, stop):
-        return start, stop
-    around = way[max(first - NEAR_END_FRAMES, 1) : after + NEAR_END_FRAMES]
-    frame = first + int(np.argmax(np.linalg.norm(way[first:after] - np.median(around, axis=0), axis=1)))
-    return frame, frame + 1
 
 
 def _interpolate(clip: Clip, found: Rejected) -> Iterator[Clip]:
