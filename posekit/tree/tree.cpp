@@ -186,8 +186,7 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
     for (std::int64_t node : nodes) left_frame.push_back(f), left_code.push_back(node);
   }
   auto longs = [](const std::vector<std::int64_t>& one) { return Longs((py::ssize_t)one.size(), one.data()); };
-  const Doubles values((py::ssize_t)numbers.size(), numbers.data());
-  return py::make_tuple(longs(left_frame), longs(left_code), longs(lost), values);
+  return py::make_tuple(longs(left_frame), longs(left_code), longs(lost), Doubles(numbers.size(), numbers.data()));
 }
 
 }  // namespace
