@@ -552,6 +552,17 @@ def test_spellings_of_a_robots_rows_read_alike(tmp_path: Path, spelling: str) ->
     assert np.abs(posekit.open(tmp_path / "rows.csv").q - motion.q).max() < 1e-8
 
 
+@pytest.mark.parametrize(("size", "degrees"), [(6.5, False), (7.5, True), (13.0, True)])
+def test_angles_of_more_than_a_turn_are_degrees(tmp_path: Path, size: float, degrees: bool) -> None:
+    motion = squatting()
+    rows, knee = np.array(motion.q), motion.q_names.index("left_knee_joint")
+    rows[:, 7:] = 0.0
+    rows[:, knee] = size
+    np.savetxt(tmp_path / "rows.csv", rows, delimiter=",")
+    found = posekit.open(tmp_path / "rows.csv", rate=RATE)
+    np.testing.assert_allclose(found.q[:, knee], np.radians(size) if degrees else size)
+
+
 def test_joints_that_a_robots_table_lacks_are_zero_and_said(tmp_path: Path) -> None:
     motion = squatting(yaw=0.6)
     from posekit.formats.layout import load_layout
