@@ -300,8 +300,8 @@ def test_impossible_detections_are_refused(fields, says):
 
 @pytest.mark.parametrize("name", [name for name, (d, _) in LENSES.items() if d])
 def test_lenses_are_undone_up_to_the_fold(name):
-    d, fisheye = LENSES[name]
-    d = np.array(d)
+    coefficients, fisheye = LENSES[name]
+    d = np.array(coefficients)
     turn = np.linspace(0, 2 * np.pi, 24)
     far = min(0.9 * fold_radius(d, fisheye=fisheye), 1.2)
     straight = far * np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.linspace(0.1, 1, 24)[:, None]
