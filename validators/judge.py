@@ -26,7 +26,6 @@ from posekit.validators.motion.hints import hints
 from posekit.validators.motion.profile import MOTION_CHECKS, load_profile, some_of
 from posekit.validators.motion.rate import rate_doubts
 from posekit.validators.motion.standing import balance
-from posekit.validators.motion.walking_phases import RULES_OVER_STRIDES, walking_phases
 from posekit.validators.report import NUMBERS, Report, joined
 from posekit.validators.rigid_parts import RigidParts
 from posekit.validators.robot import MimicJoints, Reach, RobotCollision, RobotRange, RobotTravel, sole_points
@@ -90,12 +89,7 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
     made = sorted(
         (one for one in made if one.name not in over_time), key=lambda one: rank.get(one.name, len(rank))
     )
-    chosen = list(some_of(profile, over_time))
-    rules = ",".join(str(rule) for rule in settings.rules if rule in RULES_OVER_STRIDES)
-    walks = "walking" in [one.name for one in made] and "walking-phases" not in over_time
-    if in_time and walks and rules and settings.walkers != "paper-printed":
-        chosen.append(walking_phases.with_thresholds(rules=rules))
-    return [*made, *chosen]
+    return [*made, *some_of(profile, over_time)]
 
 
 def _is_own(one: Check, known: Mapping[str, Check]) -> bool:

@@ -3,8 +3,7 @@
 The body plane holds the line from neck to pelvis and is normal to the moving direction. That is the direction that the
 trunk faces, midway between shoulders and hips; in a sequence it is the way of the neck (`WalkingRules.heading`). The
 paper takes the head's facing direction (walkers ``paper-printed``): a person who stands and turns the head by 15
-degrees then swings arm and leg of one side together, and breaks Rule 2. Of motion in space Rules 1, 2 and 4 are judged
-over strides (`posekit.validators.motion.walking_phases`).
+degrees then swings arm and leg of one side together, and breaks Rule 2.
 
 The *swing* of a joint is its displacement out of the body plane, less the one it has when the figure stands at
 neutral. A swing that is not clearly other than zero is no evidence: rules about it are undecided.

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from posekit.errors import cut, nearest, refusal, shown
 from posekit.validators.check import FunctionCheck
-from posekit.validators.motion import frames, orientation, published, sliding, speed, standing, walking_phases
+from posekit.validators.motion import frames, orientation, published, sliding, speed, standing
 
 PROFILE_SCHEMA: Final = "posekit.profile/1"
 
@@ -19,7 +19,7 @@ PROFILE_SCHEMA: Final = "posekit.profile/1"
 BUILT_IN: Final = ("posekit", "phuma", "protomotions", "holomotion", "skating")
 
 #: Modules with checks over time, in the order in which their checks are reported.
-_MODULES: Final = (orientation, frames, speed, standing, sliding, published, walking_phases)
+_MODULES: Final = (orientation, frames, speed, standing, sliding, published)
 
 #: Checks over time by name.
 MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
