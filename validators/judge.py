@@ -28,7 +28,14 @@ from posekit.validators.motion.rate import rate_doubts
 from posekit.validators.motion.standing import balance
 from posekit.validators.report import NUMBERS, Report, joined
 from posekit.validators.rigid_parts import RigidParts
-from posekit.validators.robot import MimicJoints, Reach, RobotCollision, RobotRange, RobotTravel, sole_points
+from posekit.validators.robot import (
+    mimic_joints,
+    reach,
+    robot_collision,
+    robot_range,
+    robot_travel,
+    sole_points,
+)
 from posekit.validators.walking import WalkingRules
 
 if TYPE_CHECKING:
@@ -41,7 +48,7 @@ POSTURE_CHECKS: Final[dict[str, Check]] = {
 
 #: Checks of a robot's configurations by name.
 ROBOT_CHECKS: Final[dict[str, Check]] = {
-    one.name: one for one in (Reach(), RobotRange(), RobotTravel(), MimicJoints(), RobotCollision(), balance)
+    one.name: one for one in (reach, robot_range, robot_travel, mimic_joints, robot_collision, balance)
 }
 
 USUAL_POSTURE_CHECKS: Final = ("rigid-parts", "joint-range", "collision")

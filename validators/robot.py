@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,7 +11,7 @@ from posekit.geometry import Array, cross, unit
 from posekit.settings import EXACT, MEASURED
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
 from posekit.validators.body import Body
-from posekit.validators.check import Judgement, NotAskedError
+from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.measured import MADE_UP_METRES
 from posekit.validators.ranges import load_ranges
 
@@ -36,30 +35,16 @@ MEASURED_FRAMES: Final = 300
 FOOT_SHARE, SOLE_METRES = 0.1, 0.02
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RobotRange:
-    """A joint is outside the limits of its URDF, or of the table of ranges that is asked for."""
-
-    name = "joint-range"
-    unit = "deg"
-    reads = ("q", "robot")
-
-    def judge(self, body: Body) -> Judgement:
-        """Compare the angles of all joints that have limits."""
-        return _range(body, "rad", float(np.degrees(1.0)))
+@check("joint-range", unit="deg", reads=("q", "robot"))
+def robot_range(body: Body) -> Judgement:
+    """Joints are outside the limits of their URDF, or of the table of ranges that is asked for."""
+    return _range(body, "rad", float(np.degrees(1.0)))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RobotTravel:
-    """A sliding joint is outside the limits of its URDF."""
-
-    name = "joint-travel"
-    unit = "m"
-    reads = ("q", "robot")
-
-    def judge(self, body: Body) -> Judgement:
-        """Compare the positions of all sliding joints that have limits."""
-        return _range(body, "m", 1.0)
+@check("joint-travel", unit="m", reads=("q", "robot"))
+def robot_travel(body: Body) -> Judgement:
+    """Sliding joints are outside the limits of their URDF."""
+    return _range(body, "m", 1.0)
 
 
 def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
@@ -100,77 +85,61 @@ def _of(body: Body) -> tuple[Robot, Array]:
     return body.robot, body.q
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MimicJoints:
-    """A joint does not follow the joint that it mimics."""
+@check("mimic", unit="deg", reads=("q", "robot"))
+def mimic_joints(body: Body) -> Judgement:
+    """Joints do not follow the joints that they mimic.
 
-    name = "mimic"
-    unit = "deg"
-    reads = ("q", "robot")
-
-    def judge(self, body: Body) -> Judgement:
-        """Measure how far mimicking joints are from the values of their targets."""
-        robot, q = _of(body)
-        mimics = getattr(robot, "mimics", ())
-        if not mimics:
-            raise NotAskedError("no joint of the URDF mimics another one")
-        value = np.degrees(robot.mimic_errors(q))
-        return Judgement([one.joint for one in mimics], value, 0.0, 0.0, MIMIC_DEGREES, scale=MIMIC_DEGREES)
+    Measure how far mimicking joints are from the values of their targets.
+    """
+    robot, q = _of(body)
+    mimics = getattr(robot, "mimics", ())
+    if not mimics:
+        raise NotAskedError("no joint of the URDF mimics another one")
+    value = np.degrees(robot.mimic_errors(q))
+    return Judgement([one.joint for one in mimics], value, 0.0, 0.0, MIMIC_DEGREES, scale=MIMIC_DEGREES)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RobotCollision:
-    """Two bodies of the robot penetrate each other."""
+@check("collision", unit="m", reads=("q", "robot"))
+def robot_collision(body: Body) -> Judgement:
+    """Two bodies of the robot penetrate each other.
 
-    name = "collision"
-    unit = "m"
-    reads = ("q", "robot")
-
-    def judge(self, body: Body) -> Judgement:
-        """Measure the distances of pairs that touch or are near; the place ``bodies`` is the nearest pair of all.
-
-        Distances of meshes that do not touch are measured for `MEASURED_FRAMES` frames at most: they cost ten times as
-        much as the verdict. Beyond, and farther than `NEAR_METRES`, the value is infinite.
-        """
-        robot, q = _of(body)
-        if not robot.collision_pairs:
-            raise NotAskedError("the robot has no bodies that can touch (--bodies capsules)")
-        made_up = getattr(robot, "bodies", "") == "capsules" and not body.settings.strict
-        margin = body.settings.contact_margin - (MADE_UP_METRES if made_up else 0.0)
-        known = np.flatnonzero(np.isfinite(q).all(axis=1))
-        shapes = [] if robot.geometry is None else robot.geometry.geometryObjects
-        cheap = len(known) <= MEASURED_FRAMES or all(
-            "BV" not in type(one.geometry).__name__ for one in shapes
-        )
-        found = robot.collisions(q[known], margin=max(margin, NEAR_METRES if cheap else 0.0))
-        pairs, column = np.unique(found.pair[found.distance < margin], return_inverse=True)
-        value = np.full((len(q), len(pairs) + 1), np.nan)
-        value[known] = np.inf
-        np.minimum.at(value[:, -1], known[found.frame], found.distance)
-        touching = found.distance < margin
-        value[known[found.frame[touching]], column] = found.distance[touching]
-        links = dict(zip(robot.body_names, robot.body_links, strict=True))
-        places = ["-".join(links[name] for name in robot.collision_pairs[pair]) for pair in pairs.tolist()]
-        # Pairs that touch are named themselves.
-        value[value[:, -1] < margin, -1] = np.inf
-        return Judgement([*places, "bodies"], value, margin, tolerance=CONTACT_METRES, scale=NEAR_METRES)
+    Measure the distances of pairs that touch or are near; the place ``bodies`` is the nearest pair of all.
+    Distances of meshes that do not touch are measured for `MEASURED_FRAMES` frames at most: they cost ten times as
+    much as the verdict. Beyond, and farther than `NEAR_METRES`, the value is infinite.
+    """
+    robot, q = _of(body)
+    if not robot.collision_pairs:
+        raise NotAskedError("the robot has no bodies that can touch (--bodies capsules)")
+    made_up = getattr(robot, "bodies", "") == "capsules" and not body.settings.strict
+    margin = body.settings.contact_margin - (MADE_UP_METRES if made_up else 0.0)
+    known = np.flatnonzero(np.isfinite(q).all(axis=1))
+    shapes = [] if robot.geometry is None else robot.geometry.geometryObjects
+    cheap = len(known) <= MEASURED_FRAMES or all("BV" not in type(one.geometry).__name__ for one in shapes)
+    found = robot.collisions(q[known], margin=max(margin, NEAR_METRES if cheap else 0.0))
+    pairs, column = np.unique(found.pair[found.distance < margin], return_inverse=True)
+    value = np.full((len(q), len(pairs) + 1), np.nan)
+    value[known] = np.inf
+    np.minimum.at(value[:, -1], known[found.frame], found.distance)
+    touching = found.distance < margin
+    value[known[found.frame[touching]], column] = found.distance[touching]
+    links = dict(zip(robot.body_names, robot.body_links, strict=True))
+    places = ["-".join(links[name] for name in robot.collision_pairs[pair]) for pair in pairs.tolist()]
+    # Pairs that touch are named themselves.
+    value[value[:, -1] < margin, -1] = np.inf
+    return Judgement([*places, "bodies"], value, margin, tolerance=CONTACT_METRES, scale=NEAR_METRES)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Reach:
-    """The robot cannot reach the given positions of joints within its limits."""
+@check("reach", unit="m", reads=("q", "robot"))
+def reach(body: Body) -> Judgement:
+    """Given positions of joints are beyond the reach of the robot within its limits.
 
-    name = "reach"
-    unit = "m"
-    reads = ("q", "robot")
-
-    def judge(self, body: Body) -> Judgement:
-        """Measure the distance of each joint of the fitted configuration from where it was given."""
-        if body.residual is None:
-            raise NotAskedError("configurations are given, not positions")
-        given = body.settings.rigid_tolerance
-        upper = MEASURED.rigid if given is None else given
-        return Judgement(JOINTS, body.residual, upper=upper, tolerance=body.noise)
+    Measure the distance of each joint of the fitted configuration from where it was given.
+    """
+    if body.residual is None:
+        raise NotAskedError("configurations are given, not positions")
+    given = body.settings.rigid_tolerance
+    upper = MEASURED.rigid if given is None else given
+    return Judgement(JOINTS, body.residual, upper=upper, tolerance=body.noise)
 
 
 @lru_cache(maxsize=4)

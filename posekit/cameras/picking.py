@@ -11,7 +11,6 @@ import numpy as np
 
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera
-from posekit.cameras.sides import side_warnings
 from posekit.cameras.tracking import areas, track
 from posekit.cameras.view import CameraModel, View
 from posekit.errors import refusal, shown
@@ -138,8 +137,7 @@ def view_of(
 
     A film's frames are its pictures, with those that do not show the person; of a collection of photographs only
     those that show the person are kept. Points that a tracker put outside the picture with little confidence are not
-    seen. Contradictions are given as warnings: left and right exchanged, and a person who does not stand upright by
-    the calibration.
+    seen. A person who does not stand upright by the calibration is a warning.
 
     Raises
     ------
@@ -171,7 +169,6 @@ def view_of(
         raise refusal(detections.source, "person", got, "both shoulders", remedy)
     for line in (
         *(f"{detections.source}: {line}" for line in detections.warnings),
-        *side_warnings(points, sure, frame, detections),
         *calibration_warnings(camera, points, detections.source),
     ):
         warnings.warn(line, UserWarning, stacklevel=3)

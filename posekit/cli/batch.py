@@ -8,7 +8,15 @@ from typing import Any
 
 import click
 
-from posekit.cli.command import command, option, output, say, settings_from, settings_options
+from posekit.cli.command import (
+    command,
+    option,
+    output,
+    say,
+    seeing,
+    settings_from,
+    settings_options,
+)
 from posekit.settings import RecoverSettings
 
 
@@ -21,17 +29,7 @@ from posekit.settings import RecoverSettings
 @output("DIR", "Folder of results; a run that was stopped goes on there.")
 @option("--jobs", default=None, type=click.IntRange(1), metavar="N", help="Processes. Default: one a core.")
 @option("--cluster", "ray", default="", metavar="ADDRESS", help="Ray cluster, or local (extra ray).")
-@option("--camera", default=None, metavar="FILE[:NAME]", help="Calibration of the camera.")
-@option("--person", default="", metavar="WHO", help="largest, surest, first or a track's number.")
-@option(
-    "--layout",
-    "--skeleton",
-    "--format",
-    default="",
-    metavar="NAME|FILE.toml",
-    help="Names of the key points.",
-)
-@option("--rate", "--fps", type=click.FloatRange(min=0, min_open=True), metavar="HZ", help="Frames a second.")
+@seeing()
 @settings_options(RecoverSettings, {"stature": "LENGTH", "deviation": "PX", "checks": "LIST"})
 def batch(inputs: tuple[Path, ...], output: Path, jobs: int | None, ray: str, **given: Any) -> None:
     """Recover an archive: every input once; broken ones are named and the rest is done. Exit code 1 if some fail."""

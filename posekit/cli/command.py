@@ -33,6 +33,12 @@ ALIASES: Final = {
 }
 
 
+#: Names of the option for a layout.
+LAYOUT: Final = ("--layout", "--skeleton", "--format")
+
+ABOVE_ZERO: Final = click.FloatRange(min=0, min_open=True)
+
+
 def say(text: str, *, err: bool = False) -> None:
     """Print lines without control characters: names in files may hold escapes and line ends."""
     click.echo("\n".join(one_line(line) for line in text.split("\n")), err=err)
@@ -120,6 +126,17 @@ def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 READING: Final = ("layout", "unit", "up", "rate", "urdf")
 
 
+def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare the options by which key points become a view."""
+    calibration = "Calibration of the camera. Default: none is known."
+    return apply(
+        option("--camera", default=None, metavar="FILE[:NAME]", help=calibration),
+        option("--person", default="", metavar="WHO", help="largest, surest, first or a track's number."),
+        option(*LAYOUT, default="", metavar="NAME|FILE.toml", help="Names of the key points."),
+        option("--rate", "--fps", type=ABOVE_ZERO, metavar="HZ", help="Frames a second."),
+    )
+
+
 def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Declare the options by which a file is read."""
     panel = "Reading"
@@ -132,9 +149,7 @@ def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[...
     )
     return apply(
         option(
-            "--layout",
-            "--skeleton",
-            "--format",
+            *LAYOUT,
             default="",
             metavar="NAME|FILE.toml",
             panel=panel,
@@ -158,7 +173,7 @@ def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[...
             "--rate",
             "--fps",
             default=None,
-            type=click.FloatRange(min=0, min_open=True),
+            type=ABOVE_ZERO,
             metavar="HZ",
             panel=panel,
             help="Frames a second where the file has no times.",

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from posekit.cli.command import command, option, output, say, settings_from, settings_options
+from posekit.cli.command import (
+    command,
+    option,
+    output,
+    say,
+    seeing,
+    settings_from,
+    settings_options,
+)
 from posekit.settings import RecoverSettings
 
 if TYPE_CHECKING:
@@ -26,19 +34,7 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 )
 @click.argument("source", metavar="VIEW|KEYPOINTS", type=click.Path(path_type=Path))
 @output("RESULT", "Result: .json, .json.gz, .npz, .parquet; or .html, its page.")
-@option(
-    "--camera", metavar="FILE[:NAME]", default=None, help="Calibration of the camera. Default: none is known."
-)
-@option("--person", default="", metavar="WHO", help="largest, surest, first or a track's number.")
-@option(
-    "--layout",
-    "--skeleton",
-    "--format",
-    default="",
-    metavar="NAME|FILE.toml",
-    help="Names of the key points.",
-)
-@option("--rate", "--fps", type=click.FloatRange(min=0, min_open=True), metavar="HZ", help="Frames a second.")
+@seeing()
 @option("--unit", default=None, metavar="UNIT", hidden=True, help="Unit of the calibration.")
 @option(
     "--fov", type=click.FloatRange(1, 179), metavar="DEGREES", hidden=True, help="Horizontal field of view."
