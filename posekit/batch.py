@@ -11,7 +11,7 @@ import hashlib
 import json
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
 from os import PathLike
@@ -205,30 +205,20 @@ def _computed(task: Task) -> Entry:
 
 
 def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Entry]:
-    """Compute in a pool of processes; inputs in work when a process died are tried alone once more."""
-    context = multiprocessing.get_context("spawn")
-    waiting, suspects = list(reversed(tasks)), list[Task]()
-    while waiting:
-        running: dict[Future[Entry], Task] = {}
-        with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-            try:
-                while waiting or running:
-                    while waiting and len(running) < IN_FLIGHT * jobs:
-                        running[pool.submit(_computed, waiting[-1])] = waiting[-1]
-                        waiting.pop()
-                    for future in wait(running, return_when=FIRST_COMPLETED).done:
-                        entry = future.result()
-                        del running[future]
-                        yield entry
-            except BrokenProcessPool:
-                suspects += running.values()
-    for task in suspects:
-        with ProcessPoolExecutor(1, mp_context=context) as pool:
-            try:
-                yield pool.submit(_computed, task).result()
-            except BrokenProcessPool:
-                error = f"{task[1]}: the process died; expected a result; give it more memory"
-                yield {**task[0], "error": error}
+    """Compute in a pool of processes.
+
+    Raises
+    ------
+    InputError
+        If a process dies, as of lack of memory; what is done stays, and a new run goes on.
+    """
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            for future in as_completed([pool.submit(_computed, task) for task in tasks]):
+                yield future.result()
+        except BrokenProcessPool:
+            remedy = "use fewer --jobs; a new run goes on"
+            raise refusal("batch", "", "a process that died", "enough memory for all", remedy) from None
 
 
 def _on_ray(tasks: Sequence[Task], address: str) -> Iterator[Entry]:

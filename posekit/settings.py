@@ -162,13 +162,8 @@ class Settings(Record):
         known = [one.name for one in fields(self)]
         for name in fields_given:
             if name not in known:
-                raise refusal(
-                    "settings",
-                    name,
-                    "an unknown field",
-                    f"a field of {type(self).__name__}",
-                    nearest(name, known),
-                )
+                expected = f"a field of {type(self).__name__}"
+                raise refusal("settings", name, "an unknown field", expected, nearest(name, known))
         return replace(self, **fields_given)
 
     @classmethod
@@ -189,11 +184,6 @@ class Settings(Record):
     def to_json(self) -> dict[str, Any]:
         """Return the fields as JSON values; a check that is an object is given by its name."""
         return {name: _plain(value) for name, value in asdict_shallow(self).items()}
-
-    @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> Self:
-        """Read what `to_json` wrote."""
-        return cls().changed(**document)
 
     def _one_of(self, name: str, allowed: Sequence[str]) -> None:
         if getattr(self, name) not in allowed:

@@ -103,7 +103,7 @@ def test_settings_survive_json_and_refuse_unknown_fields(kind: Any) -> None:
     settings = kind(checks="joint-range,collision", ranges="table1", contact_margin="-2cm")
     assert settings.checks == ("joint-range", "collision")
     assert settings.contact_margin == -0.02
-    assert kind.from_json(settings.to_json()).to_json() == settings.to_json()
+    assert kind(**settings.to_json()).to_json() == settings.to_json()
     with pytest.raises(posekit.InputError, match="did you mean ranges"):
         settings.changed(range="table1")
 

@@ -91,13 +91,8 @@ class Judgement(Record):
         value = np.asarray(self.value, dtype=np.float64)
         value = value[:, None] if value.ndim == 1 else value
         if value.ndim != 2 or value.shape[1] != len(self.places):
-            raise refusal(
-                "judge",
-                "value",
-                f"shape {value.shape}",
-                f"a row a frame and {len(self.places)} columns",
-                "return one column a place",
-            )
+            expected = f"a row a frame and {len(self.places)} columns"
+            raise refusal("judge", "value", f"shape {value.shape}", expected, "return one column a place")
         object.__setattr__(self, "places", tuple(self.places))
         object.__setattr__(self, "value", value)
 

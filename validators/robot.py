@@ -55,11 +55,8 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
         if name in names:
             at = names.index(name)
             lower[at], upper[at] = np.array(ends) / factor
-    which = [
-        k
-        for k, unit_here in enumerate(robot.units)
-        if unit_here == unit_of_q and (np.isfinite(lower[k]) or np.isfinite(upper[k]))
-    ]
+    bounded = np.isfinite(lower) | np.isfinite(upper)
+    which = [k for k, own in enumerate(robot.units) if own == unit_of_q and bounded[k]]
     if not which:
         raise NotAskedError("the URDF has no such limits")
     given = body.settings.angle_tolerance
@@ -92,11 +89,10 @@ def mimic_joints(body: Body) -> Judgement:
     Measure how far mimicking joints are from the values of their targets.
     """
     robot, q = _of(body)
-    mimics = getattr(robot, "mimics", ())
-    if not mimics:
+    if not robot.mimics:
         raise NotAskedError("no joint of the URDF mimics another one")
     value = np.degrees(robot.mimic_errors(q))
-    return Judgement([one.joint for one in mimics], value, 0.0, 0.0, MIMIC_DEGREES, scale=MIMIC_DEGREES)
+    return Judgement([one.joint for one in robot.mimics], value, 0.0, 0.0, MIMIC_DEGREES, scale=MIMIC_DEGREES)
 
 
 @check("collision", unit="m", reads=("q", "robot"))
@@ -109,8 +105,8 @@ def robot_collision(body: Body) -> Judgement:
     """
     robot, q = _of(body)
     if not robot.collision_pairs:
-        raise NotAskedError("the robot has no bodies that can touch (--bodies capsules)")
-    made_up = getattr(robot, "bodies", "") == "capsules" and not body.settings.strict
+        raise NotAskedError("the robot has no bodies that can touch")
+    made_up = robot.bodies == "capsules" and not body.settings.strict
     margin = body.settings.contact_margin - (MADE_UP_METRES if made_up else 0.0)
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     shapes = [] if robot.geometry is None else robot.geometry.geometryObjects

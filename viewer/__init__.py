@@ -118,9 +118,8 @@ def draw(
         number = frame_with_postures(source, frame)
         image = None if isinstance(frame, tuple) else np.asarray(seen.image[number])
         if len(subjects) == 1:  # a camera fits one body alone: others were moved aside
-            turned = subjects[0].R_world_data
             joints = subjects[0].robot.points(subjects[0].q)[0]
-            camera = camera_lines(seen, number, joints, turned, subjects[0].offset)
+            camera = camera_lines(seen, number, joints, subjects[0].R_world_data, subjects[0].offset)
     step = stride(suffix, rate) if frame is None else 1
     made = pictures(
         subjects,

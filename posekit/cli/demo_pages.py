@@ -52,20 +52,13 @@ def write_demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     report = posekit.validate(jump)
     report.save(folder / "jump.json")
     yield f"jump.bvh: {report.decision}"
-    sections = [
-        _section(
-            "Is this motion good?", report.decision, "posekit validate samples/jump.bvh -o jump.html", []
-        )
-    ]
+    files = ["jump.json"]
     if pictures:
         posekit.render(report, folder / "jump.html", view=posekit.open(jump))
         posekit.render(jump, folder / "jump.png", frame=0)
-        sections[0] = _section(
-            "Is this motion good?",
-            report.decision,
-            "posekit validate samples/jump.bvh -o jump.html",
-            ["jump.png", "jump.html", "jump.json"],
-        )
+        files = ["jump.png", "jump.html", *files]
+    command = "posekit validate samples/jump.bvh -o jump.html"
+    sections = [_section("Is this motion good?", report.decision, command, files)]
 
     for name in VIEWS:
         view = posekit.builtin_view(name)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 
 from posekit.errors import nearest, refusal, shown
-from posekit.papers.rows import Row, Rows, write_rows
+from posekit.papers.rows import Rows, write_rows
 from posekit.progress import watched
 
 PAPER_NAMES = ("all", "lee-chen", "taylor")
@@ -45,18 +43,15 @@ def reproduce(
     for field, value, known in (("paper", paper, PAPER_NAMES), ("effort", effort, EFFORTS)):
         if value not in known:
             raise refusal("", field, shown(value), f"one of {', '.join(known)}", nearest(value, known))
-    parts: list[Callable[[], Iterator[Row]]] = []
-    if paper != "taylor":
-        from posekit.papers.lee_chen_camera import camera_rows
-        from posekit.papers.lee_chen_constraints import constraint_rows
-        from posekit.papers.lee_chen_walks import walk_rows
+    from posekit.papers.lee_chen_camera import camera_rows
+    from posekit.papers.lee_chen_constraints import constraint_rows
+    from posekit.papers.lee_chen_walks import walk_rows
+    from posekit.papers.taylor import taylor_rows
+    from posekit.papers.taylor_objects import object_rows
 
-        parts += [camera_rows, constraint_rows, partial(walk_rows, effort)]
-    if paper != "lee-chen":
-        from posekit.papers.taylor import taylor_rows
-        from posekit.papers.taylor_objects import object_rows
-
-        parts += [taylor_rows, object_rows]
+    lee_chen = [camera_rows, constraint_rows, lambda: walk_rows(effort)]
+    taylor = [taylor_rows, object_rows]
+    parts = [*(lee_chen if paper != "taylor" else []), *(taylor if paper != "lee-chen" else [])]
     rows = Rows(row for part in watched(parts, "reproducing") for row in part())
     if folder is not None:
         Path(folder).mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Collision capsules for robots without meshes: along the limbs of a humanoid, or from joint to joint."""
+"""Collision capsules for humanoids without meshes, along their limbs."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from posekit.skeleton import SIDES
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
 
-#: Radius over length of a capsule between two joints; the stick figure's limbs have 0.09 to 0.15.
-RADIUS_SHARE: Final = 0.12
 #: Metres: a shorter part gets no capsule.
 SHORTEST: Final = 1e-3
 
@@ -51,7 +49,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     Parameters
     ----------
     robot : Robot
-        Its own primitive shapes stay. If it has no bodies at all, every part gets a capsule.
+        Its own primitive shapes stay. A humanoid without any body gets a capsule for every part.
     figure : Robot
         The stick figure, whose capsules are laid along the limbs of a humanoid.
     """
@@ -65,12 +63,11 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     geometry = build_bodies(model, plain, (), robot.source, "collision")
     only = meshed if meshed or len(geometry.geometryObjects) else None
     try:
-        shapes = part_shapes(figure.model, figure.geometry, figure.joint_map)
-        made = limb_capsules(model, robot.joint_map, shapes, only)
-    except InputError:  # no humanoid
-        made = []
-    rest = only - {body.parentJoint for body in made} if only is not None else set() if made else None
-    for body in (*made, *chain_capsules(model, rest)):
+        joint_map = robot.joint_map
+    except InputError:  # no humanoid: nothing is known of its shape
+        return geometry
+    shapes = part_shapes(figure.model, figure.geometry, figure.joint_map)
+    for body in limb_capsules(model, joint_map, shapes, only):
         geometry.addGeometryObject(body)
     return geometry
 
@@ -123,29 +120,6 @@ def limb_capsules(
                 name = part if len(parts) == 1 else f"{part}_{number + 1}"
                 begin, end = (data.oMi[joint].actInv(a + share * along) for share in (low, high))
                 bodies.append(capsule(model, name, joint, begin, end, radius * length))
-    return bodies
-
-
-def chain_capsules(model: pin.Model, only: set[int] | None) -> list[pin.GeometryObject]:
-    """Lay capsules from each joint to the middle of the joints that it carries.
-
-    The last body of a chain reaches from its joint to twice its centre of mass. If the joints carried surround the
-    joint, as hips surround a pelvis, the capsule lies between the two farthest of them.
-    """
-    bodies = []
-    for joint in range(1, model.njoints):
-        if only is not None and joint not in only:
-            continue
-        carried = [model.jointPlacements[child].translation for child in model.children[joint]]
-        start, end = np.zeros(3), np.mean(carried, axis=0) if carried else 2 * model.inertias[joint].lever
-        if len(carried) > 1:
-            gaps = np.linalg.norm(np.array(carried)[:, None] - np.array(carried)[None], axis=2)
-            i, j = np.unravel_index(np.argmax(gaps), gaps.shape)
-            if gaps.max() > 2 * np.linalg.norm(end):
-                start, end = carried[i], carried[j]
-        length = float(np.linalg.norm(end - start))
-        if length > SHORTEST:
-            bodies.append(capsule(model, str(model.names[joint]), joint, start, end, RADIUS_SHARE * length))
     return bodies
 
 

@@ -180,11 +180,6 @@ class Robot(Record):
         return tuple(self.model.names)[1:]
 
     @cached_property
-    def link_names(self) -> tuple[str, ...]:
-        """The links in Pinocchio's order."""
-        return tuple(frame.name for frame in self.model.frames if frame.type == pin.FrameType.BODY)
-
-    @cached_property
     def mimics(self) -> tuple[Mimic, ...]:
         """The joints that follow others; a joint comes after the one that it follows."""
         return mimics_of(self.tree)

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
 
 from posekit.errors import refusal
 from posekit.geometry import Array, cross, rotation_between
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
 RATIO: Final = (0.05, 20.0)
 #: Metres within which two places are one.
 SAME: Final = 1e-9
-#: Gauss-Newton steps that lay shoulders or hips; each takes the shortest way.
-PASSES: Final = 30
-#: Metres that a point moves at most in a step.
-MAX_STEP: Final = 0.05
 
 
 def scaled(robot: Robot, joints: ArrayLike) -> Robot:
@@ -192,17 +189,14 @@ def _lay_pair(
     half *= of[pair[0], pair[1]] / (2 * np.linalg.norm(half))
     points[pair[0]], points[pair[1]] = middle - half, middle + half
     links = [(a, b, of[a, b]) for a, b in of if {a, b} <= {*pair, *anchors} and {a, b} & {*pair}]
-    for _ in range(PASSES):
-        rows, misses = np.zeros((len(links), 6)), np.zeros(len(links))
-        for k, (a, b, length) in enumerate(links):
-            gap = points[a] - points[b]
-            misses[k] = length - np.linalg.norm(gap)
-            for point, sign in ((a, 1.0), (b, -1.0)):
-                if point in pair:
-                    at = 3 * pair.index(point)
-                    rows[k, at : at + 3] += sign * gap / np.linalg.norm(gap)
-        step = np.linalg.lstsq(rows, misses, rcond=1e-6)[0].reshape(2, 3)
-        points[list(pair)] += step * min(1.0, MAX_STEP / max(float(np.abs(step).max()), 1e-12))
+
+    def misses(places: Array) -> list[float]:
+        moved = points.copy()
+        moved[list(pair)] = places.reshape(2, 3)
+        return [float(np.linalg.norm(moved[a] - moved[b])) - length for a, b, length in links]
+
+    start, exact = points[list(pair)].ravel(), {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    points[list(pair)] = least_squares(misses, start, **exact).x.reshape(2, 3)
 
 
 def _forward(joints: Array) -> float:

@@ -376,13 +376,8 @@ def _of_result(
     drawn.frame_with_postures(recovery, None)
     chosen: list[int] = drawn.frame_rows(len(recovery), frame, recovery.source).tolist()
     if view is not None and len(view) != len(recovery):
-        raise refusal(
-            "render",
-            "--view",
-            f"{len(view)} frames",
-            f"{len(recovery)}, those of the result",
-            "give its own view",
-        )
+        expected = f"{len(recovery)}, those of the result"
+        raise refusal("render", "--view", f"{len(view)} frames", expected, "give its own view")
     table, answer = recovery.survivors, recovery.answer
     most = min(MOST_OF_FRAME, max(20, MOST_POSTURES // len(chosen)))
     points = np.concatenate([table.joints, np.asarray(table.head)], axis=1)
