@@ -254,7 +254,7 @@ class Body(Record):
         return math.hypot(bone, across) if "shoulder" in name and "elbow" not in name else bone
 
     def angle_tolerance(self, *segments: tuple[int, int]) -> float:
-        """Return by how much directions may be off, degrees: the widest of those of some segments."""
+        """Return the tolerance of directions, degrees: the largest of those of the segments."""
         given = self.settings.angle_tolerance
         if self.tolerance is not None:
             return self.tolerance.angle

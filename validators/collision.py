@@ -55,7 +55,7 @@ class Collision:
 
     @cached_property
     def parts(self) -> list[Collision]:
-        """Return checks of the pairs of links whose last joint is the same, those of the head apart."""
+        """Return a check for the pairs of links that end at the same joint; the head's pairs have their own."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
         for pair in _built_in_pairs():
             read = [point for link in pair for ends in CAPSULE_AXES[link] for point in ends]

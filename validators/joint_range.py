@@ -58,8 +58,8 @@ PARTS: Final = ("neck", "pelvis", *LIMBS)
 class JointRange:
     """An angle of a joint is outside its range.
 
-    The rotation of a limb that is almost straight is hardly determined: its tolerance is that of directions over the
-    sine of the bend, and it is undecided for measured bodies below `straight_degrees`.
+    The rotation of an almost straight limb is hardly determined. Its tolerance is that of directions divided by the
+    sine of the bend; below `straight_degrees` it is undecided for measured bodies.
 
     Parameters
     ----------

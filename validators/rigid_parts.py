@@ -54,7 +54,7 @@ class RigidParts:
 
     @cached_property
     def parts(self) -> list[RigidParts]:
-        """Return a check for each rigid segment and the torso: those that lift a joint have their length by design."""
+        """Return a check for each rigid segment that closes a loop, and one for the torso."""
         torso = RigidParts(segments=(), torso=True)
         return [*(replace(torso, segments=(segment,), torso=False) for segment in RIGID_SEGMENTS), torso]
 

@@ -76,8 +76,8 @@ class LengthUncertainty(Record):
     def uniform(deviation: float) -> LengthUncertainty:
         """Give the size, and each length beside it, the same relative deviation.
 
-        The trunk also bends by `TRUNK_BENDS`, but by no more than three times the deviation: exact lengths are those
-        of a stiff body.
+        The trunk also bends, by `TRUNK_BENDS`, but by three times the deviation at most: with exact lengths the body is
+        stiff.
         """
         own = dict.fromkeys(SEGMENT_NAMES, deviation)
         for name, bend in TRUNK_BENDS.items():

@@ -594,11 +594,11 @@ def _focal_length(J: Array, cost: Array, settled: Flags, placement: Array) -> tu
 def _misfits(heads: _Heads, placement: Array, cost: Array, settled: Flags) -> tuple[Ints, Array, Array]:
     r"""Name the point that does not fit: row (F,), -1 if all fit; squared error without it (F,); chance (F,).
 
-    A head is fitted again without each of its points. If one point alone is wrong, the squared error falls to
-    that of measuring. For normal errors of unknown size, and one point chosen beforehand,
-    :math:`F = \frac{(S - S_j)/2}{S_j / m}` follows Fisher's distribution with 2 and m degrees of freedom, m being those
-    without the point, and so :math:`P(F > x) = (S_j/S)^{m/2}` (the mean-shift outlier test of Cook & Weisberg 1982, for
-    a pair of observations). All P points are examined, hence the factor P (Bonferroni).
+    A head is fitted again without each of its points. If a single point is wrong, leaving it out reduces the squared
+    error to that of measuring. For normal errors of unknown size, and one point chosen beforehand, :math:`F = \frac{(S
+    - S_j)/2}{S_j / m}` follows Fisher's distribution with 2 and m degrees of freedom, m being those without the point,
+    and so :math:`P(F > x) = (S_j/S)^{m/2}` (the mean-shift outlier test of Cook & Weisberg 1982, for a pair of
+    observations). All P points are examined, hence the factor P (Bonferroni).
     """
     floor = ROUNDING_ERROR**2 * heads.spread
     frames, points = np.nonzero(heads.seen & (settled & (cost > floor))[:, None])

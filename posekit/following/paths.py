@@ -1,10 +1,10 @@
 """One person through a sequence: the likeliest paths through the survivors of its frames.
 
 Every end of a path carries where the body is and how fast it moves, and goes on to every survivor of the next frame, or
-passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. Of more, those
-that end in the same survivor go on as the cheapest of them moves: Viterbi's algorithm (Forney 1973, Proc. IEEE
-61:268-278) with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over
-all paths give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. Of several paths
+that end in the same survivor only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278)
+with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths
+give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
 """
 
 from __future__ import annotations
@@ -228,9 +228,9 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
 def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
-    The first path is what is expected of each frame given all frames, smoothed and laid onto the person's lengths.
-    Each further path is expected if in one frame the body is elsewhere, by 25 cm in some joint: in that frame, with
-    that survivor, that is the likeliest. In an uncalibrated view postures move about their neck.
+    The first path is what is expected of each frame given all frames, smoothed and laid onto the person's lengths. Each
+    further path passes through another survivor in one frame, the likeliest one of which some joint is at least 25 cm
+    away from the paths before. In an uncalibrated view postures move about their neck.
 
     Parameters
     ----------

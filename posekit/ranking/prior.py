@@ -90,7 +90,7 @@ class StudentMixture(Record):
         return found
 
     def _usual(self, count: int) -> float:
-        """Average of the log of the sum over the distribution; of each component where the others do not overlap."""
+        """Mean logarithm of the density over the distribution; of single components where they do not overlap."""
         if count not in self._averages:
             power = (self.dof + count) / 2
             own = power * (digamma(power) - digamma(self.dof / 2))

@@ -154,7 +154,7 @@ def lay(joints: Array, lengths: Array) -> Array:
 
 
 def representatives(shape: Array, weight: Array, hold: float) -> tuple[NDArray[np.intp], Array]:
-    """Choose few postures (N, 14, 3) so that what is within 5 cm of them, in every joint, holds a probability.
+    """Choose few postures (N, 14, 3): what is within 5 cm of them in every joint has a given probability.
 
     The posture that newly stands for the most probability comes first.
 

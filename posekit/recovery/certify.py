@@ -100,8 +100,8 @@ class Certifier:
 def noisy_tolerance(figure: Figure, lengths: LengthUncertainty, *, sized: bool) -> Tolerance:
     """Return the tolerance of postures under noise.
 
-    Limits pull at what is beyond them, so that three of their deviations contradict nothing. Lengths may be off by
-    three of their own deviations, and by the common size where that is no part of the posture (`sized`).
+    The solver only pulls at limits: a posture may be beyond them by three of their deviations. Lengths may be off by
+    three of their own deviations, and by the common size unless the solver fits it (`sized`).
     """
     deviation = {name: lengths.own[name] if sized else lengths.total(name) for name in figure.lengths}
     off = max(deviation[name] * length for name, length in figure.lengths.items())

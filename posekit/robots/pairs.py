@@ -21,8 +21,8 @@ def set_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: SrdfPairs | N
     """Set the pairs of bodies to check.
 
     With an SRDF, all pairs of bodies on different joints that it leaves. Without, all pairs but those of neighbours,
-    and those that touch in the neutral configuration. Between capsules of a humanoid's parts, `parts` are checked
-    instead of those that are no neighbours.
+    and those that touch in the neutral configuration. Of capsules that stand for a humanoid's parts, only the pairs in
+    `parts` are checked.
     """
     geometry.addAllCollisionPairs()
     pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
@@ -56,7 +56,7 @@ def neutral_inside(model: pin.Model) -> Array:
 
 
 def _neighbours(model: pin.Model, geometry: pin.GeometryModel) -> set[frozenset[int]]:
-    """Return the pairs of joints with bodies of which one carries the other, with no body between them.
+    """Return the pairs of joints that both have bodies and of which one carries the other directly.
 
     A hip of three hinges has two links without a body: pelvis and thigh are neighbours.
     """

@@ -290,7 +290,7 @@ class Limits:
         return bounds[0], bounds[1], turns, outward
 
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
-        r"""Return by how much limbs are beyond their limits (N, 4), radians, and the writing that is judged (N,).
+        r"""Return how far limbs are beyond their limits (N, 4), radians, and the writing that is judged (N,).
 
         The writing is the least violated one if not given. A rotation that is beyond by v counts
         :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`: a straight limb has none. The same holds for the first angle at
@@ -360,7 +360,7 @@ def _round_off(
     power: float,
     slack: float,
 ) -> None:
-    """Draw bounds of abduction, then rotation, toward their middles as far as the angles before are from theirs."""
+    """Narrow the bounds of abduction, then of rotation, by how far the angles before are from their middles."""
     used = np.zeros(angles.shape[:2])
     for place in range(3):
         low, high = (m[..., place] if place == 2 else mean[place, k] for k, m in enumerate(means))

@@ -92,7 +92,7 @@ def _without_sides(joints: Array) -> Array:
 
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return the frames of stretches with frames out of place (T,), including those in place by chance."""
+    """Return the frames (T,) of every stretch that holds frames out of place."""
     inside = np.zeros(len(places), dtype=np.bool_)
     for part in groups(np.flatnonzero(places), TURNS_APART):
         inside[part[0] : part[-1] + 1] = True

@@ -76,9 +76,9 @@ def floating(
 ) -> Judgement:
     r"""Bodies are above the ground, and nothing holds them there.
 
-    A body in the air falls: its centre of mass has the acceleration :math:`-g`. A body above all levels of the ground,
-    nothing of which rests and whose centre of mass falls by less than half of that, hovers. Over a stated ground a body
-    also floats if its lowest rests are above it, or if it does not come near it within 0.4 s.
+    A body in the air falls: its centre of mass has the acceleration :math:`-g`. A body hovers if it is above all levels
+    of the ground, no part of it rests, and its centre of mass falls at less than half of gravity. Over a stated ground
+    a body also floats if its lowest rests are above it, or if it does not come near it within 0.4 s.
 
     Parameters
     ----------

@@ -250,7 +250,7 @@ def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
 def _packed(
     bodies: Sequence[Array], frames: Sequence[Json], extra: Mapping[str, Sequence[Array]] | None = None
 ) -> Json:
-    """Pack points (H, P, 3) of each frame, and other points of each frame, as whole steps from its origin."""
+    """Pack the points (H, P, 3) of each frame, and further points, as whole steps from the frame's origin."""
     origins, widest, first = [], 0.0, 0
     for k, body in enumerate(bodies):
         both = np.concatenate([body, *(one[k] for one in (extra or {}).values())]).reshape(-1, 3)

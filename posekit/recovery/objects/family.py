@@ -172,7 +172,7 @@ class Incidence(Record):
 
     @staticmethod
     def of(linkage: Linkage, seen: NDArray[np.bool_]) -> Incidence:
-        """Build the matrices of a linkage of whose segments (S,) some are seen."""
+        """Build the matrices of a linkage; `seen` (S,) tells which of its segments have both ends in the image."""
         from scipy.sparse.csgraph import connected_components
 
         weights = linkage.place_nodes(np.eye(len(linkage.points)))
