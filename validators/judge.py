@@ -314,15 +314,8 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         row, place = np.nonzero(one.margin < 0)
         at = np.array([place_at[one_place] for one_place in one.places], dtype=np.intp)
         low, high = (np.where(np.isinf(ends), np.nan, ends)[row, place] for ends in (one.low, one.high))
-        cells = (
-            row,
-            np.full(len(row), k),
-            at[place],
-            one.value[row, place],
-            low,
-            high,
-            one.margin[row, place],
-        )
+        numbers = (one.value[row, place], low, high, one.margin[row, place])
+        cells = (row, np.full(len(row), k), at[place], *numbers)
         for column, values in zip(columns.values(), cells, strict=True):
             column.append(values)
     findings = {name: np.concatenate([np.empty(0), *values]) for name, values in columns.items()}

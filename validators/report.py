@@ -489,10 +489,8 @@ def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
     for one in reports:
         own = np.array([checks.index(name) for name in one.checks], dtype=np.intp)
         at = np.array([place_at[name] for name in one.places], dtype=np.intp)
-        margins, silent = (
-            np.full((len(one), len(checks)), np.nan),
-            np.zeros((len(one), len(checks)), np.bool_),
-        )
+        margins = np.full((len(one), len(checks)), np.nan)
+        silent = np.zeros((len(one), len(checks)), np.bool_)
         margins[:, own], silent[:, own] = one.margins, one.silent
         moved = {
             "row": one.findings["row"] + count,

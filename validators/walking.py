@@ -141,7 +141,6 @@ def _together(swing: Array, one: str, other: str) -> Array:
 
 def _rule_1(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
     """Not both arms, or both legs, are in front of or behind the torso."""
-    del body, axes, limits
     return {
         f"rule1.{limb}": -_together(swing, f"right_{mid}", f"left_{mid}") for limb, _, mid, _ in LIMB_PARTS
     }
@@ -149,13 +148,11 @@ def _rule_1(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> 
 
 def _rule_2(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
     """Arm and leg of one side do not swing forward, or backward, together."""
-    del body, axes, limits
     return {f"rule2.{side}": -_together(swing, f"{side}_elbow", f"{side}_knee") for side in SIDES}
 
 
 def _rule_3(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
     """Shoulder and elbow, hip and knee swing the same way."""
-    del body, axes, limits
     return {
         f"rule3.{side}_{limb[:-1]}": _together(swing, f"{side}_{girdle}", f"{side}_{middle}")
         for limb, girdle, middle, _ in LIMB_PARTS
@@ -165,7 +162,6 @@ def _rule_3(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> 
 
 def _rule_4(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
     """Limbs swing in planes parallel to the moving direction."""
-    del swing
     found = {}
     for limb, *names in LIMB_PARTS:
         for side in SIDES:
@@ -178,7 +174,6 @@ def _rule_4(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> 
 
 def _rule_5(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
     """At most one knee is flexed; then the other leg stands nearly vertically."""
-    del swing
     flexion, lean = [], []
     for side in SIDES:
         hip, knee, ankle = (body.joints[:, JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))

@@ -20,6 +20,7 @@ from posekit.motion.repair.legal import (
     Configurations,
     PostureBounds,
     nearest_valid,
+    straightened,
     tied,
 )
 from posekit.motion.repair.pieces import between, interpolated
@@ -178,9 +179,10 @@ class Clip:
                 break
             bounds = PostureBounds([check for check, _ in found.values()], now.body())
             changed = np.flatnonzero((np.nan_to_num(out - given) != 0).any(axis=(1, 2)))
+            ranges = found.get("joint-range")
             out = tied(
                 partial(nearest_valid, bounds),
-                given,
+                given if ranges is None else straightened(given, ranges[1]),
                 np.union1d(bad, changed),
                 TIED_SWEEPS if self.motion.in_time else 0,
             )

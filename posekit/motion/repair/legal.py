@@ -325,6 +325,22 @@ def _along(before: Array, after: Array) -> Array:
     return after
 
 
+def straightened(points: Array, judgement: Judgement) -> Array:
+    """Straighten elbows and knees that bend backward in some frames of a clip, as a judgement of joint ranges says.
+
+    The nearest legal bend of such a hinge is none. A single posture does not show it: neighbouring frames do.
+    """
+    out = points.copy()
+    for limb, (start, middle, end) in enumerate(LIMB_JOINTS):
+        place = f"{SIDES[limb % 2]}_{'elbow' if limb < len(SIDES) else 'knee'}.flexion"
+        if place in judgement.places:
+            column = judgement.places.index(place)
+            rows = np.flatnonzero(judgement.violated[:, column] & (judgement.value[:, column] < 0))
+            length = np.linalg.norm(points[rows, end] - points[rows, middle], axis=-1, keepdims=True)
+            out[rows, end] = points[rows, middle] + length * unit(points[rows, middle] - points[rows, start])
+    return _along(points, out)
+
+
 def tied(
     found: Callable[[Array, Array | None], Array],
     given: Array,
