@@ -460,19 +460,20 @@ class _Conductor:
         }
 
     def tolerances(self) -> dict[str, Any]:
-        """Return the tolerances of exact and tolerated frames, and the noise of the others."""
+        """Return the tolerances of exact and tolerated frames, and the noise of the others where there are any."""
         lengths = self.sight.lengths
         found: dict[str, Any] = {"exact": vars(EXACT)}
         if self.given is not None:
             found["tolerated"] = vars(self.given)
-        noise: dict[str, Any] = {
-            "deviation": float(np.nanmedian(self.sight.deviation)),
-            "size": lengths.common,
-            "by_segment": dict(lengths.own),
-            "certified": vars(self.noisy.tolerance),
-            "contact_margin": self.noisy.settings.contact_margin,
-        }
-        return {**found, "noisy": noise}
+        if "noisy" in vars(self):
+            found["noisy"] = {
+                "deviation": float(np.nanmedian(self.sight.deviation)),
+                "size": lengths.common,
+                "by_segment": dict(lengths.own),
+                "certified": vars(self.noisy.tolerance),
+                "contact_margin": self.noisy.settings.contact_margin,
+            }
+        return found
 
 
 def _middle(sight: Sight) -> Array:
