@@ -34,6 +34,8 @@ def lay_out(folder: Path) -> None:
     (folder / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(64))
     (folder / "walk.mp4").write_bytes(b"\x00\x00\x00\x20ftypisom\x00\x00\x02\x00" + bytes(64))
     (folder / "notes.md").write_text("# Notes\n\nThe walk looks fine.\n", encoding="utf-8")
+    columns = posekit.load_robot("g1", bodies="none").configuration_names
+    (folder / "header.csv").write_text(",".join(columns) + "\n", encoding="utf-8")
     (folder / "walk.csv").write_text("name,age\nAnna,31\n", encoding="utf-8")
     named = json.loads((folder / "walk.json").read_text(encoding="utf-8"))
     named["frames"][0]["image"]["left_elbo"] = named["frames"][0]["image"].pop("left_elbow")

@@ -156,7 +156,10 @@ def open(  # the door's name, as in `gzip.open`
     for module in READERS[container]:
         if named(f"{module}:looks_like")(document):
             with undamaged(Path(path), f"the parts of {container} that {module} reads"):
-                return named(f"{module}:read")(document, str(path), options)
+                found = named(f"{module}:read")(document, str(path), options)
+            if type(found).__name__ == "Motion" and not len(found):
+                raise refusal(path, "", "no frames", "at least one", "write or copy it again")
+            return found
     names = [str(one) for one in (document if isinstance(document, dict) else getattr(document, "names", ()))]
     listed = ", ".join(shown(name) for name in names[:8] if name)
     held = f"the entries {listed}" if listed else f"nothing that is known in a {container} file"
