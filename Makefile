@@ -50,8 +50,9 @@ export CREATE_VENV
 $(BIN)/python:
 	@bash -c "$$CREATE_VENV"
 
-# setuptools and pybind11 come from constraints.txt as well, hence no build isolation.
-$(VENV)/runtime.stamp: pyproject.toml constraints.txt | $(BIN)/python
+# setuptools and pybind11 come from constraints.txt as well, hence no build isolation. A change of the C++ compiles anew.
+COMPILED := setup.py $(wildcard posekit/*/*.cpp posekit/*/*.hpp)
+$(VENV)/runtime.stamp: pyproject.toml constraints.txt $(COMPILED) | $(BIN)/python
 	@echo "Installing posekit into $(VENV)"
 	@$(PIP_INSTALL) -c constraints.txt --upgrade setuptools pybind11
 	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[pictures]'

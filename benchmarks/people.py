@@ -15,7 +15,7 @@ camera of its own 2.5 to 6 m away; lengths are the medians of each clip, and the
 
 `60 mm` is the share of frames in which a representative is within 60 mm of the truth after alignment.
 `sure` is compared with how often every joint of the answer is within 5 cm of the truth (expected
-calibration error).
+calibration error). The floor is the error that probabilities which are exactly right would show on as many frames.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from benchmarks.common import data_of, parser, recordings, table
 from posekit.body import segment_lengths
 from posekit.cameras import View
 from posekit.evaluation import Evaluation, evaluate, posture_errors, with_truth
-from posekit.evaluation.scores import MEASURES
+from posekit.evaluation.scores import MEASURES, reliability
 from posekit.geometry import Array
 from posekit.motion import Motion
 from posekit.recovery import Recovery
@@ -55,6 +55,7 @@ HEAD = (
     "sure, mean",
     "true",
     "ECE",
+    "floor",
     "regions",
     "ms",
 )
@@ -153,6 +154,13 @@ def trial_views(folder: Path, stature: float) -> Iterator[tuple[str, View]]:
             yield f"{folder.name} {name}, {how}", with_truth(view, motion)[0]
 
 
+def least_error(sure: Array) -> float:
+    """Return the mean calibration error of events that happen exactly as often as stated, 200 draws."""
+    rng = np.random.default_rng(0)
+    draws = [reliability(sure, (rng.random(len(sure)) < sure).astype(np.float64)) for _ in range(200)]
+    return float(np.mean([one["ece"] for one in draws if one is not None]))
+
+
 def row(name: str, parts: list[Found]) -> tuple[str, ...]:
     """Sum up one condition."""
     whole = Evaluation.joined([one.evaluation for one in parts], {})
@@ -175,6 +183,7 @@ def row(name: str, parts: list[Found]) -> tuple[str, ...]:
         f"{sure[both].mean():.2f}",
         f"{true[both].mean():.2f}",
         "-" if stated is None else f"{stated['ece']:.3f}",
+        "-" if stated is None else f"{least_error(sure[both]):.3f}",
         "-" if said["regions"] is None else f"{said['regions']:.1%}",
         f"{1000 * sum(one.seconds for one in parts) / len(whole):.0f}",
     )
