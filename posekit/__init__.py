@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from posekit.validators import assert_valid as assert_valid
     from posekit.validators.check import check as check
 
+__version__ = "1.0.0"
+
 _HOMES = {
     "posekit.body": ("Figure", "load_figure"),
     "posekit.cameras": ("Detections", "View"),
@@ -59,10 +61,6 @@ __all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
-
-        return version("posekit")
     if name not in _HOME:
         raise AttributeError(f"module 'posekit' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import gzip
 import os
-import secrets
 import stat
 import zlib
 from io import BytesIO
@@ -13,6 +12,9 @@ from pathlib import Path
 from typing import Final
 
 from posekit.errors import InputError, TooLargeError, refusal
+
+#: Folder of the data that comes with posekit: the figure, layouts, ranges, priors, profiles.
+DATA: Final = Path(__file__).resolve().parent / "urdf"
 
 #: Bytes of a file, packed and unpacked: a larger one is cut into clips first.
 MAX_BYTES: Final = 2_000_000_000
@@ -81,7 +83,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         raise _too_large(path)
     if path.suffix.lower() == ".gz":
         data = gzip.compress(data, mtime=0)
-    new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    new = path.with_name(f".{path.name}.{os.urandom(4).hex()}")
     try:
         if path.exists() and not path.is_file():  # a device or a pipe is written to, not replaced
             path.write_bytes(data)

@@ -28,7 +28,6 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
@@ -313,6 +312,8 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
     name = given.replace("_", "-") if ":" not in given else given
     if name in known:
         return known[name]
+    from importlib.metadata import entry_points
+
     entries = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     module, _, inside = given.partition(":")
     if name not in entries and not (module and inside):

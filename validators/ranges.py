@@ -12,11 +12,11 @@ import math
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 from posekit.errors import cut, nearest, refusal, shown
+from posekit.files import DATA
 from posekit.skeleton import DOFS
 
 RANGES_SCHEMA: Final = "posekit.ranges/1"
@@ -67,7 +67,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
 
 
 def _read(name: str) -> Mapping[str, Any]:
-    path = files("posekit.urdf") / "ranges" / f"{name}.toml" if name in NAMED else Path(name)
+    path = DATA / "ranges" / f"{name}.toml" if name in NAMED else Path(name)
     if not name or not path.is_file():
         raise refusal("--ranges", "", cut(name), "a table or a TOML file", nearest(name, NAMED))
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple
@@ -28,6 +27,7 @@ from posekit.body.lengths import (
 from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
 from posekit.body.urdf import replace_limits, rewrite
 from posekit.errors import FigureError, refusal, shown
+from posekit.files import DATA
 from posekit.geometry import Array, Ints, coordinate_rotation, frame_along, read_only, unit
 from posekit.geometry.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from posekit.robots.capsules import PARTS
@@ -419,10 +419,9 @@ def with_head(joints: ArrayLike, head: Array | None = None) -> Array:
 
 @lru_cache(maxsize=1)
 def _built_in() -> Figure:
-    folder = resources.files("posekit.urdf")
     return Figure(
-        urdf=(folder / "stick_figure.urdf").read_text(encoding="utf-8"),
-        srdf=(folder / "stick_figure.srdf").read_text(encoding="utf-8"),
+        urdf=(DATA / "stick_figure.urdf").read_text(encoding="utf-8"),
+        srdf=(DATA / "stick_figure.srdf").read_text(encoding="utf-8"),
     )
 
 

@@ -13,12 +13,12 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import nearest, refusal, shown
-from posekit.files import read_bytes, text
+from posekit.files import DATA, read_bytes, text
 from posekit.geometry import Array, cross, dot, unit
 from posekit.motion.motion import NAMES
 from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side
 
-FOLDER: Final = Path(__file__).parent.parent / "urdf" / "layouts"
+FOLDER: Final = DATA / "layouts"
 #: Landmarks that are no joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
 MIDDLES: Final = ("mid_shoulders", "mid_hips")
 LANDMARKS: Final = (*POINTS, *MIDDLES)

@@ -21,10 +21,11 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import refusal, shown
+from posekit.files import DATA
 from posekit.geometry import Array, Record, read_only
 from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
 
-PRIORS: Final = Path(__file__).resolve().parents[1] / "urdf" / "priors"
+PRIORS: Final = DATA / "priors"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -79,7 +80,7 @@ class StudentMixture(Record):
         known = np.isfinite(x[:, :count])
         found = np.zeros(len(x))
         code = known @ (1 << np.arange(count))
-        for pattern in np.unique(code):
+        for pattern in set(code.tolist()):
             rows = np.flatnonzero(code == pattern)
             columns = np.flatnonzero(known[rows[0]])
             if len(columns):
@@ -213,11 +214,11 @@ def load_prior(name: str = "people") -> Prior:
 
 
 def _block(table: Mapping[str, Any], dof: float) -> tuple[tuple[str, ...], StudentMixture, bool]:
-    """Read one block: its scale is given as the lower triangle, row by row."""
+    """Read one block: rows of numbers are lines of text; its scale is given as the lower triangle."""
     names = tuple(table["directions"])
     scale = np.zeros((3 * len(names), 3 * len(names)))
-    for row, values in enumerate(table["scale"]):
-        scale[row, : row + 1] = scale[: row + 1, row] = values
-    means = np.atleast_2d(table["mean"])
+    for row, line in enumerate(table["scale"].splitlines()):
+        scale[row, : row + 1] = scale[: row + 1, row] = line.split()
+    means = np.array([line.split() for line in table["mean"].splitlines()], dtype=np.float64)
     student = StudentMixture(means=means, scale=scale, dof=dof, share=table.get("share", np.ones(len(means))))
     return names, student, bool(table.get("conditional", False))

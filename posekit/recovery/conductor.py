@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property
-from importlib.metadata import version
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import pinocchio
 from numpy.typing import NDArray
 
+import posekit
 from posekit.body import Figure, LengthUncertainty, segment_lengths
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
@@ -484,7 +485,7 @@ def _middle(sight: Sight) -> Array:
 @cache
 def versions() -> dict[str, str]:
     """Return the versions of the packages that decide a result."""
-    return {name: version(name) for name in ("posekit", "pin", "numpy")}
+    return {"posekit": posekit.__version__, "pin": pinocchio.__version__, "numpy": np.__version__}
 
 
 def _up_of(view: View) -> Up:

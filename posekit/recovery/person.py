@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +12,7 @@ from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.body.lengths import stature_from_lengths
 from posekit.body.uncertainty import KNOWN_STATURE, STATED_LENGTHS, UNKNOWN_ADULT
 from posekit.cameras import ScaledOrthographicCamera, View
+from posekit.files import DATA
 from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
@@ -29,7 +29,7 @@ TAYLOR_LENGTHS: Final = {
 
 def _key_points() -> dict[str, Any]:
     """Read the body between a detector's key points: shares of stature and deviations of the 17 lengths."""
-    path = Path(__file__).resolve().parents[1] / "urdf" / "priors" / "key_points.toml"
+    path = DATA / "priors" / "key_points.toml"
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
     parts = {

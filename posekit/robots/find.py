@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import sys
 import tomllib
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from posekit.errors import cut, nearest, refusal, shown
+from posekit.files import DATA
 
 #: Names of the built-in figure.
 FIGURE: Final = ("figure", "stick_figure")
@@ -45,9 +44,8 @@ def find(name_or_path: str | Path) -> RobotFiles:
     """
     name = str(name_or_path)
     if name in FIGURE:
-        folder = Path(str(resources.files("posekit.urdf")))
-        urdf = folder / "stick_figure.urdf"
-        return RobotFiles(FIGURE[0], urdf, urdf.with_suffix(".srdf"), (folder,), True)
+        urdf = DATA / "stick_figure.urdf"
+        return RobotFiles(FIGURE[0], urdf, urdf.with_suffix(".srdf"), (DATA,), True)
     known = _published() if isinstance(name_or_path, str) else {}
     if name in known:
         urdf, srdf = known[name]
@@ -78,7 +76,7 @@ def directory(path: str | Path) -> Path:
 
 @lru_cache(maxsize=1)
 def _short_names() -> dict[str, list[str]]:
-    text = (resources.files("posekit.urdf") / "robots.toml").read_text(encoding="utf-8")
+    text = (DATA / "robots.toml").read_text(encoding="utf-8")
     table: dict[str, list[str]] = tomllib.loads(text)["robots"]
     return table
 
@@ -89,11 +87,13 @@ def _published() -> dict[str, tuple[Path, Path]]:
 
     The distribution has data alone, under the prefix of its packager; a system package puts them under ``share``.
     """
+    from importlib.metadata import PackageNotFoundError, distribution
+
     places = [Path(sys.prefix) / "share" / ROBOT_PACKAGE / "robots"]
     try:
-        files = importlib.metadata.distribution(ROBOT_PACKAGE)
+        files = distribution(ROBOT_PACKAGE)
         places.insert(0, Path(str(files.locate_file(f"cmeel.prefix/share/{ROBOT_PACKAGE}/robots"))))
-    except importlib.metadata.PackageNotFoundError:
+    except PackageNotFoundError:
         pass
     robots = next((place for place in places if place.is_dir()), None)
     if robots is None:

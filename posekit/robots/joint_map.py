@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from posekit.errors import nearest, refusal, shown
+from posekit.files import DATA
 from posekit.geometry import Array
 from posekit.robots.kinematics import Kinematics, Site
 from posekit.robots.urdf import need
@@ -185,7 +185,7 @@ def _triple(values: Array) -> tuple[float, float, float]:
 @lru_cache(maxsize=16)
 def _table(name: str) -> dict[str, Any]:
     built_in = name in BUILT_IN
-    place = resources.files("posekit.urdf") / "joint_maps" / f"{name}.toml" if built_in else Path(name)
+    place = DATA / "joint_maps" / f"{name}.toml" if built_in else Path(name)
     try:
         table = tomllib.loads(place.read_text(encoding="utf-8"))
     except OSError:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 from posekit.errors import cut, nearest, refusal, shown
+from posekit.files import DATA
 from posekit.validators.check import FunctionCheck
 from posekit.validators.motion import frames, orientation, published, sliding, speed, standing
 
@@ -42,7 +42,7 @@ def load_profile(name: str) -> Profile:
     InputError
         If there is no such profile, or it is not as the schema says.
     """
-    path = files("posekit.urdf") / "profiles" / f"{name}.toml" if name in BUILT_IN else Path(name)
+    path = DATA / "profiles" / f"{name}.toml" if name in BUILT_IN else Path(name)
     if not name or not path.is_file():
         raise refusal("--profile", "", cut(name), "a profile or a TOML file", nearest(name, BUILT_IN))
     try:

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, nearest, refusal, shown
+from posekit.files import DATA
 from posekit.geometry import Array, Record, read_only
 
-LINKAGES: Final = Path(__file__).resolve().parents[2] / "urdf" / "linkages"
+LINKAGES: Final = DATA / "linkages"
 
 #: Largest number of segments of one object.
 MAX_SEGMENTS: Final = 2000
