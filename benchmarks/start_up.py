@@ -37,7 +37,8 @@ print("modules", len(own), "opens", sum(one == {path!r} for one in opened))
 def environment() -> dict[str, str]:
     """Return the environment of a process that runs this posekit."""
     root = str(Path(posekit.__file__).parents[1])
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**kept, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
 
 
 def spend(arguments: list[str], folder: Path) -> tuple[float, float]:
