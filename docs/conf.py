@@ -37,7 +37,7 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 python_maximum_signature_line_length = 90
 
-# Short names in docstrings have more than one target: posekit.Figure is posekit.body.figure.Figure.
+# Short names in docstrings have more than one target: posekit.Motion is posekit.motion.motion.Motion.
 suppress_warnings = ["ref.python"]
 
 html_theme = "furo"

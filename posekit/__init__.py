@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from posekit.body import Figure as Figure
     from posekit.body import load_figure as load_figure
     from posekit.cameras import Detections as Detections
     from posekit.cameras import View as View
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 __version__ = "1.0.0"
 
 _HOMES = {
-    "posekit.body": ("Figure", "load_figure"),
+    "posekit.body": ("load_figure",),
     "posekit.cameras": ("Detections", "View"),
     "posekit.doors": ("convert", "recover", "render"),
     "posekit.errors": ("InputError", "PosekitError"),

@@ -6,6 +6,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from posekit.errors import refusal, shown
 from posekit.settings import RecoverSettings, number
 
@@ -14,8 +16,18 @@ if TYPE_CHECKING:
     from posekit.cameras import Detections, PinholeCamera, View
     from posekit.recovery import Recovery
 
-#: A path, a `View`, `Detections` or a `Motion`.
+#: A path, an array, a `View`, `Detections` or a `Motion`.
 Source = Any
+
+
+def opened(source: Source, layout: str = "", **facts: Any) -> Any:
+    """Return what a path, or an array in the order of a layout, holds; other objects as they are."""
+    from posekit.formats import open as open_file
+    from posekit.motion.validation import has_layout
+
+    if isinstance(source, str | PathLike) or has_layout(source, layout):
+        return open_file(source, layout, **facts)
+    return source
 
 
 def recover(
@@ -40,8 +52,9 @@ def recover(
 
     Parameters
     ----------
-    source : path, View, Detections
-        A view; a detector's file or folder of key points; or one of these objects.
+    source : path, View, Detections or array
+        A view; a detector's file or folder of key points; one of these objects; or key points (T, P, 2) in pixels, or
+        (T, P, 3) with confidences, in the order of the `layout`.
     settings : RecoverSettings, optional
         All settings at once; the arguments below override single ones.
     camera : path or PinholeCamera, optional
@@ -112,7 +125,7 @@ def view_of(
 
     Parameters
     ----------
-    source : path, View or Detections
+    source : path, View, Detections or array
     camera : path or PinholeCamera, optional
         ``FILE`` or ``FILE:NAME`` where a calibration has several cameras.
     person, layout, unit, rate, stature
@@ -131,10 +144,14 @@ def view_of(
     """
     from posekit.cameras import Detections, View
     from posekit.formats import open as open_file
+    from posekit.formats.arrays import key_points_of
+    from posekit.formats.options import Options
 
     name = source if isinstance(source, str | PathLike) else getattr(source, "source", "") or "recover"
     if isinstance(source, str | PathLike):
         source = open_file(source, layout, rate=rate)
+    elif isinstance(source, np.ndarray | list | tuple):
+        source = key_points_of(source, Options(layout=layout, rate=rate))
     if isinstance(source, View):
         return source
     if not isinstance(source, Detections):
@@ -237,10 +254,10 @@ def convert(
 
     Parameters
     ----------
-    source : path or object
+    source : path, array or object
     target : path
     layout : str
-        Layout of the source.
+        Layout of the source; an array (T, J, 3) has its joints in this order.
     which : {"", "answer", "path", "all", "first"}
         Postures of a result that motion files get; the followed path if there is one, else the answer.
     unit, up, rate, urdf
@@ -256,11 +273,9 @@ def convert(
     >>> import posekit
     >>> posekit.convert(posekit.recover(posekit.builtin_view("seq1")), "walk.bvh")
     """
-    from posekit.formats import open as open_file
     from posekit.formats import save
 
-    if isinstance(source, str | PathLike):
-        source = open_file(source, layout, unit=unit, up=up, rate=rate, urdf=urdf)
+    source = opened(source, layout, unit=unit, up=up, rate=rate, urdf=urdf)
     save(source, target, **({"which": which} if which else {}))
 
 
@@ -283,7 +298,8 @@ def render(
 
     Parameters
     ----------
-    source : path, Motion, Recovery, View, Report or array (T, 14, 3)
+    source : path, Motion, Recovery, View, Report or array
+        An array is joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
     target : path
     layout, urdf, rate
         As in `posekit.open`.
@@ -310,17 +326,11 @@ def render(
     >>> import posekit
     >>> posekit.render(posekit.recover(posekit.builtin_view("seq1")), "walk.html")
     """
-    import numpy as np
-
     from posekit.cameras import Detections, View
-    from posekit.formats import open as open_file
     from posekit.viewer import draw
 
     name = source if isinstance(source, str | PathLike) else "render"
-    if isinstance(source, str | PathLike):
-        source = open_file(source, layout, rate=rate, urdf=urdf)
-    if isinstance(view, str | PathLike):
-        view = open_file(view)
+    source, view = opened(source, layout, rate=rate, urdf=urdf), opened(view)
     if isinstance(source, dict | Detections):
         expected = "postures, motion, a result, a view or a report"
         raise refusal(name, "", kind_of(source), expected, "recover key points first")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -29,7 +30,7 @@ def test_importing_posekit_loads_no_library() -> None:
 
 
 def test_public_names_are_few_and_all_load() -> None:
-    assert len(posekit.__all__) <= 28
+    assert len(posekit.__all__) <= 25
     for name in posekit.__all__:
         assert getattr(posekit, name).__doc__, name
     assert set(posekit.__all__) <= set(dir(posekit))
@@ -49,6 +50,31 @@ def test_recover_takes_statures_and_tolerances_as_text_or_numbers(folder: Path) 
     text = posekit.recover(view, camera=camera, stature="175cm", deviation="2px", rate=10)
     numbers = posekit.recover(view, camera=camera, stature=1.75, deviation=2, rate=10)
     assert np.array_equal(text.survivors.joints, numbers.survivors.joints)
+
+
+def test_recover_takes_key_points_as_an_array_in_the_order_of_a_layout(folder: Path) -> None:
+    files = sorted((folder / "keypoints").glob("*.json"))[:2]
+    people = [json.loads(file.read_text())["people"][0]["pose_keypoints_2d"] for file in files]
+    points = np.reshape(people, (2, 25, 3))
+    known: dict[str, Any] = {"camera": f"{folder / 'calibration.toml'}:cam_01", "stature": 1.75, "rate": 10}
+    found = posekit.recover(points, layout="body_25", **known)
+    of_files = posekit.recover(folder / "keypoints", **known)
+    assert np.array_equal(found.survivors.joints, of_files.survivors.joints[: len(found.survivors)])
+    two = np.stack([np.full_like(points, np.nan), points], axis=1)  # two people, of whom one is never seen
+    assert np.array_equal(posekit.recover(two, **known).survivors.joints, found.survivors.joints)
+    with pytest.raises(posekit.InputError, match=r"shape \(2, 75\); expected key points \(T, P, 2\)"):
+        posekit.recover(points.reshape(2, -1))
+
+
+def test_every_door_takes_an_array_in_the_order_of_a_layout(folder: Path, tmp_path: Path) -> None:
+    joints = posekit.open(folder / "jump.bvh").figure_joints[:5]
+    smpl = posekit.open(joints, "posekit_14", rate=30, up="+z")
+    assert np.array_equal(smpl.joints, joints)
+    assert np.array_equal(posekit.repair(joints, layout="posekit_14", rate=30, up="+z").motion.joints, joints)
+    posekit.convert(joints, tmp_path / "jump.npz", layout="posekit_14", rate=30, up="+z")
+    assert np.array_equal(posekit.open(tmp_path / "jump.npz").joints, joints)
+    posekit.render(joints[:, ::-1], tmp_path / "jump.html", layout="posekit_14")
+    assert posekit.open(joints[..., :2], "posekit_14").points.shape == (5, 14, 2)
 
 
 @pytest.mark.parametrize("name", ["jump.bvh", "walk.npz"])

@@ -8,11 +8,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from posekit.errors import refusal, shown
 from posekit.files import read_bytes
 from posekit.formats.node import undamaged
 from posekit.formats.options import Options
-from posekit.geometry import UP_AXES
+from posekit.geometry import UP_AXES, Array
 
 CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     # container: "module:parse" of (data: bytes, source: str) -> plain document, and the endings of its files
@@ -95,7 +97,7 @@ def named(function: str) -> Callable[..., Any]:
 
 
 def open(  # the door's name, as in `gzip.open`
-    path: str | PathLike[str],
+    path: str | PathLike[str] | Array,
     layout: str = "",
     *,
     unit: str | None = None,
@@ -104,13 +106,13 @@ def open(  # the door's name, as in `gzip.open`
     urdf: str = "",
     person: int | None = None,
 ) -> Any:
-    """Open a file or folder: it is read once, and recognised by its content.
+    """Open a file or folder, which is read once and recognised by its content; or understand an array.
 
     Parameters
     ----------
-    path : path
+    path : path or array
         A file of motion, key points, a view, cameras, a result, a report or a robot; or a detector's folder. Files may
-        be gzipped.
+        be gzipped. An array (T, J, 3) has joints in space, one (T, P, 2) key points in pixels.
     layout : str
         Name of a layout (`posekit.formats.layout.layout_names`), or path of a TOML file of your own.
     unit : str, optional
@@ -148,6 +150,11 @@ def open(  # the door's name, as in `gzip.open`
         raise refusal("", "up", shown(options.up), f"one of {', '.join(UP_AXES)}", "state one of them")
     if rate is not None and not 0 < rate < float("inf"):
         raise refusal("", "rate", shown(rate), "frames a second, above 0", "state another")
+    if not isinstance(path, str | PathLike):
+        from posekit.formats.arrays import key_points_of, motion_of
+
+        flat = np.ndim(path) > 2 and np.shape(path)[-1] == 2
+        return key_points_of(path, options) if flat else motion_of(path, options)
     if suffix_of(Path(path)) == ".urdf":
         from posekit.robots import load_robot
 

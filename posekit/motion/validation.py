@@ -107,12 +107,10 @@ def validate(
     judge = _Judge(settings, urdf, changes)
     if rate is not None and not 0 < rate < np.inf:
         raise refusal("", "rate", shown(rate), "frames a second, above 0", "correct it")
-    if not _is_path(given) and not _paths(given) and _has_layout(given, layout):
-        from posekit.formats.joint_arrays import read
-        from posekit.formats.options import Options
+    if not _is_path(given) and not _paths(given) and has_layout(given, layout):
+        from posekit.formats import open as open_array
 
-        facts_given = Options(layout=layout, unit=unit or "", up=up or "", rate=rate)
-        given = read({"": np.asarray(given, dtype=np.float64)}, "array", facts_given)
+        given = open_array(given, layout, unit=unit, up=up, rate=rate)
     if not (_is_path(given) or _paths(given)):
         if isinstance(given, Motion):
             given = _stated(given, up, rate)
@@ -130,7 +128,7 @@ def _is_path(given: Any) -> bool:
     return isinstance(given, str | os.PathLike)
 
 
-def _has_layout(given: Any, layout: str) -> bool:
+def has_layout(given: Any, layout: str) -> bool:
     """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's."""
     shape = np.shape(given) if isinstance(given, list | tuple | np.ndarray) else ()
     known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))

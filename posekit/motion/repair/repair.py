@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal
 from posekit.files import write_bytes
+from posekit.formats import open as open_array
 from posekit.formats.bvh import Bvh
 from posekit.formats.options import Options
 from posekit.geometry import Record
@@ -24,7 +25,7 @@ from posekit.motion.repair.clip import Clip, RobotClip
 from posekit.motion.repair.own_bvh import in_bvh
 from posekit.motion.repair.own_file import in_own_file
 from posekit.motion.repair.time import mended
-from posekit.motion.validation import files_of, in_order, names_below
+from posekit.motion.validation import files_of, has_layout, in_order, names_below
 from posekit.progress import watched
 from posekit.settings import ValidateSettings
 from posekit.validators.judge import Validator
@@ -116,7 +117,7 @@ def repair(
     Parameters
     ----------
     source : path, sequence of path, Motion or array
-        A file, a folder, a motion, or an array as `posekit.Validator` takes it; an array is motion if `rate` is given.
+        A file, a folder, a motion, or an array as `posekit.validate` takes it; an array is motion if `rate` is given.
     target : path, optional
         File to write; for a folder or several files a new folder of files of the same names, in which valid files are
         copied unchanged.
@@ -161,6 +162,8 @@ def repair(
             return _folder(files, target, judge, facts)
         source = _opened(files[0], facts)
     else:
+        if has_layout(source, layout):
+            source = open_array(source, layout, unit=unit, up=up, rate=rate)
         source = _given(source, judge(""), up, rate)
     done = _repaired(source, judge, facts)
     return done if target is None else _written(done, Path(target), judge, facts)

@@ -1,0 +1,62 @@
+"""Arrays in memory, understood as files are: joints in space as motion, points in pictures as key points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from posekit.cameras import Detections
+from posekit.errors import refusal
+from posekit.formats import joint_arrays
+from posekit.formats.detection_rows import Rows, detections_of
+from posekit.formats.options import Options
+from posekit.geometry import Array
+from posekit.motion.motion import Motion
+
+
+def numbers(values: Any) -> Array:
+    """Return values as an array.
+
+    Raises
+    ------
+    InputError
+        If they are not numbers.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise refusal("", "array", f"a {type(values).__name__}", "a path, an object or numbers") from None
+
+
+def motion_of(values: Any, options: Options) -> Motion:
+    """Read joints in space (T, J, 3) in the order of a layout."""
+    return joint_arrays.read({"": numbers(values)}, "array", options)
+
+
+def key_points_of(values: Any, options: Options) -> Detections:
+    """Read key points of pictures in the order of a layout.
+
+    Parameters
+    ----------
+    values : array (T, P, 2) or (T, P, 3), or (T, N, P, 2) or (T, N, P, 3) of N people
+        Pixels, and the confidence of each point. NaN, and a confidence of 0, is an unseen point.
+
+    Raises
+    ------
+    InputError
+        If the array has another shape, or it is not clear which points the points are.
+    """
+    points = numbers(values)
+    several = points[:, None] if points.ndim == 3 else points
+    if several.ndim != 4 or several.shape[-1] not in (2, 3):
+        expected = "key points (T, P, 2), or (T, P, 3) with confidences"
+        raise refusal("array", "", f"shape {points.shape}", expected, "give one picture a row")
+    rows = Rows("array")
+    rows.kind = "an array"
+    for label, people in enumerate(several):
+        rows.picture(label)
+        for person, one in enumerate(people):
+            sure = one[:, 2] if one.shape[1] == 3 else np.full(len(one), np.nan)
+            rows.add(label, one[:, :2], sure, person=person)
+    return detections_of(rows, options)
