@@ -10,7 +10,7 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import pa_mpjpe
 from posekit.recovery import Answer, Frames, Recovery, Survivors
-from posekit.recovery.answer import answer_of, joint_radius, lay, representatives
+from posekit.recovery.answer import answers_of, joint_radius, lay, representatives
 from posekit.recovery.conductor import recover
 from posekit.recovery.scales import likely_scale
 from posekit.samples import samples
@@ -299,18 +299,26 @@ def test_sure_is_the_probability_of_the_samples():
     truth = random_views(1, np.random.default_rng(0), figure=FIGURE).truth
     sigma = 0.03
     covariance = np.broadcast_to(sigma**2 * np.eye(42), (1, 42, 42))
-    answer = answer_of(truth, np.ones(1), covariance, LENGTHS)
+
+    def answered(covariance, relative=False):
+        frame, none = np.zeros(1, dtype=int), np.zeros(1)
+        found = answers_of(
+            truth, frame, np.ones(1), covariance, LENGTHS[None], relative=np.array([relative]), unlisted=none
+        )
+        return {name: values[0] for name, values in found.items()}
+
     from scipy.stats import chi, chi2, norm, t
 
     # A t distribution of 4 degrees of freedom is a normal one whose deviation varies with the root of 4 / chi2.
     deviation = (
         sigma * norm.ppf(0.975) / t(4).ppf(0.975) * np.sqrt(4 / chi2(4).ppf((np.arange(1000) + 0.5) / 1000))
     )
-    assert answer.sure == pytest.approx(np.mean(chi(3).cdf(0.05 / deviation) ** 14), abs=0.1)
-    assert answer.survivor == 0 and answer.representatives.tolist() == [0]
+    answer = answered(covariance)
+    assert answer["sure"] == pytest.approx(np.mean(chi(3).cdf(0.05 / deviation) ** 14), abs=0.1)
+    assert answer["survivor"] == 0 and answer["representatives"].tolist() == [0]
     shared = np.tile(np.eye(3), (14, 14)) * 0.2**2 + 1e-6 * np.eye(42)
-    assert answer_of(truth, np.ones(1), shared[None], LENGTHS, relative=True).sure == pytest.approx(1.0)
-    assert answer_of(truth, np.ones(1), shared[None], LENGTHS).sure < 0.2
+    assert answered(shared[None], relative=True)["sure"] == pytest.approx(1.0)
+    assert answered(shared[None])["sure"] < 0.2
 
 
 def test_radius_holds_95_percent():
@@ -323,15 +331,45 @@ def test_radius_holds_95_percent():
         assert inside.mean() == pytest.approx(0.95, abs=0.012)
 
 
-def test_representatives_cover_what_they_must():
+@pytest.mark.parametrize("spread", [0.006, 0.012, 0.06])
+def test_representatives_cover_what_they_must(spread):
     rng = np.random.default_rng(1)
-    shape = 0.06 * rng.normal(size=(60, 14, 3))
-    weight = rng.exponential(size=60)
-    weight /= weight.sum()
-    rows, held = representatives(shape, weight, 0.9)
-    assert held.sum() >= 0.9 and (np.diff(held) <= 0).all() and len(set(rows.tolist())) == len(rows)
-    apart = np.linalg.norm(shape[rows][:, None] - shape[None], axis=3).max(axis=2).min(axis=0)
-    assert weight[apart <= 0.05].sum() == pytest.approx(held.sum())
+    counts = [60, 1, 25, 60, 7]
+    frame = np.repeat(np.arange(len(counts)), counts)
+    shape = spread * rng.normal(size=(len(frame), 14, 3))
+    weights = [np.sort(rng.exponential(size=count))[::-1] for count in counts]
+    weight = np.concatenate([one / one.sum() for one in weights])
+    found = representatives(shape, frame, weight, np.full(len(counts), 0.9))
+    for k, (rows, held) in enumerate(zip(*found, strict=True)):
+        own, share = shape[frame == k], weight[frame == k]
+        assert (
+            held.sum() >= 0.9 - 1e-9 and (np.diff(held) <= 0).all() and len(set(rows.tolist())) == len(rows)
+        )
+        apart = np.linalg.norm(own[rows][:, None] - own[None], axis=3).max(axis=2)
+        assert share[apart.min(axis=0) <= 0.05].sum() == pytest.approx(held.sum())
+        assert held[0] == pytest.approx(max(share[near <= 0.05].sum() for near in apart))
+        alone = representatives(own, np.zeros(len(own), dtype=int), share, np.full(1, 0.9))
+        np.testing.assert_array_equal(alone[0][0], rows)
+        np.testing.assert_allclose(alone[1][0], held, atol=1e-12)
+
+
+def test_configurations_and_margins_are_found_when_they_are_read(exact):
+    import pickle
+
+    from posekit.settings import RecoverSettings
+    from posekit.validators.judge import chosen_checks
+
+    recovery = recover(exact[0])
+    copy = pickle.loads(pickle.dumps(recovery))
+    table = recovery.survivors
+    np.testing.assert_array_equal(copy.survivors.q, table.q)
+    np.testing.assert_array_equal(recovery[1].q, table.q[recovery.rows(1)])
+    checks = chosen_checks(RecoverSettings(), of_robot=False, in_time=False)
+    points = np.concatenate([table.joints, table.head], axis=1)
+    found = judge_postures(points, checks, FIGURE, RecoverSettings(), tolerance=EXACT)
+    assert list(table.margins) == list(found)
+    for name, one in found.items():
+        np.testing.assert_allclose(table.margins[name], np.nanmin(one.margin, axis=1), atol=1e-9)
 
 
 def test_tables_are_read_only_and_become_motion_and_pandas(exact):

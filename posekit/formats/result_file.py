@@ -191,8 +191,8 @@ def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
             "camera": plain(_scaled(frames.camera[k], CAMERA_LENGTHS, per)),
             "rejected": plain(frames.rejected[k]),
             "levels": plain(frames.levels[k]),
-            "unlisted": int(frames.unlisted[k]),  # type: ignore[index]
-            "unlisted_probability": float(frames.unlisted_probability[k]),  # type: ignore[index]
+            "unlisted": int(frames.unlisted[k]),
+            "unlisted_probability": float(frames.unlisted_probability[k]),
             "reason": frames.reason[k],
             "root": plain(_scaled(frames.root[k], ROOT_LENGTHS, per)),
             "judged": frames.judged[k],
@@ -200,11 +200,11 @@ def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
                 "joints": joints[k],
                 "sure": nullable(answer.sure[k]),
                 "sure_of": answer.sure_of[k],
-                "survivor": int(answer.survivor[k]) - start if answer.survivor[k] >= 0 else None,  # type: ignore[index]
+                "survivor": int(answer.survivor[k]) - start if answer.survivor[k] >= 0 else None,
                 "representatives": (np.asarray(answer.representatives[k]) - start).tolist(),
                 "represented": plain(np.asarray(answer.represented[k])),
-                "nearer": answer.nearer[k].tolist(),  # type: ignore[index]
-                "nearer_sure": nullable(answer.nearer_sure[k]),  # type: ignore[index]
+                "nearer": answer.nearer[k].tolist(),
+                "nearer_sure": nullable(answer.nearer_sure[k]),
             },
             "postures": postures,
         }

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, dot, unit
+from posekit.geometry import Array, Flags, Ints, dot, unit
 from posekit.skeleton import PARENTS, SEGMENTS, TREE_SEGMENTS
 
 #: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
@@ -25,8 +25,11 @@ NEGLIGIBLE: Final = 1e-4
 #: Postures of a frame that are compared each with each; of more, the likeliest stand for the rest.
 MAX_COMPARED: Final = 600
 
-#: Pairs of joints that are compared at once: the products stay in the processor's cache.
-COMPARED_AT_ONCE: Final = 50_000
+#: Pairs of postures that are compared at once, and modes that are sampled at once: they stay in the processor's cache.
+COMPARED_AT_ONCE, SAMPLED_AT_ONCE = 50_000, 64
+
+#: Probabilities that differ by less are equal.
+ROUNDED_PROBABILITY: Final = 1e-9
 
 #: Degrees of freedom of the distribution within a mode, t, as of other misfits: a few lengths are far off, spines bend.
 TAIL_DEGREES_OF_FREEDOM: Final = 4
@@ -58,28 +61,17 @@ NORMAL_95: Final = 1.6449
 SAME_METRES: Final = 1e-7
 
 
-class FrameAnswer(NamedTuple):
-    """The answer of one frame; rows are those of its survivors. See `posekit.recovery.Answer`."""
-
-    joints: Array
-    sure: float
-    survivor: int
-    representatives: NDArray[np.intp]
-    represented: Array
-    nearer: NDArray[np.intp]
-    nearer_sure: Array
-
-
-def answer_of(
+def answers_of(
     joints: Array,
+    frame: Ints,
     probability: Array,
     covariance: Array | None,
     lengths: Array,
     *,
-    relative: bool = False,
-    unlisted: float = 0.0,
-) -> FrameAnswer:
-    r"""Make the answer of one frame.
+    relative: Flags,
+    unlisted: Array,
+) -> dict[str, Any]:
+    r"""Answer K frames; the result of each depends on that frame alone.
 
     Under noise the joints of the answer are the probability-weighted mean of the modes, laid onto the
     lengths. `sure` is :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m, \Sigma_m))`,
@@ -88,36 +80,60 @@ def answer_of(
     Parameters
     ----------
     joints : array (N, 14, 3)
-        Survivors, metres, camera frame; NaN where a joint is not known.
+        Survivors by frame, the likeliest first, metres, camera frame; NaN where a joint is not known.
+    frame : int array (N,)
+        Frame of each, 0 to K - 1.
     probability : array (N,)
-        They sum to one minus `unlisted`.
+        Within a frame they sum to one minus `unlisted`.
     covariance : array (N, 42, 42), optional
         Of the joints of each, square metres; None for exact postures.
-    lengths : array (17,)
-        Segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres.
-    relative : bool
-        Measure distances relative to the neck: its depth is not known.
-    unlisted : float
+    lengths : array (K, 17)
+        Segment lengths of the answers, in the order of `posekit.skeleton.SEGMENTS`, metres.
+    relative : bool array (K,)
+        Where distances are measured relative to the neck: its depth is not known.
+    unlisted : array (K,)
         Probability of postures that are not listed.
+
+    Returns
+    -------
+    dict
+        Columns of `posekit.recovery.Answer`; rows of survivors are counted from the first of each frame.
     """
-    weight = probability / probability.sum()
-    base = joints[:, :1] if relative else np.zeros((len(joints), 1, 3))
-    shape = joints - base
-    rows, held = representatives(shape, weight, min(REPRESENTED / max(1.0 - unlisted, REPRESENTED), 1.0))
-    draws = _draws(shape, covariance, weight, relative)
+    starts = np.flatnonzero(np.diff(frame, prepend=-1))
+    weight = probability / np.add.reduceat(probability, starts)[frame]
+    base = np.where(relative[frame, None, None], joints[:, :1], 0.0)
+    shape, listed = joints - base, 1.0 - unlisted
+    hold = np.minimum(REPRESENTED / np.maximum(listed, REPRESENTED), 1.0)
+    rows, held = representatives(shape, frame, weight, hold)
     if covariance is None:
         # Between exact postures there is none: the answer is the one that stands for the most probability.
-        survivor, laid, sure = int(rows[0]), shape[rows[0]], float(held[0])
+        survivor, sure = np.array([one[0] for one in rows]), np.array([one[0] for one in held])
+        laid = shape[starts + survivor]
+        sides = _sides(shape[:, None])
     else:
-        mean = np.einsum("n,njk->jk", weight, shape)
-        laid = lay(mean[None], lengths[None])[0]
-        inside = ~(np.linalg.norm(draws - laid, axis=3) > WITHIN_METRES).any(axis=2)  # NaN is not beyond
-        sure = float(weight @ inside.mean(axis=1))
-        survivor = int(np.nan_to_num(np.linalg.norm(shape - laid, axis=2)).mean(axis=1).argmin())
-    nearer, nearer_sure = _nearer(draws, weight, unlisted)
-    place = laid + (np.einsum("n,njk->jk", weight, base) if relative else 0.0)
-    listed = 1.0 - unlisted
-    return FrameAnswer(place, sure * listed, survivor, rows, held * listed, nearer, nearer_sure)
+        laid = lay(np.add.reduceat(weight[:, None, None] * shape, starts), lengths)
+        away = np.nan_to_num(np.linalg.norm(shape - laid[frame], axis=2)).mean(axis=1)
+        survivor = np.lexsort((away, frame))[starts] - starts
+        inside, sides = np.empty(len(shape)), np.empty((len(shape), 2, len(PARENTS) - 1))
+        for at in range(0, len(shape), SAMPLED_AT_ONCE):
+            own = slice(at, at + SAMPLED_AT_ONCE)
+            draws = _draws(shape[own], covariance[own], weight[own], relative[frame[own]])
+            away = np.linalg.norm(draws - laid[frame[own], None], axis=3)
+            inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not beyond
+            sides[own] = _sides(draws)
+        sure = np.add.reduceat(weight * inside, starts)
+    near, far = np.add.reduceat(weight[:, None, None] * sides, starts).transpose(1, 0, 2)
+    each = np.stack([1.0 - near - far, near, far])
+    known = np.isfinite(laid[:, 1:, 2] - laid[:, PARENTS[1:], 2])
+    return {
+        "joints": laid + np.add.reduceat(weight[:, None, None] * base, starts),
+        "sure": sure * listed,
+        "survivor": survivor,
+        "representatives": rows,
+        "represented": [one * share for one, share in zip(held, listed, strict=True)],
+        "nearer": np.where(known, np.array([0, 1, -1])[each.argmax(axis=0)], 0),
+        "nearer_sure": np.where(known, each.max(axis=0) * listed[:, None], np.nan),
+    }
 
 
 def lay(joints: Array, lengths: Array) -> Array:
@@ -134,14 +150,16 @@ def lay(joints: Array, lengths: Array) -> Array:
     for _ in range(30):
         apart = np.where(use[..., None], x[:, b] - x[:, a], 0.0)
         gap = np.where(use, 0.5 * ((apart**2).sum(axis=2) - lengths**2), 0.0)
-        if np.abs(gap).max(initial=0.0) < SAME_METRES * 0.1:
+        left = np.abs(gap).max(axis=1) >= SAME_METRES * 0.1
+        if not left.any():
             break
         J[:, rows, b], J[:, rows, a] = apart, -apart
         flat = J.reshape(len(x), len(SEGMENTS), -1)
         # A small damping keeps triangles that lie in a plane solvable.
         normal = flat @ flat.transpose(0, 2, 1) + 1e-9 * np.eye(len(SEGMENTS))
         step = np.einsum("fsk,fs->fk", flat, np.linalg.solve(normal, gap[..., None])[..., 0]).reshape(x.shape)
-        x = x - step * np.minimum(1.0, 0.1 / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-12))[:, None, None]
+        share = left * np.minimum(1.0, 0.1 / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-12))
+        x = x - step * share[:, None, None]
     off = np.where(use, np.abs(np.linalg.norm(x[:, b] - x[:, a], axis=2) - lengths), 0.0).max(
         axis=1, initial=0.0
     )
@@ -153,45 +171,71 @@ def lay(joints: Array, lengths: Array) -> Array:
     return np.where(known[..., None], x, np.nan)
 
 
-def representatives(shape: Array, weight: Array, hold: float) -> tuple[NDArray[np.intp], Array]:
-    """Choose few postures (N, 14, 3): what is within 5 cm of them in every joint has a given probability.
+def representatives(
+    shape: Array, frame: Ints, weight: Array, hold: Array
+) -> tuple[list[NDArray[np.intp]], list[Array]]:
+    """Choose few postures of each of K frames: what is within 5 cm of them in every joint has a given probability.
 
-    The posture that newly stands for the most probability comes first.
+    Parameters
+    ----------
+    shape : array (N, 14, 3)
+        Postures by frame, the likeliest first, metres.
+    frame : int array (N,)
+        Frame of each, 0 to K - 1.
+    weight : array (N,)
+        Their probabilities; they sum to one over a frame.
+    hold : array (K,)
+        Probability that is to be held.
 
     Returns
     -------
-    rows : int array (K,)
-        Representatives.
-    held : array (K,)
-        Probability of each and of what it stands for.
+    rows : list of K int arrays
+        Representatives, counted from the first posture of the frame. The one that stands for the most probability
+        comes first.
+    held : list of K arrays
+        Probability of each and of what it newly stands for.
     """
-    order = np.argsort(-weight, kind="stable")[:MAX_COMPARED]
-    # |a - b|^2 = |a|^2 + |b|^2 - 2 a.b, counted from the likeliest; an unknown joint is far from none.
-    place = (shape[order] - shape[order[:1]]).transpose(1, 0, 2)
-    place = np.where(np.isnan(place), 0.0, place)
-    square = dot(place, place)
-    within = (square - WITHIN_METRES**2) / 2
-    near = np.ones((len(order), len(order)), dtype=np.bool_)
-    step = 1 + COMPARED_AT_ONCE // near.size
-    for at in range(0, len(place), step):
-        one = place[at : at + step]
-        reach = within[at : at + step, :, None] + square[at : at + step, None] / 2
-        near &= (one @ one.swapaxes(1, 2) >= reach).all(axis=0)
-    left, stands = weight[order], near.astype(np.float64)
-    rows: list[int] = []
-    held: list[float] = []
-    total = 0.0
-    while total < hold - 1e-9:
-        gain = stands @ left
-        best = gain.argmax()  # of equal ones the likeliest
-        if not gain[best] > 0:
-            break
-        rows.append(int(order[best]))
-        held.append(float(gain[best]))
-        total += held[-1]
-        left[near[best]] = 0.0
-    by_share = np.argsort(-np.array(held), kind="stable")
-    return np.array(rows, dtype=np.intp)[by_share], np.array(held)[by_share]
+    count = np.bincount(frame)
+    starts, left = np.cumsum(count) - count, np.argsort(-count, kind="stable")
+    rows: list[Any] = [None] * len(count)
+    held: list[Any] = [None] * len(count)
+    while len(left):
+        width = min(count[left[0]], MAX_COMPARED)
+        some, left = np.split(left, [1 + COMPARED_AT_ONCE // width**2])
+        place = np.arange(width)
+        at = starts[some, None] + np.minimum(place, count[some, None] - 1)
+        near = _near(shape[at]).astype(np.float64)
+        rest = np.where(place < count[some, None], weight[at], 0.0)
+        lacking, chosen, gains = hold[some] - ROUNDED_PROBABILITY, [], []
+        while True:
+            gain = (near @ rest[..., None])[..., 0]
+            most = np.where(lacking > 0, gain.max(axis=1), 0.0)
+            if not most.any():
+                break
+            best = (gain > most[:, None] - ROUNDED_PROBABILITY).argmax(axis=1)  # of equal ones the likeliest
+            chosen.append(best)
+            gains.append(most)
+            lacking = lacking - most
+            rest = rest * (1.0 - near[np.arange(len(some)), best])
+        order = np.argsort(-np.array(gains), axis=0, kind="stable")
+        for column, k in enumerate(some.tolist()):
+            own = order[: np.count_nonzero(np.array(gains)[:, column]), column]
+            rows[k], held[k] = np.array(chosen)[own, column], np.array(gains)[own, column]
+    return rows, held
+
+
+def _near(places: Array) -> Flags:
+    r"""Tell which postures (K, n, 14, 3) of a frame are within 5 cm of each other in every joint (K, n, n).
+
+    :math:`a \cdot b - a^2 / 2 - b^2 / 2 = -|a - b|^2 / 2`, counted from the likeliest. An unknown joint is near.
+    """
+    place = np.nan_to_num(places - places[:, :1]).transpose(2, 0, 1, 3)
+    half, one = dot(place, place)[..., None] / 2, np.ones((*place.shape[:3], 1))
+    left, right = np.concatenate([place, -half, one], axis=3), np.concatenate([place, one, -half], axis=3)
+    near = np.ones((*places.shape[:2], places.shape[1]), dtype=np.bool_)
+    for a, b in zip(left, right, strict=True):
+        near &= a @ b.swapaxes(1, 2) >= -(WITHIN_METRES**2) / 2
+    return near
 
 
 def joint_radius(covariance: Array) -> Array:
@@ -209,27 +253,19 @@ def joint_radius(covariance: Array) -> Array:
     return np.where(known, np.sqrt(mean * root**3), 0.0)
 
 
-def _draws(shape: Array, covariance: Array | None, weight: Array, relative: bool) -> Array:
-    """Draw postures (N, S, 14, 3) of each mode, relative to the neck if asked."""
-    if covariance is None:
-        return shape[:, None]
+def _draws(shape: Array, covariance: Array, weight: Array, relative: Flags) -> Array:
+    """Draw postures (N, S, 14, 3) of each mode, relative to the neck where this is asked."""
     found = np.repeat(shape[:, None], N_SAMPLES, axis=1)
     rows = np.flatnonzero(weight > NEGLIGIBLE)
     some = (covariance[rows] + covariance[rows].transpose(0, 2, 1)) / 2
     floor = ROUNDING * (1.0 + np.einsum("nii->n", some))
     root = np.linalg.cholesky(some + floor[:, None, None] * np.eye(some.shape[1]))
     off = (DRAWS @ root.transpose(0, 2, 1)).reshape(len(rows), N_SAMPLES, shape.shape[1], 3)
-    found[rows] += off - off[:, :, :1] if relative else off
+    found[rows] += off - np.where(relative[rows, None, None, None], off[:, :, :1], 0.0)
     return found
 
 
-def _nearer(draws: Array, weight: Array, unlisted: float) -> tuple[NDArray[np.intp], Array]:
-    """Return for each segment whether its outer end is nearer (1), farther (-1) or neither, and how sure that is."""
-    depth = draws[..., 2]
-    gap = depth[..., 1:] - depth[..., PARENTS[1:]]
-    near, far = weight @ np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES]).mean(axis=2)
-    each = np.stack([1.0 - near - far, near, far])
-    best = each.argmax(axis=0)
-    known = np.isfinite(gap).any(axis=(0, 1))
-    sure = np.where(known, each.max(axis=0) * (1.0 - unlisted), np.nan)
-    return np.where(known, np.array([0, 1, -1])[best], 0), sure
+def _sides(draws: Array) -> Array:
+    """Return the shares of draws (N, S, 14, 3) in which a segment's outer end is nearer, and farther (N, 2, 13)."""
+    gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
+    return np.asarray(np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2))

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Final, NamedTuple
+from collections.abc import Iterable
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, LengthUncertainty
 from posekit.geometry import Array, perpendicular, unit
-from posekit.settings import MEASURED, RecoverSettings, Tolerance
+from posekit.settings import MEASURED, Tolerance
 from posekit.skeleton import HIPS, JOINT
 from posekit.solver import Limits
 from posekit.validators.check import Check
-from posekit.validators.judge import PostureJudge, chosen_checks, early_checks, judge_postures
+from posekit.validators.judge import PostureJudge, judge_postures
 from posekit.validators.ranges import load_ranges
 
 #: Standard deviations of lengths and of joint limits that do not contradict a posture.
@@ -28,73 +28,33 @@ LIMIT_DEGREES: Final = 2.0
 CONTACT_METRES, FOREARM_METRES, PHOTOGRAPH_CONTACT_METRES = 0.03, 0.24, 0.06
 
 
-class Certificate(NamedTuple):
-    """Verdicts on N postures.
+def certified(
+    judge: PostureJudge, checks: Iterable[Check], points: Array
+) -> tuple[NDArray[np.str_], dict[str, Array]]:
+    """Judge postures (N, 19, 3); head points are NaN where not known.
 
-    Attributes
-    ----------
-    valid : bool array (N,)
-    reason : list of str
-        ``check/place`` of the worst violation of each; empty if there is none.
+    Returns
+    -------
+    reason : str array (N,)
+        ``check/place`` of the worst violation of each; empty if it passes.
     margins : dict of str to array (N,)
         Worst margin of each check, in its unit; NaN where it decided nothing.
     """
-
-    valid: NDArray[np.bool_]
-    reason: list[str]
-    margins: dict[str, Array]
-
-
-class Certifier:
-    """The checks that a recovery asks about one figure.
-
-    Parameters
-    ----------
-    figure : Figure
-        The person's.
-    settings : RecoverSettings
-    tolerance : Tolerance
-        Allowed differences.
-    up : array (3,)
-        Unit vector against gravity, camera frame.
-    """
-
-    def __init__(self, figure: Figure, settings: RecoverSettings, tolerance: Tolerance, up: Array) -> None:
-        self.figure, self.settings, self.tolerance, self.up = figure, settings, tolerance, up
-        self.checks = [
-            check
-            for check in chosen_checks(settings, of_robot=False, in_time=False)
-            if not getattr(check, "over_time", False)
-        ]
-
-    @cached_property
-    def early(self) -> list[Check]:
-        """The checks as a tree asks them."""
-        return early_checks(self.settings)
-
-    @cached_property
-    def judge(self) -> PostureJudge:
-        """What asks them."""
-        return PostureJudge(self.figure, self.settings, self.tolerance, self.up)
-
-    def certify(self, joints: Array, head: Array) -> Certificate:
-        """Judge postures (N, 14, 3) with head points (N, 5, 3), NaN where not known."""
-        points = np.concatenate([joints, head], axis=1)
-        rows, worst, reason = np.arange(len(points)), np.zeros(len(points)), [""] * len(points)
-        margins: dict[str, Array] = {}
-        found = judge_postures(
-            points, self.checks, self.figure, self.settings, tolerance=self.tolerance, up=self.up
-        )
-        for name, one in found.items():
-            share = np.where(np.isnan(one.margin), np.inf, one.share)
-            place = share.argmin(axis=1)
-            margin = one.margin[rows, place]
-            margins[name] = np.where(np.isfinite(margin), margin, np.nan)
-            least = np.where(one.violated.any(axis=1), share[rows, place], 0.0)
-            for k in np.flatnonzero(least < worst).tolist():
-                reason[k] = f"{name}/{one.places[place[k]]}"
-            worst = np.minimum(worst, least)
-        return Certificate(worst >= 0, reason, margins)
+    rows, worst, reason = np.arange(len(points)), np.zeros(len(points)), [""] * len(points)
+    margins: dict[str, Array] = {}
+    found = judge_postures(
+        points, checks, judge.figure, judge.settings, tolerance=judge.tolerance, up=judge.up
+    )
+    for name, one in found.items():
+        share = np.where(np.isnan(one.margin), np.inf, one.share)
+        place = share.argmin(axis=1)
+        margin = one.margin[rows, place]
+        margins[name] = np.where(np.isfinite(margin), margin, np.nan)
+        least = np.where(one.violated.any(axis=1), share[rows, place], 0.0)
+        for k in np.flatnonzero(least < worst).tolist():
+            reason[k] = f"{name}/{one.places[place[k]]}"
+        worst = np.minimum(worst, least)
+    return np.array(reason, dtype=np.str_), margins
 
 
 def noisy_tolerance(figure: Figure, lengths: LengthUncertainty, *, sized: bool) -> Tolerance:
@@ -116,10 +76,10 @@ def noisy_contact(settings: float, lengths: LengthUncertainty, *, photograph: bo
     return settings - CONTACT_METRES - ALLOWED_DEVIATIONS * max(lengths.own.values()) * FOREARM_METRES
 
 
-def solver_limits(figure: Figure, certifier: Certifier) -> Limits | None:
+def solver_limits(figure: Figure, checks: Iterable[Check], ranges: str) -> Limits | None:
     """Return the joint ranges that pull at the solver's postures; None if no check asks for them."""
-    table = load_ranges(certifier.settings.ranges)
-    if "joint-range" not in [check.name for check in certifier.checks] or (
+    table = load_ranges(ranges)
+    if "joint-range" not in [check.name for check in checks] or (
         table is not None and table["kind"] not in ("anatomical", "configuration")
     ):
         return None
@@ -134,15 +94,3 @@ def solver_limits(figure: Figure, certifier: Certifier) -> Limits | None:
         above_hips=float(np.linalg.norm(perpendicular(right - pelvis, unit(left - right)))),
         pelvis_between_hips=figure.pelvis_between_hips,
     )
-
-
-def group_of(joints: Array, within: float) -> NDArray[np.intp]:
-    """Group postures (N, 14, 3), the likeliest first: each joins the first leader no joint of which is farther away."""
-    group, leaders = np.empty(len(joints), dtype=np.intp), np.empty(0, dtype=np.intp)
-    for k, one in enumerate(joints):
-        apart = np.fmax.reduce(np.linalg.norm(joints[leaders] - one, axis=2), axis=1, initial=0.0)
-        near = np.flatnonzero(apart <= within)
-        if not len(near):
-            leaders = np.append(leaders, k)
-        group[k] = near[0] if len(near) else len(leaders) - 1
-    return group

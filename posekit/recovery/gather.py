@@ -1,73 +1,46 @@
-"""From frames to a `Recovery`: the tables of survivors, frames and answers."""
+"""From postures to a `Recovery`: which are listed, how probable they are, and the answers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.body import Figure, with_head
 from posekit.cameras import View
-from posekit.recovery.answer import FrameAnswer
+from posekit.geometry import Array, Flags, Ints
+from posekit.ranking import softmax
+from posekit.recovery.answer import answers_of, joint_radius
 from posekit.recovery.recovery import Answer, Frames, Recovery, Survivors
 from posekit.recovery.sight import Sight
-from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
+from posekit.settings import RecoverSettings
+from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
+
+#: Rejected leaves of a frame in which nothing is grown.
+LOST: Final = {"root/not_known": 8192}
+
+#: Difference in depth below which neither end of a segment is nearer.
+LEVEL_METRES: Final = 1e-6
+
+#: Row of `Answer` of a frame without a survivor.
+NO_ANSWER: Final[Mapping[str, Any]] = {
+    "joints": np.full((len(JOINTS), 3), np.nan),
+    "sure": np.nan,
+    "sure_of": "",
+    "survivor": -1,
+    "representatives": np.empty(0, dtype=np.intp),
+    "represented": np.empty(0),
+    "nearer": np.zeros(len(TREE_SEGMENTS), dtype=np.intp),
+    "nearer_sure": np.full(len(TREE_SEGMENTS), np.nan),
+}
 
 
-class Found(NamedTuple):
-    """The survivors of one frame, and what became of the rest.
-
-    Attributes
-    ----------
-    columns : mapping of str to array
-        Columns of `Survivors`, the likeliest first.
-    answer : FrameAnswer or None
-    rejected : mapping
-    judged, reason : str
-    levels : sequence of int
-    unlisted : int
-    unlisted_probability : float
-    margins : mapping of str to array
-        Of each check.
-    """
-
-    columns: Mapping[str, Any]
-    answer: FrameAnswer | None
-    rejected: Mapping[str, int]
-    judged: str
-    reason: str = ""
-    levels: Sequence[int] = ()
-    unlisted: int = 0
-    unlisted_probability: float = 0.0
-    margins: Mapping[str, Any] = {}
-
-    @property
-    def size(self) -> int:
-        """Number of survivors."""
-        return 0 if self.answer is None else len(self.columns["joints"])
-
-
-NO_ANSWER: Final = FrameAnswer(
-    np.full((len(JOINTS), 3), np.nan),
-    np.nan,
-    -1,
-    np.empty(0, dtype=np.intp),
-    np.empty(0),
-    np.zeros(len(TREE_SEGMENTS), dtype=np.intp),
-    np.full(len(TREE_SEGMENTS), np.nan),
-)
-
-
-def gathered(
-    view: View,
-    sight: Sight,
-    person: Figure,
-    found: Sequence[Found],
-    settings: Mapping[str, Any],
-    tolerances: Mapping[str, Any],
-) -> Recovery:
-    """Put the frames together; configurations are found for all survivors at once.
+class Gathering:
+    """The frames of a view: those in which postures are still sought, and what was found behind the others.
 
     Parameters
     ----------
@@ -75,84 +48,204 @@ def gathered(
     sight : Sight
         What the view shows.
     person : Figure
-    found : sequence of F Found
-    settings, tolerances : mapping
-        What decided the result, as JSON values.
+    settings : RecoverSettings
+    nearer : int array (F, 17)
+        Flips given by hand: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer, 0 if
+        neither was given.
     """
-    counts = [one.size for one in found]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    tables = [one.columns for one in found if one.size]
-    columns: dict[str, Any] = {
-        "joints": np.empty((0, len(JOINTS), 3)),
-        "head": np.empty((0, len(HEAD_POINTS), 3)),
-    }
-    margins: dict[str, Any] = {}
-    if tables:
-        columns = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
-        judged = [one.margins for one in found if one.size]
-        margins = {name: np.concatenate([one[name] for one in judged]) for name in judged[0]}
-    survivors = Survivors(
-        frame=np.repeat(np.arange(len(found)), counts),
-        q=person.inverse_kinematics(with_head(columns["joints"], columns["head"])),
-        margins=margins,
-        **columns,
-    )
-    frames = Frames(
-        time=view.time,
-        pictures=view.pictures,
-        camera=sight.cameras,
-        rejected=[dict(one.rejected) for one in found],
-        levels=[one.levels for one in found],
-        unlisted=np.array([one.unlisted for one in found]),
-        unlisted_probability=np.array([one.unlisted_probability for one in found]),
-        reason=[one.reason for one in found],
-        root=[
-            root or _root(one, sight, k) for k, (one, root) in enumerate(zip(found, sight.roots, strict=True))
-        ],
-        judged=[one.judged for one in found],
-    )
-    answers = [one.answer or NO_ANSWER for one in found]
-    nearest = np.array([one.survivor for one in answers], dtype=np.intp)
-    answer = Answer(
-        joints=np.stack([one.joints for one in answers]),
-        sure=np.array([one.sure for one in answers]),
-        sure_of=[_sure_of(one, sight, k) for k, one in enumerate(found)],
-        survivor=np.where(nearest < 0, -1, nearest + starts[:-1]),
-        representatives=[a.representatives + at for a, at in zip(answers, starts[:-1].tolist(), strict=True)],
-        represented=[a.represented for a in answers],
-        nearer=np.stack([a.nearer for a in answers]),
-        nearer_sure=np.stack([a.nearer_sure for a in answers]),
-    )
-    return Recovery(
-        survivors=survivors,
-        frames=frames,
-        answer=answer,
-        settings=settings,
-        tolerances=tolerances,
-        lengths=dict(person.lengths),
-        configuration_names=person.configuration_names,
-        unit=view.unit,
-        camera=view.camera.fields("m"),
-        source=view.source,
-    )
+
+    def __init__(
+        self, view: View, sight: Sight, person: Figure, settings: RecoverSettings, nearer: NDArray[np.int8]
+    ) -> None:
+        self.view, self.sight, self.person, self.settings, self.nearer = view, sight, person, settings, nearer
+        self.lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
+        self.given = np.ones(len(view), dtype=np.bool_)
+        self.given[sight.frame[~sight.given]] = False
+        self.open = {k for k, reason in enumerate(sight.reasons) if not reason}
+        nothing = {"rejected": LOST, "levels": (), "judged": "", "unlisted": 0, "unlisted_probability": 0.0}
+        self.frames: list[dict[str, Any]] = [
+            {**nothing, "reason": reason or "no posture fits", "root": root}
+            for reason, root in zip(sight.reasons, sight.roots, strict=True)
+        ]
+        self.answers = [NO_ANSWER] * len(view)
+        self.survivors: list[dict[str, Any]] = []
+
+    def close(self, k: int, **about: Any) -> None:
+        """State what is known of a frame, by columns of `Frames`; nothing more is sought in it."""
+        self.frames[k] |= about
+        self.open.discard(k)
+
+    def add(
+        self,
+        judged: str,
+        lost: dict[int, Counter[str]],
+        columns: dict[str, Any],
+        score: Array,
+        reason: NDArray[np.str_],
+        covariance: Callable[[Ints], Array] | None = None,
+        *,
+        leave: bool = False,
+    ) -> None:
+        """List the postures of some frames that pass, the likeliest first, and answer.
+
+        Parameters
+        ----------
+        judged : str
+            As in `Frames`.
+        lost : dict of int to Counter
+            Branches of each of the frames that were rejected before, by reason.
+        columns : dict of str to array
+            Columns of `Survivors`, by frame.
+        score : array (N,)
+            Logarithm of the unnormalised probability of each posture.
+        reason : str array (N,)
+            Why each does not pass; empty if it does.
+        covariance : callable, optional
+            Returns those of the joints of some rows under noise (n, 42, 42): as many postures are listed as hold the
+            coverage.
+        leave : bool
+            Leave frames open in which nothing passes.
+        """
+        every, joints = columns["frame"], columns["joints"]
+        start, end = np.array(SEGMENTS).T
+        ahead = (joints[:, end, 2] - joints[:, start, 2]) * self.nearer[every]
+        reason = np.where((ahead < -LEVEL_METRES).any(axis=1) & (reason == ""), "nearer/given", reason)
+        for row in np.flatnonzero(reason != "").tolist():
+            lost[int(every[row])][str(reason[row])] += 1
+        rows = np.flatnonzero(reason == "")
+        probability = softmax(score[rows], every[rows])
+        order = np.lexsort((-probability, every[rows]))
+        rows, probability = rows[order], probability[order]
+        frame = every[rows]
+        first = np.searchsorted(frame, frame)
+        if covariance is not None:
+            before = np.cumsum(probability) - probability
+            held = before - before[first] < self.settings.coverage - 1e-12
+            held[first] = True
+        else:
+            held = np.ones(len(rows), dtype=np.bool_)
+        rest = frame[~held], np.ones(len(rows))[~held], probability[~held]
+        unlisted, improbable = (np.bincount(rest[0], weight, len(self.view)) for weight in rest[1:])
+        found = np.unique(frame)
+        for k in lost if not leave else found.tolist():
+            rejected = lost[k]
+            worst = max(rejected, key=lambda name: rejected[name], default="").replace("/", " at ")
+            why = f"no posture passes: most fail {worst}"
+            self.close(
+                k,
+                rejected=dict(rejected),
+                judged=judged,
+                reason="" if k in found else why,
+                unlisted=int(unlisted[k]),
+                unlisted_probability=improbable[k],
+            )
+        if len(found):
+            table = {name: values[rows[held]] for name, values in columns.items()}
+            own = None if covariance is None else covariance(rows[held])
+            self._answer(found, table | {"probability": probability[held]}, own, improbable[found])
+
+    def _answer(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
+        """Keep the survivors of some frames (K,) and answer these frames."""
+        count = len(table["frame"])
+        frame = np.searchsorted(found, table["frame"])
+        starts = np.flatnonzero(np.diff(frame, prepend=-1))
+        joints, probability = table["joints"], table["probability"]
+        deep = self.sight.camera.perspective & ((covariance is None) | self.given[found])
+        lengths = np.tile(self.lengths, (len(found), 1))
+        usual: dict[str, Any] = {"branch": np.full(count, ""), "chi2": np.zeros(count)}
+        usual |= {
+            "radius": np.zeros((count, len(JOINTS))),
+            "inferred": np.zeros((count, len(JOINTS)), np.bool_),
+        }
+        table = usual | table
+        if covariance is not None:
+            block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
+            if not self.sight.camera.perspective:
+                # There is no place in space: radii are about the middle of the joints.
+                block = block - block.mean(axis=1, keepdims=True)
+                block = block - block.mean(axis=3, keepdims=True)
+            table["radius"] = joint_radius(np.einsum("njajb->njab", block))
+            # The lengths of the answer are the person's, in the mean size of the survivors.
+            a, b = np.array(TREE_SEGMENTS).T
+            each = np.log(np.linalg.norm(joints[:, a] - joints[:, b], axis=2) / self.lengths[: len(a)])
+            lengths *= np.exp(_mean(np.nan_to_num(each).mean(axis=1), probability, starts))[:, None]
+            depth, own = joints[:, 0, 2], table["radius"][:, 0] / 1.96
+            mean = _mean(depth, probability, starts)
+            spread = np.sqrt(_mean((depth - mean[frame]) ** 2 + own**2, probability, starts))
+            for row in np.flatnonzero(~deep).tolist() if self.sight.camera.perspective else ():
+                root = {"method": "solver", "estimate": float(mean[row]), "deviation": float(spread[row])}
+                self.frames[found[row]]["root"] = self.frames[found[row]]["root"] or root
+        if self.settings.group is not None:
+            each = np.split(joints, starts[1:])
+            table["group"] = np.concatenate([group_of(one, self.settings.group) for one in each])
+        answers = answers_of(
+            joints, frame, probability, covariance, lengths, relative=~deep, unlisted=unlisted
+        )
+        answers["sure_of"] = np.where(deep, "position", "relative to the neck")
+        for row, number in enumerate(found.tolist()):
+            self.answers[number] = {name: values[row] for name, values in answers.items()}
+        self.survivors.append(table)
+
+    def recovery(
+        self,
+        margins: Callable[[Array, Flags], Mapping[str, Array]],
+        settings: Mapping[str, Any],
+        tolerances: Mapping[str, Any],
+    ) -> Recovery:
+        """Put the frames together.
+
+        Parameters
+        ----------
+        margins : callable
+            Returns those of postures (N, 19, 3) that were found under noise, or exactly.
+        settings, tolerances : mapping
+            What decided the result, as JSON values.
+        """
+        view, nothing = self.view, {"frame": np.empty(0, np.intp), "joints": np.empty((0, len(JOINTS), 3))}
+        tables = self.survivors or [nothing | {"head": np.empty((0, len(HEAD_POINTS), 3))}]
+        table = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
+        order = np.argsort(table["frame"], kind="stable")
+        table = {name: values[order] for name, values in table.items()}
+        frames: dict[str, Any] = {name: [one[name] for one in self.frames] for name in self.frames[0]}
+        answers: dict[str, Any] = {name: [one[name] for one in self.answers] for name in NO_ANSWER}
+        starts = np.searchsorted(table["frame"], np.arange(len(view)))
+        nearest = np.array(answers["survivor"])
+        answers["survivor"] = np.where(nearest < 0, -1, nearest + starts)
+        answers["representatives"] = [
+            one + at for one, at in zip(answers["representatives"], starts, strict=True)
+        ]
+        points = with_head(table["joints"], table["head"])
+        noisy = np.array([one == "noisy" for one in frames["judged"]])[table["frame"]]
+        return Recovery(
+            survivors=Survivors(
+                q=partial(self.person.inverse_kinematics, points),
+                margins=partial(margins, points, noisy),
+                **table,
+            ),
+            frames=Frames(time=view.time, pictures=view.pictures, camera=self.sight.cameras, **frames),
+            answer=Answer(**answers),
+            settings=settings,
+            tolerances=tolerances,
+            lengths=dict(self.person.lengths),
+            configuration_names=self.person.configuration_names,
+            unit=view.unit,
+            camera=view.camera.fields("m"),
+            source=view.source,
+        )
 
 
-def _root(found: Found, sight: Sight, k: int) -> dict[str, Any] | None:
-    """Say how the neck's depth was found where the solver placed it."""
-    if not sight.camera.perspective or found.judged != "noisy" or not found.size or sight.given[k]:
-        return None
-    depth, weight = found.columns["joints"][:, 0, 2], found.columns["probability"]
-    weight = weight / weight.sum()
-    mean, own = float(weight @ depth), found.columns["radius"][:, 0] / 1.96
-    return {
-        "method": "solver",
-        "estimate": mean,
-        "deviation": float(np.sqrt(weight @ ((depth - mean) ** 2 + own**2))),
-    }
+def _mean(values: Array, probability: Array, starts: Ints) -> Array:
+    """Return the probability-weighted means (K,) of values (N,) over frames that start at some rows."""
+    return np.add.reduceat(values * probability, starts) / np.add.reduceat(probability, starts)
 
 
-def _sure_of(found: Found, sight: Sight, k: int) -> str:
-    if found.answer is None:
-        return ""
-    deep = sight.camera.perspective and (found.judged != "noisy" or bool(sight.given[k]))
-    return "position" if deep else "relative to the neck"
+def group_of(joints: Array, within: float) -> Ints:
+    """Group postures (N, 14, 3), the likeliest first: each joins the first leader no joint of which is farther away."""
+    group, leaders = np.empty(len(joints), dtype=np.intp), np.empty(0, dtype=np.intp)
+    for k, one in enumerate(joints):
+        apart = np.fmax.reduce(np.linalg.norm(joints[leaders] - one, axis=2), axis=1, initial=0.0)
+        near = np.flatnonzero(apart <= within)
+        if not len(near):
+            leaders = np.append(leaders, k)
+        group[k] = near[0] if len(near) else len(leaders) - 1
+    return group

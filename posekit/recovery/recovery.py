@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal, shown
-from posekit.geometry import Array, Record
+from posekit.geometry import Array, Record, read_only
 from posekit.motion import Motion
 from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
 
@@ -19,23 +19,59 @@ if TYPE_CHECKING:
 
     import pandas
 
-N_JOINTS, N_SEGMENTS = len(JOINTS), len(TREE_SEGMENTS)
+
+def column(*shape: int, fill: Any = np.nan) -> Any:
+    """Declare a column of a table: the shape of a row, and the value of all rows where it is not given."""
+    return field(default=None, metadata={"shape": shape, "fill": fill})
+
+
+def listed(fill: Any) -> Any:
+    """Declare a sequence with an entry a row, and the entry of all rows where it is not given."""
+    return field(default=(), metadata={"entry": fill})
 
 
 class Table(Record):
-    """Base of tables with one row a survivor or a frame: arrays of one length, read-only."""
+    """Base of tables with one row a survivor or a frame, read-only; the first column is always given."""
 
-    def _complete(self, rows: int, shapes: Mapping[str, tuple[int, ...]], fill: Mapping[str, Any]) -> None:
-        """Make every column an array of `rows` rows; a column that is None is filled."""
-        for name, shape in shapes.items():
-            given, value = getattr(self, name), fill.get(name, np.nan)
-            dtype = np.result_type(type(value)) if not isinstance(value, str) else np.dtype(np.str_)
-            column = np.full((rows, *shape), value) if given is None else np.array(given, dtype=dtype)
-            if column.shape != (rows, *shape) and not (column.size == 0 and rows == 0):
-                raise InputError(
-                    f"result: {name}: got shape {column.shape}; expected {(rows, *shape)}; correct it"
-                )
-            self._set(name, column.reshape(rows, *shape))
+    def __post_init__(self) -> None:
+        rows = len(self)
+        for one in fields(self):  # type: ignore[arg-type]
+            if "entry" in one.metadata:
+                self._set(one.name, tuple(getattr(self, one.name)) or (one.metadata["entry"],) * rows)
+            elif "shape" in one.metadata:
+                given = getattr(self, one.name)
+                shape, fill = (rows, *one.metadata["shape"]), one.metadata["fill"]
+                dtype = np.dtype(np.str_) if isinstance(fill, str) else np.result_type(type(fill))
+                values = np.full(shape, fill) if given is None else np.array(given, dtype=dtype)
+                if values.shape != shape and not (values.size == 0 and rows == 0):
+                    raise InputError(
+                        f"result: {one.name}: got shape {values.shape}; expected {shape}; correct it"
+                    )
+                self._set(one.name, values.reshape(shape))
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a pickle: functions of `Derived` fields are called."""
+        return {name: getattr(self, name) for name in vars(self)}
+
+
+class Derived:
+    """A field that may be given as a function without arguments: it is called when the field is first read."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, table: Any, owner: type | None = None) -> Any:
+        held = {} if table is None else vars(table)
+        if callable(held.get(self.name)):
+            self.__set__(table, held[self.name]())
+        return held.get(self.name)
+
+    def __set__(self, table: Any, value: Any) -> None:
+        vars(table)[self.name] = read_only(value) if isinstance(value, np.ndarray) else value or {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -70,34 +106,18 @@ class Survivors(Table):
         Scale of a scaled orthographic camera, pixels a metre; NaN elsewhere.
     """
 
-    frame: NDArray[np.intp]
-    joints: Array
-    q: Array
-    head: Array | None = None
-    probability: Array | None = None
-    chi2: Array | None = None
-    margins: Mapping[str, Array] = field(default_factory=dict)
-    branch: NDArray[np.str_] | None = None
-    group: NDArray[np.intp] | None = None
-    radius: Array | None = None
-    inferred: NDArray[np.bool_] | None = None
-    scale: Array | None = None
-
-    def __post_init__(self) -> None:
-        rows = len(self.frame)
-        nq = np.shape(self.q)[1] if np.ndim(self.q) == 2 else 0
-        shapes: dict[str, tuple[int, ...]] = {"joints": (N_JOINTS, 3), "head": (len(HEAD_POINTS), 3)}
-        shapes |= {"q": (nq,), "radius": (N_JOINTS,), "inferred": (N_JOINTS,)}
-        shapes |= dict.fromkeys(("frame", "probability", "chi2", "branch", "group", "scale"), ())
-        fill = {"chi2": 0.0, "branch": "", "group": -1, "radius": 0.0, "inferred": False, "frame": 0}
-        self._complete(rows, shapes, fill)
-        self._set(
-            "margins", {name: np.array(values, dtype=np.float64) for name, values in self.margins.items()}
-        )
-
-    def __len__(self) -> int:
-        """Count the survivors."""
-        return len(self.frame)
+    frame: NDArray[np.intp] = column(fill=0)
+    joints: Array = column(len(JOINTS), 3)
+    q: Derived = Derived()
+    head: Array = column(len(HEAD_POINTS), 3)
+    probability: Array = column()
+    chi2: Array = column(fill=0.0)
+    margins: Derived = Derived()
+    branch: NDArray[np.str_] = column(fill="")
+    group: NDArray[np.intp] = column(fill=-1)
+    radius: Array = column(len(JOINTS), fill=0.0)
+    inferred: NDArray[np.bool_] = column(len(JOINTS), fill=False)
+    scale: Array = column()
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Survivors:
         """Return some rows."""
@@ -105,9 +125,11 @@ class Survivors(Table):
 
     def _columns(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> dict[str, Any]:
         """Return some rows of every column."""
-        columns = {one.name: getattr(self, one.name) for one in fields(Survivors)}
-        margins = {name: values[rows] for name, values in columns.pop("margins").items()}
-        return {name: values[rows] for name, values in columns.items()} | {"margins": margins}
+        columns = {one.name: getattr(self, one.name)[rows] for one in fields(Survivors) if one.metadata}
+        return columns | {
+            "q": lambda: self.q[rows],
+            "margins": lambda: {name: values[rows] for name, values in self.margins.items()},
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -138,30 +160,16 @@ class Frames(Table):
         ``exact``, ``tolerated`` or ``noisy``.
     """
 
-    time: Array
+    time: Array = column()
     pictures: Sequence[str] = ()
-    camera: Sequence[Mapping[str, Any]] = ()
-    rejected: Sequence[Mapping[str, int]] = ()
-    levels: Sequence[Sequence[int]] = ()
-    unlisted: NDArray[np.intp] | None = None
-    unlisted_probability: Array | None = None
-    reason: Sequence[str] = ()
-    root: Sequence[Mapping[str, Any] | None] = ()
-    judged: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        count = len(self.time)
-        shapes: dict[str, tuple[int, ...]] = {"time": (), "unlisted": (), "unlisted_probability": ()}
-        self._complete(count, shapes, {"unlisted": 0, "unlisted_probability": 0.0})
-        empty: dict[str, Any] = {"camera": {}, "rejected": {}, "levels": (), "root": None}
-        empty |= {"reason": "", "judged": ""}
-        for name, value in empty.items():
-            self._set(name, tuple(getattr(self, name)) or (value,) * count)
-        self._set("pictures", tuple(str(name) for name in self.pictures))
-
-    def __len__(self) -> int:
-        """Count the frames."""
-        return len(self.time)
+    camera: Sequence[Mapping[str, Any]] = listed({})
+    rejected: Sequence[Mapping[str, int]] = listed({})
+    levels: Sequence[Sequence[int]] = listed(())
+    unlisted: NDArray[np.intp] = column(fill=0)
+    unlisted_probability: Array = column(fill=0.0)
+    reason: Sequence[str] = listed("")
+    root: Sequence[Mapping[str, Any] | None] = listed(None)
+    judged: Sequence[str] = listed("")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -190,32 +198,14 @@ class Answer(Table):
         Probability of `nearer`; NaN where there is no answer.
     """
 
-    joints: Array
-    sure: Array
-    sure_of: Sequence[str] = ()
-    survivor: NDArray[np.intp] | None = None
-    representatives: Sequence[NDArray[np.intp]] = ()
-    represented: Sequence[Array] = ()
-    nearer: NDArray[np.intp] | None = None
-    nearer_sure: Array | None = None
-
-    def __post_init__(self) -> None:
-        count = len(self.joints)
-        shapes: dict[str, tuple[int, ...]] = {
-            "joints": (N_JOINTS, 3),
-            "sure": (),
-            "survivor": (),
-            "nearer": (N_SEGMENTS,),
-            "nearer_sure": (N_SEGMENTS,),
-        }
-        self._complete(count, shapes, {"survivor": -1, "nearer": 0})
-        none = np.empty(0, dtype=np.intp)
-        for name, value in (("sure_of", ""), ("representatives", none), ("represented", np.empty(0))):
-            self._set(name, tuple(getattr(self, name)) or (value,) * count)
-
-    def __len__(self) -> int:
-        """Count the frames."""
-        return len(self.joints)
+    joints: Array = column(len(JOINTS), 3)
+    sure: Array = column()
+    sure_of: Sequence[str] = listed("")
+    survivor: NDArray[np.intp] = column(fill=-1)
+    representatives: Sequence[NDArray[np.intp]] = listed(np.empty(0, dtype=np.intp))
+    represented: Sequence[Array] = listed(np.empty(0))
+    nearer: NDArray[np.intp] = column(len(TREE_SEGMENTS), fill=0)
+    nearer_sure: Array = column(len(TREE_SEGMENTS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -235,14 +225,6 @@ class Paths(Table):
     survivor: NDArray[np.intp]
     probability: Array
     joints: Array
-
-    def __post_init__(self) -> None:
-        for name, dtype in (("survivor", np.intp), ("probability", np.float64), ("joints", np.float64)):
-            self._set(name, np.array(getattr(self, name), dtype=dtype))
-
-    def __len__(self) -> int:
-        """Count the paths."""
-        return len(self.survivor)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -402,9 +384,9 @@ class Recovery(Record):
             rows = np.asarray(self.answer.survivor if which == "answer" else first)
         frame = np.arange(len(self)) if which != "all" else self.survivors.frame
         known = rows >= 0
-        joints = np.full((len(rows), N_JOINTS + len(HEAD_POINTS), 3), np.nan)
-        joints[known, :N_JOINTS] = self.survivors.joints[rows[known]]
-        joints[known, N_JOINTS:] = self.survivors.head[rows[known]]  # type: ignore[index]
+        joints = np.full((len(rows), len(JOINTS) + len(HEAD_POINTS), 3), np.nan)
+        joints[known, : len(JOINTS)] = self.survivors.joints[rows[known]]
+        joints[known, len(JOINTS) :] = self.survivors.head[rows[known]]
         q = np.full((len(rows), self.survivors.q.shape[1]), np.nan)
         q[known] = self.survivors.q[rows[known]]
         return Motion(
@@ -435,7 +417,7 @@ class Recovery(Record):
         columns |= {f"margin_{name}": values for name, values in table.margins.items()}
         for j, joint in enumerate(self.joint_names):
             columns |= {f"{joint}_{axis}": table.joints[:, j, k] for k, axis in enumerate("xyz")}
-            columns[f"{joint}_radius"] = table.radius[:, j]  # type: ignore[index]
-            columns[f"{joint}_inferred"] = table.inferred[:, j]  # type: ignore[index]
+            columns[f"{joint}_radius"] = table.radius[:, j]
+            columns[f"{joint}_inferred"] = table.inferred[:, j]
         columns |= {f"q_{k}": table.q[:, k] for k in range(table.q.shape[1])}
         return pandas.DataFrame(columns)
