@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Final
 
@@ -48,6 +49,9 @@ SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
 
 #: Columns of the findings that are numbers.
 NUMBERS: Final = ("value", "lower", "upper", "margin")
+
+#: Columns of the table of findings.
+COLUMNS: Final = tuple("clip frame time check place value lower upper unit margin verdict".split())
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -241,6 +245,19 @@ class Report(Record):
         words = np.where(self.invalid, "invalid", np.where(self.undecided, "undecided", "valid"))
         return [str(word) for word in words]
 
+    @cached_property
+    def _cells(self) -> Columns:
+        """The findings, and a row of NaN for each check that is undecided about a frame, by frame and check."""
+        rows, which = np.nonzero(self.silent & self.undecided[:, None])
+        nothing = {"row": rows, "check": which, "place": np.full(len(rows), -1)}
+        unknown = np.full(len(rows), np.nan)
+        columns = {
+            name: np.concatenate([column, nothing.get(name, unknown)])
+            for name, column in self.findings.items()
+        }
+        order = np.lexsort((columns["check"], columns["row"]))
+        return {name: column[order] for name, column in columns.items()}
+
     def table(self) -> dict[str, NDArray[Any]]:
         """Return the findings as columns.
 
@@ -250,29 +267,19 @@ class Report(Record):
             ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row a violation, and a
             row for each check that is undecided about a frame, whose numbers are NaN.
         """
-        found = self.findings
-        rows, which = np.nonzero(self.silent & self.undecided[:, None])
-        row = np.concatenate([found["row"], rows])
-        check = np.concatenate([found["check"], which])
-        order = np.lexsort((check, row))
-        checks, units = (np.array(one, dtype=object) for one in (self.checks, self.units))
-        nothing = np.full(len(rows), np.nan)
-        places = np.array([*self.places, ""], dtype=object)
-        place = np.concatenate([found["place"], np.full(len(rows), -1)]).astype(np.intp)
-        verdict = np.array(["invalid"] * len(found["row"]) + ["undecided"] * len(rows), dtype=object)
-        titles = np.array([*map(_title, self.files, self.names)], dtype=object)
-        columns = {
-            "clip": titles[self.clip[row]] if len(row) else np.empty(0, dtype=object),
-            "frame": self.frame[row],
-            "time": self.time[row],
-            "check": checks[check] if len(row) else np.empty(0, dtype=object),
-            "place": places[place],
-            **{name: np.concatenate([found[name], nothing]) for name in ("value", "lower", "upper")},
-            "unit": units[check] if len(row) else np.empty(0, dtype=object),
-            "margin": np.concatenate([found["margin"], nothing]),
-            "verdict": verdict,
+        cells, titles = self._cells, [*map(_title, self.files, self.names)]
+        row, check = cells["row"], cells["check"]
+        words = {
+            "clip": (titles, self.clip[row]),
+            "check": (self.checks, check),
+            "place": ([*self.places, ""], cells["place"]),
+            "unit": (self.units, check),
+            "verdict": (("invalid", "undecided"), np.isnan(cells["margin"]).astype(np.intp)),
         }
-        return {name: column[order] for name, column in columns.items()}
+        columns = {name: np.array(known, dtype=object)[which] for name, (known, which) in words.items()}
+        columns |= {"frame": self.frame[row], "time": self.time[row]}
+        columns |= {name: cells[name] for name in NUMBERS}
+        return {name: columns[name] for name in COLUMNS}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a data frame."""
@@ -289,84 +296,73 @@ class Report(Record):
     @cached_property
     def clips(self) -> list[ClipDecision]:
         """The decision about each clip."""
-        order = np.argsort(self.clip, kind="stable")
-        cuts = np.searchsorted(self.clip[order], np.arange(len(self.files) + 1))
-        return [self._decided(k, order[cuts[k] : cuts[k + 1]]) for k in range(len(self.files))]
+        cuts = np.searchsorted(self.clip, np.arange(len(self.files) + 1)).tolist()
+        return [self._decided(clip, *ends) for clip, ends in enumerate(pairwise(cuts))]
 
     @property
     def spans(self) -> list[Span]:
         """All spans, clip by clip."""
         return [span for clip in self.clips for span in clip.spans]
 
-    def _decided(self, clip: int, rows: NDArray[np.intp]) -> ClipDecision:
-        invalid, undecided = int(self.invalid[rows].sum()), int(self.undecided[rows].sum())
-        spans = _in_order(list(self._spans(clip, rows)))
+    def _decided(self, clip: int, start: int, stop: int) -> ClipDecision:
+        invalid, undecided = (int(one[start:stop].sum()) for one in (self.invalid, self.undecided))
+        spans = _in_order(list(self._spans(start, stop)))
         rejecting = [span for span in spans if span.verdict == "invalid"]
-        bad = bool(invalid or undecided or not len(rows))
+        bad = bool(invalid or undecided or start == stop)
         mendable = rejecting and not undecided and all(span.check in MENDABLE for span in rejecting)
-        good = max(runs(self.ok[rows]), key=lambda run: run[1] - run[0], default=(0, 0))
-        first, last = (int(self.frame[rows[k]]) if good[1] else -1 for k in (good[0], good[1] - 1))
+        good = max(runs(self.ok[start:stop]), key=lambda run: run[1] - run[0], default=None)
         return ClipDecision(
             file=self.files[clip],
             name=self.names[clip],
             decision="repair?" if mendable else "drop" if bad else "keep",
             reason=rejecting[0].check if rejecting else "unknown joints" if bad else "",
-            frames=len(rows),
+            frames=stop - start,
             invalid=invalid,
             undecided=undecided,
             severity=max((span.severity for span in rejecting), default=0.0),
             spans=tuple(spans),
-            good=(first, last) if good[1] else None,
+            good=good and (int(self.frame[start + good[0]]), int(self.frame[start + good[1] - 1])),
         )
 
-    def _spans(self, clip: int, rows: NDArray[np.intp]) -> Iterator[Span]:
-        """Cut the findings of a clip into runs of one check."""
-        step = np.diff(self.time[rows])
+    def _spans(self, start: int, stop: int) -> Iterator[Span]:
+        """Cut the findings and the undecided frames of a clip into runs of one check."""
+        step = np.diff(self.time[start:stop])
         step, gap = step[step > 0], MERGED_FRAMES
         if len(step):
             gap = max(gap, round(MERGED_SECONDS / float(np.median(step))))
-        found = self.findings
-        low, high = np.searchsorted(found["row"], (rows[0], rows[-1] + 1)) if len(rows) else (0, 0)
-        mine = np.arange(low, high)
-        mine = mine[self.clip[found["row"][mine]] == clip]
-        for check in np.unique(found["check"][mine]).tolist():
-            of_check = mine[found["check"][mine] == check]
-            at = np.searchsorted(rows, found["row"][of_check])
-            for part in np.split(np.arange(len(at)), np.flatnonzero(np.diff(at) > gap) + 1):
-                yield self._span(check, rows, at[part], of_check[part])
-        for check in np.flatnonzero(self.silent[rows].any(axis=0)).tolist():
-            at = np.flatnonzero(self.silent[rows, check] & self.undecided[rows])
-            for part in np.split(at, np.flatnonzero(np.diff(at) > gap) + 1):
-                if len(part):
-                    yield self._span(check, rows, part, None)
+        first, last = np.searchsorted(self._cells["row"], (start, stop))
+        cells = {name: column[first:last] for name, column in self._cells.items()}
+        undecided = np.isnan(cells["margin"])
+        for silent, check in sorted(set(zip(undecided.tolist(), cells["check"].tolist(), strict=True))):
+            mine = np.flatnonzero((cells["check"] == check) & (undecided == silent))
+            for part in np.split(mine, np.flatnonzero(np.diff(cells["row"][mine]) > gap) + 1):
+                yield self._span(check, {name: column[part] for name, column in cells.items()})
 
-    def _span(
-        self, check: int, rows: NDArray[np.intp], at: NDArray[np.intp], cells: NDArray[np.intp] | None
-    ) -> Span:
-        unit, found = self.units[check], self.findings
-        numbers = {"value": np.nan, "bound": np.nan, "margin": np.nan, "severity": 0.0}
-        worst, places = 0, [""]
-        if cells is not None:
-            order = np.argsort(found["margin"][cells], kind="stable")
-            worst, cell = int(order[0]), int(cells[order[0]])
-            value, lower, upper, margin = (float(found[name][cell]) for name in NUMBERS)
-            bound = lower if value < lower else upper
-            slight = SLIGHT.get(unit, max(abs(bound), 1e-9) / 10)
-            numbers = {"value": value, "bound": bound, "margin": margin, "severity": -margin / slight}
-            places = [self.places[k] for k in dict.fromkeys(found["place"][cells[order]].tolist())]
+    def _span(self, check: int, cells: Columns) -> Span:
+        """Make a span of its cells."""
+        unit, rows = self.units[check], cells["row"]
+        order = np.argsort(cells["margin"], kind="stable")
+        value, lower, upper, margin = (float(cells[name][order[0]]) for name in NUMBERS)
+        bound = lower if value < lower else upper
+        slight = SLIGHT.get(unit, max(abs(bound), 1e-9) / 10)
+        places = [[*self.places, ""][k] for k in dict.fromkeys(cells["place"][order].tolist())]
+        first, last, worst = self.frame[rows[[0, -1, order[0]]]].tolist()
         return Span(
             check=self.checks[check],
             place=places[0],
             unit=unit,
-            verdict="undecided" if cells is None else "invalid",
-            first=int(self.frame[rows[at[0]]]),
-            last=int(self.frame[rows[at[-1]]]),
-            frames=len(np.unique(at)),
-            worst_frame=int(self.frame[rows[at[worst]]]),
-            start=float(self.time[rows[at[0]]]),
-            end=float(self.time[rows[at[-1]]]),
+            verdict="undecided" if np.isnan(margin) else "invalid",
+            first=first,
+            last=last,
+            frames=len(np.unique(rows)),
+            worst_frame=worst,
+            start=float(self.time[rows[0]]),
+            end=float(self.time[rows[-1]]),
+            value=value,
+            bound=bound,
+            margin=margin,
+            severity=0.0 if np.isnan(margin) else -margin / slight,
             places=tuple(places),
-            **numbers,
         )
 
     @cached_property
@@ -479,45 +475,41 @@ def plural(count: int, noun: str) -> str:
 
 def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
     """Join the reports of several files into one; checks and places are matched by name."""
-    checks = tuple(dict.fromkeys(name for one in reports for name in one.checks))
-    places = tuple(dict.fromkeys(name for one in reports for name in one.places))
     units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
-    place_at = {name: k for k, name in enumerate(places)}
-    parts: dict[str, list[NDArray[Any]]] = {}
-    found: dict[str, list[NDArray[Any]]] = {}
+    check_at, place_at = (
+        {name: k for k, name in enumerate(dict.fromkeys(name for one in reports for name in names(one)))}
+        for names in (lambda one: one.checks, lambda one: one.places)
+    )
+    parts: list[dict[str, NDArray[Any]]] = []
     count = clips = 0
     for one in reports:
-        own = np.array([checks.index(name) for name in one.checks], dtype=np.intp)
+        own = np.array([check_at[name] for name in one.checks], dtype=np.intp)
         at = np.array([place_at[name] for name in one.places], dtype=np.intp)
-        margins = np.full((len(one), len(checks)), np.nan)
-        silent = np.zeros((len(one), len(checks)), np.bool_)
+        margins = np.full((len(one), len(units)), np.nan)
+        silent = np.zeros(margins.shape, dtype=np.bool_)
         margins[:, own], silent[:, own] = one.margins, one.silent
-        moved = {
-            "row": one.findings["row"] + count,
-            "check": own[one.findings["check"]],
-            "place": at[one.findings["place"]],
-        }
-        arrays = {"clip": one.clip + clips, "margins": margins, "silent": silent}
-        arrays |= {name: getattr(one, name) for name in ("frame", "time", "incomplete")}
-        for table, columns in ((found, {**one.findings, **moved}), (parts, arrays)):
-            for name, column in columns.items():
-                table.setdefault(name, []).append(column)
+        found = one.findings
+        moved = {"row": found["row"] + count, "check": own[found["check"]], "place": at[found["place"]]}
+        frames = {name: getattr(one, name) for name in ("frame", "time", "incomplete")}
+        parts.append({**found, **moved, **frames, "clip": one.clip + clips, "margins": margins, "silent": silent})
         count, clips = count + len(one), clips + len(one.files)
-    why = {name: reason for one in reports for name, reason in one.not_asked.items() if name not in checks}
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Report(
-        **{name: np.concatenate(arrays) for name, arrays in parts.items()},
+        findings={name: whole.pop(name) for name in reports[0].findings},
         files=tuple(name for one in reports for name in one.files),
         names=tuple(name for one in reports for name in one.names),
-        checks=checks,
-        units=tuple(units[name] for name in checks),
-        places=places,
-        findings={name: np.concatenate(columns) for name, columns in found.items()},
+        checks=tuple(check_at),
+        units=tuple(units[name] for name in check_at),
+        places=tuple(place_at),
         messages={name: text for one in reports for name, text in one.messages.items()},
-        not_asked=why,
+        not_asked={
+            name: why for one in reports for name, why in one.not_asked.items() if name not in check_at
+        },
         settings=reports[0].settings,
         notes=_joined_notes([note for one in reports for note in one.notes]),
         warnings=tuple(dict.fromkeys(note for one in reports for note in one.warnings)),
         refused=tuple(refused),
+        **whole,
     )
 
 
