@@ -18,11 +18,10 @@ from posekit.validators.measured import (
     ALLOWED_DEVIATIONS,
     MADE_UP_METRES,
     Person,
-    Shape,
+    figure_of,
     girdle_gives,
     person_of,
     segment_lengths,
-    shape_of,
     spine_gives,
 )
 
@@ -203,12 +202,12 @@ class Body(Record):
         return load_figure()
 
     @cached_property
-    def figure(self) -> Figure | Shape:
+    def figure(self) -> Figure:
         """The figure that positions are compared with: the base, with the person's lengths if people were measured."""
         base = self.base_figure
         if self.tolerance is not None or self.settings.strict or not self.person.lengths:
             return base
-        return _scaled(base, self.person)
+        return figure_of(base, tuple(self.person.lengths.items()), self.person.behind)
 
     @property
     def lengths(self) -> Mapping[str, float]:
@@ -286,21 +285,6 @@ class Body(Record):
             "rigid_tolerance": f"{min(bones):.2g} to {max(bones):.2g} cm",
             "contact_margin": f"{100 * self.contact_margin:.3g} cm",
         }
-
-
-#: Figures of the last people, by their lengths: clips of one skeleton share one.
-_SCALED: dict[tuple[Any, ...], Figure | Shape] = {}
-
-MOST_FIGURES = 8
-
-
-def _scaled(base: Figure, person: Person) -> Figure | Shape:
-    key = base.hash, person.behind, tuple(person.lengths.items())
-    if key not in _SCALED:
-        if len(_SCALED) >= MOST_FIGURES:
-            _SCALED.pop(next(iter(_SCALED)))
-        _SCALED[key] = shape_of(base, person)
-    return _SCALED[key]
 
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:

@@ -37,7 +37,6 @@ from posekit.tree.steps import LIMB, PELVIS, Step, step
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 from posekit.validators.hinges import bent_backward
-from posekit.validators.measured import Shape
 from posekit.validators.ranges import load_ranges, of_person
 from posekit.validators.table1 import table1_angles
 
@@ -236,7 +235,7 @@ def _stacked(found: Sequence[Judgement]) -> Judgement:
 
 
 @lru_cache(maxsize=32)
-def _limits(figure: Figure | Shape, name: str, forward: float) -> tuple[Limits, ClosedForm]:
+def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedForm]:
     """Return the ranges of a figure as numbers, and its closed form with the same limits of the neck.
 
     The hips of a measured person lie `forward` degrees before the trunk's line.
@@ -269,7 +268,7 @@ def _limits(figure: Figure | Shape, name: str, forward: float) -> tuple[Limits, 
     return limits, figure.ik.with_limits(lower, upper)
 
 
-def _hips_outward(figure: Figure | Shape) -> float:
+def _hips_outward(figure: Figure) -> float:
     """Return by how many degrees straight thighs lean inward because hips are wider apart than usual."""
     hips, thigh, usual = "right_hip-left_hip", "right_hip-right_knee", load_figure().lengths
     lengths = figure.lengths

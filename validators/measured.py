@@ -12,29 +12,18 @@ over the eight segments i of arms and legs; mid is the mean of the middle half. 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
-from posekit.body import ClosedForm, Figure, Limits
-from posekit.body.capsules import Capsule
-from posekit.body.frames import MIDDLE_PELVIS_PART
-from posekit.body.lengths import closed_lengths, hips_points, shoulders_are_behind, torso_points
+from posekit.body import Figure
+from posekit.body.lengths import shoulders_are_behind
 from posekit.errors import FigureError
 from posekit.geometry import Array, Record, cross, dot
-from posekit.skeleton import (
-    HIPS,
-    JOINT,
-    LIMB_JOINTS,
-    LIMB_SEGMENTS,
-    SEGMENT_NAMES,
-    SEGMENTS,
-    TORSO,
-    segment_name,
-)
+from posekit.skeleton import JOINT, LIMB_JOINTS, LIMB_SEGMENTS, SEGMENT_NAMES, SEGMENTS, segment_name
 
 LIMB_NAMES: Final = tuple(map(segment_name, LIMB_SEGMENTS))
 
@@ -179,123 +168,38 @@ def _shoulders_behind(joints: Array) -> bool | None:
     return shoulders_are_behind(joints[rows])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Shape:
-    """The part of a figure that positions are compared with, for other lengths and without a URDF.
+@lru_cache(maxsize=8)
+def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
+    """Return a figure with the lengths of a person, as far as they are a person's.
 
-    It has the attributes of `posekit.body.Figure` that checks of positions read, with the same values as
-    `Figure.scaled` gives.
+    Lengths that nobody has are left to the figure at the person's size; if no body is near the lengths, all but the
+    limbs are. Clips of one skeleton share a figure.
 
     Parameters
     ----------
     base : Figure
-        The figure whose limits, head and capsules it has.
-    lengths : mapping
-        Lengths that close, metres, by segment name.
-    behind : bool
-        Whether the shoulders lie behind the line from neck to pelvis.
-    side_known : bool
-        Whether that is known.
+        The figure that is scaled.
+    lengths : sequence of (str, float)
+        As `Person.lengths` has them.
+    behind : bool or None
+        As `Person.behind`.
     """
-
-    base: Figure
-    lengths: Mapping[str, float]
-    behind: bool
-    side_known: bool
-
-    @cached_property
-    def neutral_points(self) -> Array:
-        """The 19 points of the posture that stands (19, 3), metres."""
-        points, torso = self.base.neutral_points.copy(), torso_points(self.lengths, behind=self.behind)
-        points[[JOINT[name] for name in TORSO]] = torso
-        points[[JOINT[name] for name in HIPS]] = hips_points(self.lengths) + torso[3]
-        for (start, end), name in zip(LIMB_SEGMENTS, LIMB_NAMES, strict=True):
-            points[end] = points[start] - [0.0, 0.0, self.lengths[name]]
-        return points
-
-    @cached_property
-    def capsules(self) -> tuple[Capsule, ...]:
-        """The collision bodies, which grow with their part; the torso with the width of the shoulders."""
-        old, new = self.base.neutral_points, self.neutral_points
-        across = "right_shoulder-left_shoulder"
-        wide = self.lengths[across] / self.base.lengths[across]
-        found = []
-        for one in self.base.capsules:
-            before, after = (
-                np.linalg.norm(points[list(one.end)].mean(axis=0) - points[list(one.start)].mean(axis=0))
-                for points in (old, new)
-            )
-            ratio = float(after / before)
-            found.append(
-                replace(
-                    one,
-                    center=one.center * ratio,
-                    half_length=one.half_length * ratio,
-                    radius=one.radius * (wide if one.link == "torso" else ratio),
-                )
-            )
-        return tuple(found)
-
-    @property
-    def capsule_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Index pairs into `capsules` that are checked."""
-        return self.base.capsule_pairs
-
-    @property
-    def limits(self) -> Limits:
-        """Limits of the 22 angles, radians."""
-        return self.base.limits
-
-    @cached_property
-    def ik(self) -> ClosedForm:
-        """The closed form from points to angles."""
-        return replace(self.base.ik, middle_pelvis=self.pelvis_between_hips)
-
-    @cached_property
-    def pelvis_between_hips(self) -> bool:
-        """Whether the pelvis is so near to the line between the hips that it spans no plane with them."""
-        pelvis, right = self.neutral_points[[JOINT["pelvis"], JOINT["right_hip"]]]
-        return bool(pelvis[2] - right[2] < MIDDLE_PELVIS_PART * self.lengths["right_hip-left_hip"])
-
-    @property
-    def shoulder_offset(self) -> float:
-        """Distance of the shoulders in front of the line from neck to pelvis, metres; negative behind it."""
-        return float(self.neutral_points[1, 0])
-
-    @property
-    def shoulder_side(self) -> str:
-        """Side of that line on which they are; undecided if unknown, and for a flat torso."""
-        if not self.side_known or self.shoulder_offset == 0:
-            return "undecided"
-        return "behind" if self.shoulder_offset < 0 else "front"
-
-
-def shape_of(figure: Figure, person: Person) -> Figure | Shape:
-    """Return the shape of a figure with the lengths of a person, as far as they are a person's.
-
-    Lengths that nobody has are left to the figure at the person's size; if no body is near the lengths, all but the
-    limbs are.
-    """
-    ratios = {
-        name: person.lengths[name] / figure.lengths[name] for name in LIMB_NAMES if name in person.lengths
-    }
+    ratios = {name: length / base.lengths[name] for name, length in lengths if name in LIMB_NAMES}
     size = float(np.median(list(ratios.values()))) if ratios else 1.0
     if not SIZE_BOUNDS[0] <= size <= SIZE_BOUNDS[1]:
-        return figure
+        return base
     low, high = LIMB_BOUNDS
-    usual = {name: size * length for name, length in figure.lengths.items()}
+    usual = {name: size * length for name, length in base.lengths.items()}
     believed = {
         name: length
-        for name, length in person.lengths.items()
-        if length > 0 and (name not in ratios or low <= ratios[name] / size <= high)
+        for name, length in lengths
+        if length > 0 and low <= ratios.get(name, size) / size <= high
     }
     try:
-        closed, _ = closed_lengths({**usual, **believed})
+        return base.scaled(usual | believed, behind=behind)
     except FigureError:
         limbs = {name: length for name, length in believed.items() if name in ratios}
-        closed, _ = closed_lengths({**usual, **limbs})
-    behind = figure.shoulder_offset < 0 if person.behind is None else person.behind
-    return Shape(base=figure, lengths=closed, behind=behind, side_known=person.behind is not None)
+        return base.scaled(usual | limbs, behind=behind)
 
 
 def spine_gives(lengths: Mapping[str, float]) -> float:

@@ -491,7 +491,9 @@ def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
         found = one.findings
         moved = {"row": found["row"] + count, "check": own[found["check"]], "place": at[found["place"]]}
         frames = {name: getattr(one, name) for name in ("frame", "time", "incomplete")}
-        parts.append({**found, **moved, **frames, "clip": one.clip + clips, "margins": margins, "silent": silent})
+        parts.append(
+            {**found, **moved, **frames, "clip": one.clip + clips, "margins": margins, "silent": silent}
+        )
         count, clips = count + len(one), clips + len(one.files)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Report(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -126,3 +127,22 @@ def read_capsules(
         first, last = CAPSULE_AXES[link]
         capsules.append(Capsule(link=link, start=first, end=last, center=center, **size))
     return tuple(capsules), tuple((pair.first, pair.second) for pair in geometry.collisionPairs)
+
+
+def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule, ...]:
+    """Let capsules grow with their part, from the neutral points of one figure (19, 3) to those of another.
+
+    A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with the same
+    ratio, the torso's with the width of the shoulders.
+    """
+    shoulders = float(np.linalg.norm(new[1] - new[2]) / np.linalg.norm(old[1] - old[2]))
+    found = []
+    for one in capsules:
+        before, after = (
+            np.linalg.norm(points[list(one.end)].mean(axis=0) - points[list(one.start)].mean(axis=0))
+            for points in (old, new)
+        )
+        ratio = float(after / before)
+        size = {"center": one.center * ratio, "half_length": one.half_length * ratio}
+        found.append(replace(one, **size, radius=one.radius * (shoulders if one.link == "torso" else ratio)))
+    return tuple(found)

@@ -14,15 +14,17 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.body.angles import LIMBS, ClosedForm, Limits
-from posekit.body.capsules import Capsule, read_capsules
+from posekit.body.capsules import Capsule, grown, read_capsules
 from posekit.body.frames import MIDDLE_PELVIS_PART, torso_frame
 from posekit.body.lengths import (
     TORSO_LENGTHS,
     check_lengths,
     closed_lengths,
+    hips_points,
     lengths_from_stature,
     segment_lengths,
     side_is_certain,
+    torso_points,
 )
 from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
 from posekit.body.urdf import replace_limits, rewrite
@@ -33,7 +35,19 @@ from posekit.geometry.quaternions import quaternion_from_rotation, rotation_from
 from posekit.robots.capsules import PARTS
 from posekit.robots.robot import Robot
 from posekit.robots.urdf import read_text
-from posekit.skeleton import DOFS, HEAD, HEAD_POINTS, HIPS, JOINT, JOINTS, POINTS, TORSO, urdf_joint_name
+from posekit.skeleton import (
+    DOFS,
+    HEAD,
+    HEAD_POINTS,
+    HIPS,
+    JOINT,
+    JOINTS,
+    LIMB_SEGMENTS,
+    POINTS,
+    TORSO,
+    segment_name,
+    urdf_joint_name,
+)
 
 #: The URDF link whose origin is each point.
 LINK_OF_POINT: Final = {
@@ -260,7 +274,9 @@ class Figure(Robot):
         same = all(abs(closed[name] - self.lengths[name]) <= SAME_TORSO_METRES for name in TORSO_LENGTHS)
         was_behind = self.shoulder_offset < 0
         side = was_behind if behind is None else behind
-        text = rewrite(self.urdf, self.capsules, self.neutral_points, closed, head, behind=side)
+        neutral = self._neutral_of(closed, head, behind=side)
+        capsules = grown(self.capsules, self.neutral_points, neutral)
+        text = rewrite(self.urdf, capsules, closed, head, behind=side)
         unchanged = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
         # The new text differs from the checked one in checked lengths only, so that it is not checked again.
         figure = object.__new__(Figure)
@@ -269,9 +285,22 @@ class Figure(Robot):
             urdf=text,
             side_known=behind is not None or (same and self.side_known),
             moved_lengths=MappingProxyType({**unchanged, **moved}),
+            # Known without building the model.
             limits=self.limits,
+            neutral_points=read_only(neutral),
+            _bodies=(capsules, self.capsule_pairs),
         )
         return figure
+
+    def _neutral_of(self, lengths: Mapping[str, float], head: Array, *, behind: bool) -> Array:
+        """Return the neutral points (19, 3) of the same figure with other lengths."""
+        points, torso = self.neutral_points.copy(), torso_points(lengths, behind=behind)
+        points[[JOINT[name] for name in TORSO]] = torso
+        points[[JOINT[name] for name in HIPS]] = hips_points(lengths) + torso[3]
+        points[list(HEAD)] = head
+        for start, end in LIMB_SEGMENTS:
+            points[end] = points[start] - [0.0, 0.0, lengths[segment_name((start, end))]]
+        return points
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
         """Return the figure as far as uncertain lengths determine it: the side of the shoulders may become unknown."""

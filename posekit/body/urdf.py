@@ -28,28 +28,18 @@ LIMB_LINKS = (
 
 
 def rewrite(
-    text: str,
-    capsules: Sequence[Capsule],
-    old: Array,
-    lengths: Mapping[str, float],
-    head: Array,
-    *,
-    behind: bool = False,
+    text: str, capsules: Sequence[Capsule], lengths: Mapping[str, float], head: Array, *, behind: bool = False
 ) -> str:
-    """Write the figure's URDF with other lengths and another head; capsules grow with their part.
+    """Write the figure's URDF with other capsules, lengths and head.
 
-    A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with
-    the same ratio, the torso's with the width of the shoulders. Masses and moments are those of a person of these
-    lengths.
+    Masses and moments are those of a person of these lengths.
 
     Parameters
     ----------
     text : str
         The URDF to start from.
     capsules : sequence of Capsule
-        Its capsules.
-    old : array (19, 3)
-        Its points at the neutral configuration, metres.
+        The new capsules.
     lengths : mapping
         All 17 lengths, metres.
     head : array (5, 3)
@@ -72,20 +62,15 @@ def rewrite(
             lines[f"{side}_{part}"] = (np.zeros(3), origins[f"{side}_{joint}"])
     for name, place in origins.items():
         _find(robot, f"joint[@name='{name}']/origin").set("xyz", _numbers(place))
-    shoulders = float(np.linalg.norm(torso[1] - torso[2]) / np.linalg.norm(old[1] - old[2]))
     for capsule in capsules:
         start_point, end_point = lines[capsule.link]
-        line = end_point - start_point
-        length = float(np.linalg.norm(line))
-        old_start, old_end = (old[list(points)].mean(axis=0) for points in (capsule.start, capsule.end))
-        ratio = length / float(np.linalg.norm(old_end - old_start))
-        x, y, z = axis = line / length
+        x, y, z = axis = (end_point - start_point) / np.linalg.norm(end_point - start_point)
         collision = _find(robot, f"link[@name='{capsule.link}']/collision")
         origin, cylinder = _find(collision, "origin"), _find(collision, "geometry/cylinder")
-        origin.set("xyz", _numbers(start_point + capsule.center * ratio * axis))
+        origin.set("xyz", _numbers(start_point + capsule.center * axis))
         origin.set("rpy", _numbers(np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])))
-        cylinder.set("length", repr(2 * capsule.half_length * ratio))
-        cylinder.set("radius", repr(capsule.radius * (shoulders if capsule.link == "torso" else ratio)))
+        cylinder.set("length", repr(2 * capsule.half_length))
+        cylinder.set("radius", repr(capsule.radius))
     for name, (mass, centre, moments) in inertias(lengths).items():
         inertial = robot.find(f"link[@name='{name}']/inertial")
         if inertial is None:  # a user's figure may have no masses
