@@ -476,10 +476,9 @@ def plural(count: int, noun: str) -> str:
 def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
     """Join the reports of several files into one; checks and places are matched by name."""
     units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
-    check_at, place_at = (
-        {name: k for k, name in enumerate(dict.fromkeys(name for one in reports for name in names(one)))}
-        for names in (lambda one: one.checks, lambda one: one.places)
-    )
+    check_at = {name: k for k, name in enumerate(units)}
+    places = dict.fromkeys(name for one in reports for name in one.places)
+    place_at = {name: k for k, name in enumerate(places)}
     parts: list[dict[str, NDArray[Any]]] = []
     count = clips = 0
     for one in reports:
@@ -500,13 +499,11 @@ def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
         findings={name: whole.pop(name) for name in reports[0].findings},
         files=tuple(name for one in reports for name in one.files),
         names=tuple(name for one in reports for name in one.names),
-        checks=tuple(check_at),
-        units=tuple(units[name] for name in check_at),
-        places=tuple(place_at),
+        checks=tuple(units),
+        units=tuple(units.values()),
+        places=tuple(places),
         messages={name: text for one in reports for name, text in one.messages.items()},
-        not_asked={
-            name: why for one in reports for name, why in one.not_asked.items() if name not in check_at
-        },
+        not_asked={name: why for one in reports for name, why in one.not_asked.items() if name not in units},
         settings=reports[0].settings,
         notes=_joined_notes([note for one in reports for note in one.notes]),
         warnings=tuple(dict.fromkeys(note for one in reports for note in one.warnings)),

@@ -143,6 +143,12 @@ def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule,
             for points in (old, new)
         )
         ratio = float(after / before)
-        size = {"center": one.center * ratio, "half_length": one.half_length * ratio}
-        found.append(replace(one, **size, radius=one.radius * (shoulders if one.link == "torso" else ratio)))
+        found.append(
+            replace(
+                one,
+                center=one.center * ratio,
+                half_length=one.half_length * ratio,
+                radius=one.radius * (shoulders if one.link == "torso" else ratio),
+            )
+        )
     return tuple(found)
