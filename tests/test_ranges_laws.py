@@ -1,0 +1,139 @@
+"""Every angle of the figure is judged at the ends that its table of ranges states, with its own value."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.errors import InputError
+from posekit.skeleton import DOFS
+
+FIGURE = posekit.load_figure()
+RANGES = Path(posekit.__file__).with_name("urdf") / "ranges"
+PEOPLE, TABLE1 = (
+    tomllib.loads((RANGES / f"{name}.toml").read_text(encoding="utf-8")) for name in ("anatomical", "table1")
+)
+BENT = {"shoulder.rotation": "elbow", "hip.flexion": "knee", "hip.rotation": "knee"}
+"""Joints that are bent, too: a straight limb shows no rotation, and a straight knee stops the hip."""
+
+ROUNDING = 2e-3
+"""Degrees that rounding may add to an end of a range."""
+
+COUPLED = ("shoulder", "hip", "pelvis.flexion")
+"""Angles whose ends depend on other angles or on the person, in the table of people."""
+
+
+def ends_of(table: str, dof: str) -> tuple[float, float] | None:
+    """Return the range that a table states for an angle, degrees."""
+    joint, angle = dof.removeprefix("right_").removeprefix("left_").split(".")
+    if table == "urdf":
+        low, high = (np.degrees(ends[DOFS.index(dof)]) for ends in (FIGURE.limits.lower, FIGURE.limits.upper))
+        return float(low), float(high)
+    if table == "table1":
+        found = TABLE1.get(joint, {}).get(angle)
+        return None if found is None else tuple(found)
+    if f"{joint}.{angle}".startswith(COUPLED):
+        return None
+    ends = PEOPLE[joint][angle]
+    lower, upper = (
+        ends[end]["mean"] + sign * PEOPLE["spreads"] * ends[end]["spread"]
+        for end, sign in (("lower", -1), ("upper", 1))
+    )
+    return lower, upper
+
+
+def posed(**degrees: float) -> np.ndarray[Any, Any]:
+    """Return points (1, 19, 3) of the figure with some angles, degrees; a dot in a name is written as two `_`."""
+    q = FIGURE.neutral.copy()
+    for name, angle in degrees.items():
+        q[FIGURE.angle_index[DOFS.index(name.replace("__", "."))]] = math.radians(angle)
+    return FIGURE.forward_kinematics(q[None])
+
+
+def is_judged(table: str, dof: str, end: int) -> bool:
+    """Return whether a table has that end; near straight up an arm is written by other angles."""
+    ends = ends_of(table, dof)
+    return ends is not None and not (abs(ends[end]) >= 130 and "shoulder" in dof)
+
+
+CASES = [
+    (table, dof, end)
+    for table in ("urdf", "table1", "anatomical")
+    for dof in DOFS
+    for end in (0, 1)
+    if is_judged(table, dof, end)
+]
+
+
+@pytest.mark.parametrize(("table", "dof", "end"), CASES)
+def test_an_angle_is_rejected_beyond_the_end_of_its_range(table: str, dof: str, end: int) -> None:
+    ends = ends_of(table, dof)
+    assert ends is not None
+    side = dof.partition("_")[0]
+    bent = BENT.get(dof.removeprefix("right_").removeprefix("left_"))
+    others = {f"{side}_{bent}__flexion": 80.0} if bent else {}
+    validator = posekit.Validator(checks=["joint-range"], ranges=table, strict=True)
+    for beyond in (-1.0, 1.0):
+        angle = ends[end] + (beyond if end else -beyond)
+        found = validator.check(posed(**others, **{dof.replace(".", "__"): angle})).to_pandas()
+        mine = found[found.place == dof]
+        assert len(mine) == (beyond > 0)
+        if beyond > 0:
+            (row,) = mine.itertuples()
+            assert row.value == pytest.approx(angle, abs=1e-6)
+            assert (row.lower, row.upper) == pytest.approx(ends, abs=ROUNDING)
+            assert row.margin == pytest.approx(-1.0, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("degrees", [70.5, 120.0])
+def test_an_arm_is_raised_by_less_backward_than_forward(degrees: float) -> None:
+    validator = posekit.Validator(checks=["joint-range"], strict=True)
+    for side in ("right", "left"):
+        backward = validator.check(posed(**{f"{side}_shoulder__flexion": -degrees})).to_pandas()
+        (row,) = backward[backward.place == f"{side}_shoulder.elevation"].itertuples()
+        # 62.3 degrees and 0.8 spreads of 9.5 behind the body.
+        assert (row.value, row.upper) == pytest.approx((degrees, 62.3 + 0.8 * 9.5), abs=ROUNDING)
+        assert validator.check(posed(**{f"{side}_shoulder__flexion": degrees})).ok.all()
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ("kind = 'rotation'", "schema"),
+        ("schema = 'posekit.ranges/1'\nkind = 'bent'", "kind"),
+        (
+            "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexion = [130.0, 0.0]",
+            "knee.flexion",
+        ),
+        (
+            "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexing = [0.0, 130.0]",
+            "knee.flexing",
+        ),
+        ("schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexion = [0.0]", "knee.flexion"),
+        ("schema = 'posekit.ranges/1'\nkind = 'rotation'", "shoulder.flexion"),
+        ("schema = 'posekit.ranges/1'\nkind = 'anatomical'", "spreads"),
+    ],
+)
+def test_a_broken_table_names_the_field(text: str, field: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=rf"mine\.toml: {field}"):
+        posekit.Validator(ranges=str(path)).check(posed())
+
+
+def test_own_ranges_judge_the_angles_that_they_name(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[elbow]\nflexion = [10.0, 50.0]\n",
+        encoding="utf-8",
+    )
+    validator = posekit.Validator(checks=["joint-range"], ranges=str(path), strict=True)
+    for angle, places in ((5.0, {"right_elbow.flexion"}), (30.0, set()), (55.0, {"right_elbow.flexion"})):
+        found = validator.check(posed(right_elbow__flexion=angle, left_elbow__flexion=30.0)).table()
+        assert set(found["place"]) == places
