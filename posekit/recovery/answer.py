@@ -87,8 +87,9 @@ def answers_of(
         Within a frame they sum to one minus `unlisted`.
     covariance : array (N, 42, 42), optional
         Of the joints of each, square metres; None for exact postures.
-    lengths : array (K, 17)
-        Segment lengths of the answers, in the order of `posekit.skeleton.SEGMENTS`, metres.
+    lengths : array (17,)
+        The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. Answers have them in the mean
+        size of their survivors.
     relative : bool array (K,)
         Where distances are measured relative to the neck: its depth is not known.
     unlisted : array (K,)
@@ -111,7 +112,10 @@ def answers_of(
         laid = shape[starts + survivor]
         sides = _sides(shape[:, None])
     else:
-        laid = lay(np.add.reduceat(weight[:, None, None] * shape, starts), lengths)
+        a, b = np.array(TREE_SEGMENTS).T
+        sizes = np.log(np.linalg.norm(shape[:, a] - shape[:, b], axis=2) / lengths[: len(a)])
+        size = np.add.reduceat(weight * np.nan_to_num(sizes).mean(axis=1), starts)
+        laid = lay(np.add.reduceat(weight[:, None, None] * shape, starts), np.exp(size)[:, None] * lengths)
         away = np.nan_to_num(np.linalg.norm(shape - laid[frame], axis=2)).mean(axis=1)
         survivor = np.lexsort((away, frame))[starts] - starts
         inside, sides = np.empty(len(shape)), np.empty((len(shape), 2, len(PARENTS) - 1))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure, LengthUncertainty
 from posekit.geometry import Array, perpendicular, unit
-from posekit.settings import MEASURED, Tolerance
+from posekit.recovery.person import sided
+from posekit.settings import MEASURED, RecoverSettings, Tolerance
 from posekit.skeleton import HIPS, JOINT
 from posekit.solver import Limits
 from posekit.validators.check import Check
@@ -57,23 +58,23 @@ def certified(
     return np.array(reason, dtype=np.str_), margins
 
 
-def noisy_tolerance(figure: Figure, lengths: LengthUncertainty, *, sized: bool) -> Tolerance:
-    """Return the tolerance of postures under noise.
+def noisy_judge(
+    figure: Figure, settings: RecoverSettings, lengths: LengthUncertainty, up: Array, *, photograph: bool
+) -> PostureJudge:
+    """Return the judge of postures under noise.
 
     The solver only pulls at limits: a posture may be beyond them by three of their deviations. Lengths may be off by
-    three of their own deviations, and by the common size unless the solver fits it (`sized`).
+    three of their own deviations, and by the common size unless the solver fits it, as it does before an uncalibrated
+    camera. Bodies may overlap, and the side of the shoulders may be open.
     """
-    deviation = {name: lengths.own[name] if sized else lengths.total(name) for name in figure.lengths}
+    deviation = {name: lengths.own[name] if photograph else lengths.total(name) for name in figure.lengths}
     off = max(deviation[name] * length for name, length in figure.lengths.items())
     rigid = max(MEASURED.rigid, ALLOWED_DEVIATIONS * off)
-    return Tolerance(rigid=rigid, tangent=rigid, angle=ALLOWED_DEVIATIONS * LIMIT_DEGREES)
-
-
-def noisy_contact(settings: float, lengths: LengthUncertainty, *, photograph: bool) -> float:
-    """Return the distance that bodies must keep under noise, metres: negative allows overlap."""
-    if photograph:
-        return settings - PHOTOGRAPH_CONTACT_METRES
-    return settings - CONTACT_METRES - ALLOWED_DEVIATIONS * max(lengths.own.values()) * FOREARM_METRES
+    tolerance = Tolerance(rigid=rigid, tangent=rigid, angle=ALLOWED_DEVIATIONS * LIMIT_DEGREES)
+    contact = CONTACT_METRES + ALLOWED_DEVIATIONS * max(lengths.own.values()) * FOREARM_METRES
+    overlap = PHOTOGRAPH_CONTACT_METRES if photograph else contact
+    asked = settings.changed(contact_margin=settings.contact_margin - overlap)
+    return PostureJudge(sided(figure, lengths), asked, tolerance, up)
 
 
 def solver_limits(figure: Figure, checks: Iterable[Check], ranges: str) -> Limits | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import Any, Final
@@ -19,20 +19,23 @@ from posekit.errors import refusal
 from posekit.geometry import Array, Flags, Ints
 from posekit.progress import watched
 from posekit.ranking import Up, deviation_of_tolerance, log_terms
-from posekit.recovery.certify import certified, noisy_contact, noisy_tolerance, solver_limits
+from posekit.recovery.certify import certified, noisy_judge, solver_limits
 from posekit.recovery.gather import Gathering
-from posekit.recovery.person import person_of, sided, uncertainty_of
+from posekit.recovery.person import person_of, uncertainty_of
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.scales import figure_linkage, from_near, from_usual_distance
 from posekit.recovery.sight import SHARP_PIXELS, Sight, sight_of
 from posekit.settings import EXACT, MEASURED, PHOTOGRAPH, RecoverSettings
 from posekit.skeleton import HEAD_POINTS, RIGID_SEGMENTS, SEGMENTS
-from posekit.solver import Limits, Modes, Problem, solve
+from posekit.solver import Modes, Problem, solve
 from posekit.tree import grow
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
 
 #: Frames that are recovered together: enough to spread NumPy's overhead. The result does not depend on them.
 FRAMES_AT_ONCE: Final = 64
+
+#: Relative deviation of lengths that were estimated from the frames of a clip.
+CLIP_DEVIATION: Final = 0.02
 
 #: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
 MANY: Final = 3000
@@ -91,7 +94,9 @@ def recover(
             stage(left[start : start + FRAMES_AT_ONCE])
     recovery = conductor.found.recovery(conductor.margins, conductor.document(), conductor.tolerances())
     if settings.clip_lengths and len(recovery.survivors):
-        measured = _clip_lengths(recovery)
+        # Of one person in all frames: medians over the survivors nearest to the answers.
+        nearest = recovery.answer.survivor
+        measured = segment_lengths(recovery.survivors.joints[nearest[nearest >= 0]])
         whole = replace(view, lengths=measured, stature=None, length_deviation=CLIP_DEVIATION)
         again = settings.changed(clip_lengths=False, stature=None, length_deviation=None, follow=0)
         recovery = recover(whole, again, figure=figure)
@@ -104,16 +109,6 @@ def recover(
     return recovery
 
 
-#: Relative deviation of lengths that were estimated from the frames of a clip.
-CLIP_DEVIATION: Final = 0.02
-
-
-def _clip_lengths(recovery: Recovery) -> dict[str, float]:
-    """Return the lengths of one person over all frames: medians over the survivors nearest to the answers."""
-    nearest = np.asarray(recovery.answer.survivor)
-    return segment_lengths(recovery.survivors.joints[nearest[nearest >= 0]])
-
-
 class _Conductor:
     """What is the same for all frames of a view: person, noise, checks, and the way up."""
 
@@ -123,50 +118,34 @@ class _Conductor:
         self.view, self.settings, self.person, self.lengths = view, settings, person, lengths
         self.sight: Sight = sight_of(view, person, settings, lengths)
         self.photograph = isinstance(view.camera, ScaledOrthographicCamera)
-        self.given = settings.tolerance(PHOTOGRAPH if self.photograph else MEASURED)
-        if self.given is not None and settings.refine:
+        given = settings.tolerance(PHOTOGRAPH if self.photograph else MEASURED)
+        if given is not None and settings.refine:
             raise refusal("", "refine", "tolerances beside it", "one of them", "leave the tolerances out")
+        self.judged, self.tolerance = ("exact", EXACT) if given is None else ("tolerated", given)
         self.up = _up_of(view)
         chosen = chosen_checks(settings, of_robot=False, in_time=False)
         self.checks = [check for check in chosen if not getattr(check, "over_time", False)]
-        self.exact = PostureJudge(person, settings, self.given or EXACT, self.up.direction)
+        self.exact = PostureJudge(person, settings, self.tolerance, self.up.direction)
         self.found = Gathering(view, self.sight, person, settings, _by_hand(view, settings, person))
 
     @cached_property
     def noisy(self) -> PostureJudge:
-        """The judge under noise: with wider tolerances, and a torso whose side uncertain lengths may leave open."""
-        known = self.lengths
-        contact = noisy_contact(self.settings.contact_margin, known, photograph=self.photograph)
-        loose = noisy_tolerance(self.person, known, sized=self.photograph)
-        settings = self.settings.changed(contact_margin=contact)
-        return PostureJudge(sided(self.person, known), settings, loose, self.up.direction)
-
-    @cached_property
-    def limits(self) -> Limits | None:
-        """Joint ranges that pull at the solver's postures."""
-        return solver_limits(self.person, self.checks, self.settings.ranges)
-
-    @cached_property
-    def pull(self) -> Callable[[Array], Array] | None:
-        """Residuals of the checks that have some; None if none has."""
-        pulling = [check.residuals for check in self.checks if hasattr(check, "residuals")]
-        if not pulling:
-            return None
-        return lambda joints: np.concatenate([residuals(joints) for residuals in pulling], axis=1)
+        """The judge of postures under noise."""
+        return noisy_judge(
+            self.person, self.settings, self.lengths, self.up.direction, photograph=self.photograph
+        )
 
     def stages(self) -> Iterator[Callable[[Ints], None]]:
         """Yield what is done, one after the other, with the frames that are open."""
-        if self.given is not None:
+        found = self.found
+        if self.judged == "tolerated":
             yield self._grow
-            for k in list(self.found.open):
-                self.found.close(
-                    k, judged="tolerated", reason="its neck is not known, or a joint is not seen"
-                )
+            why = "its neck is not known, or a joint is not seen"
+            found.close(*found.open, judged="tolerated", reason=why)
         elif self.sight.may_be_exact:
             yield self._grow
             if self.settings.refine is False:
-                for k in list(self.found.open):
-                    self.found.close(k, judged="exact", reason="no posture is exact", rejected={})
+                found.close(*found.open, judged="exact", reason="no posture is exact", rejected={})
             elif not self.photograph:
                 yield partial(self._solve, sharp=True)
         yield partial(self._solve, sharp=False)
@@ -177,7 +156,7 @@ class _Conductor:
         sight = self.sight.take(np.flatnonzero(whole & np.isin(self.sight.frame, part)))
         if not len(sight.frame):
             return
-        tolerance, lengths = self.given or EXACT, self.found.lengths
+        tolerance, lengths = self.tolerance, self.found.lengths
         trees = grow(
             sight.camera,
             sight.image,
@@ -188,17 +167,21 @@ class _Conductor:
             head=sight.head,
             tolerance=tolerance.tangent,
         )
-        frame, head = sight.frame[trees.frame], sight.head[trees.frame]
         lost = {k: Counter[str]() for k in sight.frame.tolist()}
         for k, rejected in zip(sight.frame.tolist(), trees.rejected, strict=True):
             lost[k].update(rejected)
-        own: Any = slice(None)
-        if self.given is None:
-            closing = self._closing(frame, trees.joints, lost)
-            if len(closing) < len(lost):
-                lost = {k: lost[k] for k in closing}
-                own = np.isin(frame, list(closing))
-        joints = trees.joints[own]
+        frame = sight.frame[trees.frame]
+        if self.judged == "exact":
+            lost = {k: lost[k] for k in self._closing(frame, trees.joints, lost)}
+        own = np.flatnonzero(np.isin(frame, list(lost)))
+        row, joints = trees.frame[own], trees.joints[own]
+        columns = {
+            "frame": frame[own],
+            "joints": joints,
+            "head": sight.head[row],
+            "branch": np.array(trees.branches, dtype=np.str_)[own],
+            "scale": sight.scale[row],
+        }
         terms = log_terms(
             joints,
             deviation=deviation_of_tolerance(tolerance.rigid),
@@ -206,25 +189,12 @@ class _Conductor:
             length_residual=trees.length_residual[own],
             up=self.up,
         )
-        columns = {
-            "frame": frame[own],
-            "joints": joints,
-            "head": head[own],
-            "branch": np.array(trees.branches, dtype=np.str_)[own],
-            "scale": self._scale(sight, trees.frame[own]),
-        }
         # The tree asked checks about the points that they name; what has parts has named all that it reads.
         late = [check for check in self.checks if not hasattr(check, "parts")]
-        reason, _ = certified(self.exact, late, with_head(joints, head[own]))
-        self.found.add(
-            "exact" if self.given is None else "tolerated",
-            lost,
-            columns,
-            np.sum(list(terms.values()), axis=0),
-            reason,
-        )
+        reason, _ = certified(self.exact, late, with_head(joints, sight.head[row]))
+        self.found.add(self.judged, lost, columns, terms, reason)
         for k in lost:
-            self.found.frames[k]["levels"] = trees.levels[sight.frame == k].sum(axis=0).tolist()
+            self.found.frames["levels"][k] = trees.levels[sight.frame == k].sum(axis=0).tolist()
 
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
         """Return the frames in which a branch closes torso and hips exactly, which only exact image points do."""
@@ -241,15 +211,16 @@ class _Conductor:
         """Solve some frames under noise; `sharp` treats points and lengths as exact, and leaves empty frames open."""
         sight = self.sight.take(np.flatnonzero(np.isin(self.sight.frame, part)))
         problem = self._problem(sight, sharp=sharp)
-        modes = solve(problem, most=MANY, pull=self.pull)
+        pulling = [check.residuals for check in self.checks if hasattr(check, "residuals")]
+        modes = solve(problem, most=MANY, pull=partial(_pulled, pulling) if pulling else None)
         if sharp:
             least = np.full(len(problem), np.inf)
             np.minimum.at(least, modes.frame, modes.chi2)
             closed = np.asarray((least < EXACT_CHI2) & (problem.freedom > 0))
             modes = modes.take(closed[modes.frame])
-        frame, joints, scale = sight.frame[modes.frame], modes.joints, self._scale(sight, modes.frame)
+        frame, joints, scale = sight.frame[modes.frame], modes.joints, sight.scale[modes.frame]
         if self.photograph:
-            joints, scale = from_near(joints, _middle(sight)[modes.frame], scale)
+            joints, scale = from_near(joints, sight.middle[modes.frame], scale)
         hidden = np.asarray(~np.isfinite(self.view.image[frame]).all(axis=2))
         columns = {
             "frame": frame,
@@ -262,9 +233,8 @@ class _Conductor:
         reason, _ = certified(self.noisy, self.checks, with_head(joints))
         volume = modes.log_evidence + 0.5 * modes.chi2
         terms = log_terms(joints, chi2=modes.chi2, log_volume=volume, up=self.up)
-        score = np.sum(list(terms.values()), axis=0)
         lost = {k: Counter[str]() for k in np.unique(frame).tolist()}
-        self.found.add("noisy", lost, columns, score, reason, partial(self._covariance, modes), leave=sharp)
+        self.found.add("noisy", lost, columns, terms, reason, partial(self._covariance, modes), leave=sharp)
         if not sharp:
             self._diagnose(sight, problem, [k for k in part.tolist() if k not in lost])
 
@@ -300,21 +270,15 @@ class _Conductor:
             sight.image,
             SHARP_PIXELS * sight.deviation if sharp else sight.deviation,
             lengths=self.found.lengths,
-            length_deviation=0.0 if sharp else sight.lengths.deviations,
+            length_deviation=0.0 if sharp else self.lengths.deviations,
             size_deviation=0.0 if sharp or self.photograph else sight.size_deviation,
             root=None if self.photograph else np.where(sight.given[:, None], sight.root, np.nan),
-            limits=self.limits,
+            limits=solver_limits(self.person, self.checks, self.settings.ranges),
             robust=bool(self.view.derived) and not self.photograph,
         )
         return (
-            from_usual_distance(problem, _middle(sight), sight.size_deviation) if self.photograph else problem
+            from_usual_distance(problem, sight.middle, sight.size_deviation) if self.photograph else problem
         )
-
-    def _scale(self, sight: Sight, rows: Ints) -> Array:
-        """Return the scales of some rows; NaN before a calibrated camera."""
-        if not isinstance(sight.camera, ScaledOrthographicCamera):
-            return np.full(len(rows), np.nan)
-        return np.asarray(sight.camera.scale)[rows]
 
     def margins(self, points: Array, noisy: Flags) -> dict[str, Array]:
         """Return the worst margins (N,) of each check of postures (N, 19, 3), found under noise or exactly."""
@@ -341,15 +305,12 @@ class _Conductor:
 
     def tolerances(self) -> dict[str, Any]:
         """Return the tolerances of exact and tolerated frames, and the noise of the others where there are any."""
-        lengths = self.sight.lengths
-        found: dict[str, Any] = {"exact": vars(EXACT)}
-        if self.given is not None:
-            found["tolerated"] = vars(self.given)
+        found: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
         if "noisy" in vars(self):
             found["noisy"] = {
                 "deviation": float(np.nanmedian(self.sight.deviation)),
-                "size": lengths.common,
-                "by_segment": dict(lengths.own),
+                "size": self.lengths.common,
+                "by_segment": dict(self.lengths.own),
                 "certified": vars(self.noisy.tolerance),
                 "contact_margin": self.noisy.settings.contact_margin,
             }
@@ -358,7 +319,9 @@ class _Conductor:
 
 def _by_hand(view: View, settings: RecoverSettings, person: Figure) -> NDArray[np.int8]:
     """Return the flips that were given by hand for each frame (F, 17); 0 where none is given."""
-    hands = [settings.nearer] if isinstance(settings.nearer, Mapping) else list(settings.nearer or [{}])
+    if not settings.nearer:
+        return np.zeros((len(view), len(SEGMENTS)), dtype=np.int8)
+    hands = [settings.nearer] if isinstance(settings.nearer, Mapping) else settings.nearer
     if len(hands) not in (1, len(view)):
         raise refusal(
             "", "nearer", f"{len(hands)} frames", f"{len(view)}, or one for all", "give one a frame"
@@ -381,9 +344,9 @@ def _why(nearest: Modes) -> str:
     return f"no posture fits: the nearest misses {words}"
 
 
-def _middle(sight: Sight) -> Array:
-    """Return the middle of the trunk's image points (H, 2) before a scaled orthographic camera, metres."""
-    return np.asarray(np.nanmean(sight.camera.normalize(sight.image)[:, :6], axis=1))
+def _pulled(residuals: Sequence[Callable[[Array], Array]], joints: Array) -> Array:
+    """Return the residuals of checks together."""
+    return np.concatenate([one(joints) for one in residuals], axis=1)
 
 
 @cache

@@ -18,25 +18,13 @@ from posekit.recovery.answer import answers_of, joint_radius
 from posekit.recovery.recovery import Answer, Frames, Recovery, Survivors
 from posekit.recovery.sight import Sight
 from posekit.settings import RecoverSettings
-from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
+from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS
 
 #: Rejected leaves of a frame in which nothing is grown.
 LOST: Final = {"root/not_known": 8192}
 
 #: Difference in depth below which neither end of a segment is nearer.
 LEVEL_METRES: Final = 1e-6
-
-#: Row of `Answer` of a frame without a survivor.
-NO_ANSWER: Final[Mapping[str, Any]] = {
-    "joints": np.full((len(JOINTS), 3), np.nan),
-    "sure": np.nan,
-    "sure_of": "",
-    "survivor": -1,
-    "representatives": np.empty(0, dtype=np.intp),
-    "represented": np.empty(0),
-    "nearer": np.zeros(len(TREE_SEGMENTS), dtype=np.intp),
-    "nearer_sure": np.full(len(TREE_SEGMENTS), np.nan),
-}
 
 
 class Gathering:
@@ -62,25 +50,31 @@ class Gathering:
         self.given = np.ones(len(view), dtype=np.bool_)
         self.given[sight.frame[~sight.given]] = False
         self.open = {k for k, reason in enumerate(sight.reasons) if not reason}
-        nothing = {"rejected": LOST, "levels": (), "judged": "", "unlisted": 0, "unlisted_probability": 0.0}
-        self.frames: list[dict[str, Any]] = [
-            {**nothing, "reason": reason or "no posture fits", "root": root}
-            for reason, root in zip(sight.reasons, sight.roots, strict=True)
-        ]
-        self.answers = [NO_ANSWER] * len(view)
-        self.survivors: list[dict[str, Any]] = []
+        frames = Frames(
+            time=view.time,
+            camera=sight.cameras,
+            rejected=[LOST] * len(view),
+            reason=[reason or "no posture fits" for reason in sight.reasons],
+            root=sight.roots,
+        )
+        answers = Answer(joints=np.full((len(view), len(JOINTS), 3), np.nan))
+        self.frames: dict[str, Any] = {name: list(values) for name, values in frames.columns().items()}
+        self.answers: dict[str, Any] = {name: list(values) for name, values in answers.columns().items()}
+        self.survivors = [Survivors(frame=np.empty(0, np.intp), joints=np.empty((0, len(JOINTS), 3)))]
 
-    def close(self, k: int, **about: Any) -> None:
-        """State what is known of a frame, by columns of `Frames`; nothing more is sought in it."""
-        self.frames[k] |= about
-        self.open.discard(k)
+    def close(self, *frames: int, **about: Any) -> None:
+        """State what is known of frames, by columns of `Frames`; nothing more is sought in them."""
+        for k in frames:
+            for name, value in about.items():
+                self.frames[name][k] = value
+        self.open.difference_update(frames)
 
     def add(
         self,
         judged: str,
         lost: dict[int, Counter[str]],
         columns: dict[str, Any],
-        score: Array,
+        terms: Mapping[str, Array],
         reason: NDArray[np.str_],
         covariance: Callable[[Ints], Array] | None = None,
         *,
@@ -96,8 +90,8 @@ class Gathering:
             Branches of each of the frames that were rejected before, by reason.
         columns : dict of str to array
             Columns of `Survivors`, by frame.
-        score : array (N,)
-            Logarithm of the unnormalised probability of each posture.
+        terms : mapping of str to array (N,)
+            Logarithms whose sum is that of the unnormalised probability of each posture.
         reason : str array (N,)
             Why each does not pass; empty if it does.
         covariance : callable, optional
@@ -113,7 +107,7 @@ class Gathering:
         for row in np.flatnonzero(reason != "").tolist():
             lost[int(every[row])][str(reason[row])] += 1
         rows = np.flatnonzero(reason == "")
-        probability = softmax(score[rows], every[rows])
+        probability = softmax(np.sum(list(terms.values()), axis=0)[rows], every[rows])
         order = np.lexsort((-probability, every[rows]))
         rows, probability = rows[order], probability[order]
         frame = every[rows]
@@ -127,37 +121,22 @@ class Gathering:
         rest = frame[~held], np.ones(len(rows))[~held], probability[~held]
         unlisted, improbable = (np.bincount(rest[0], weight, len(self.view)) for weight in rest[1:])
         found = np.unique(frame)
-        for k in lost if not leave else found.tolist():
-            rejected = lost[k]
-            worst = max(rejected, key=lambda name: rejected[name], default="").replace("/", " at ")
-            why = f"no posture passes: most fail {worst}"
-            self.close(
-                k,
-                rejected=dict(rejected),
-                judged=judged,
-                reason="" if k in found else why,
-                unlisted=int(unlisted[k]),
-                unlisted_probability=improbable[k],
-            )
+        for k in found.tolist() if leave else lost:
+            worst = max(lost[k], key=lambda name: lost[k][name], default="").replace("/", " at ")
+            why = "" if k in found else f"no posture passes: most fail {worst}"
+            about = {"unlisted": int(unlisted[k]), "unlisted_probability": improbable[k]}
+            self.close(k, rejected=dict(lost[k]), judged=judged, reason=why, **about)
         if len(found):
-            table = {name: values[rows[held]] for name, values in columns.items()}
-            own = None if covariance is None else covariance(rows[held])
-            self._answer(found, table | {"probability": probability[held]}, own, improbable[found])
+            rows, probability = rows[held], probability[held]
+            table = {name: values[rows] for name, values in columns.items()} | {"probability": probability}
+            self._answer(found, table, None if covariance is None else covariance(rows), improbable[found])
 
     def _answer(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
         """Keep the survivors of some frames (K,) and answer these frames."""
-        count = len(table["frame"])
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
         deep = self.sight.camera.perspective & ((covariance is None) | self.given[found])
-        lengths = np.tile(self.lengths, (len(found), 1))
-        usual: dict[str, Any] = {"branch": np.full(count, ""), "chi2": np.zeros(count)}
-        usual |= {
-            "radius": np.zeros((count, len(JOINTS))),
-            "inferred": np.zeros((count, len(JOINTS)), np.bool_),
-        }
-        table = usual | table
         if covariance is not None:
             block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
             if not self.sight.camera.perspective:
@@ -165,26 +144,25 @@ class Gathering:
                 block = block - block.mean(axis=1, keepdims=True)
                 block = block - block.mean(axis=3, keepdims=True)
             table["radius"] = joint_radius(np.einsum("njajb->njab", block))
-            # The lengths of the answer are the person's, in the mean size of the survivors.
-            a, b = np.array(TREE_SEGMENTS).T
-            each = np.log(np.linalg.norm(joints[:, a] - joints[:, b], axis=2) / self.lengths[: len(a)])
-            lengths *= np.exp(_mean(np.nan_to_num(each).mean(axis=1), probability, starts))[:, None]
+            weight = probability / np.add.reduceat(probability, starts)[frame]
             depth, own = joints[:, 0, 2], table["radius"][:, 0] / 1.96
-            mean = _mean(depth, probability, starts)
-            spread = np.sqrt(_mean((depth - mean[frame]) ** 2 + own**2, probability, starts))
-            for row in np.flatnonzero(~deep).tolist() if self.sight.camera.perspective else ():
-                root = {"method": "solver", "estimate": float(mean[row]), "deviation": float(spread[row])}
-                self.frames[found[row]]["root"] = self.frames[found[row]]["root"] or root
+            mean = np.add.reduceat(weight * depth, starts)
+            spread = np.sqrt(np.add.reduceat(weight * ((depth - mean[frame]) ** 2 + own**2), starts))
+            for row, k in enumerate(found.tolist()):
+                if self.sight.camera.perspective and not self.given[k] and not self.frames["root"][k]:
+                    estimate = {"estimate": float(mean[row]), "deviation": float(spread[row])}
+                    self.frames["root"][k] = {"method": "solver", **estimate}
         if self.settings.group is not None:
             each = np.split(joints, starts[1:])
             table["group"] = np.concatenate([group_of(one, self.settings.group) for one in each])
         answers = answers_of(
-            joints, frame, probability, covariance, lengths, relative=~deep, unlisted=unlisted
+            joints, frame, probability, covariance, self.lengths, relative=~deep, unlisted=unlisted
         )
         answers["sure_of"] = np.where(deep, "position", "relative to the neck")
-        for row, number in enumerate(found.tolist()):
-            self.answers[number] = {name: values[row] for name, values in answers.items()}
-        self.survivors.append(table)
+        for name, values in answers.items():
+            for row, k in enumerate(found.tolist()):
+                self.answers[name][k] = values[row]
+        self.survivors.append(Survivors(**table))
 
     def recovery(
         self,
@@ -201,28 +179,23 @@ class Gathering:
         settings, tolerances : mapping
             What decided the result, as JSON values.
         """
-        view, nothing = self.view, {"frame": np.empty(0, np.intp), "joints": np.empty((0, len(JOINTS), 3))}
-        tables = self.survivors or [nothing | {"head": np.empty((0, len(HEAD_POINTS), 3))}]
-        table = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
+        view, answers, parts = self.view, self.answers, [one.columns() for one in self.survivors]
+        table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         order = np.argsort(table["frame"], kind="stable")
         table = {name: values[order] for name, values in table.items()}
-        frames: dict[str, Any] = {name: [one[name] for one in self.frames] for name in self.frames[0]}
-        answers: dict[str, Any] = {name: [one[name] for one in self.answers] for name in NO_ANSWER}
         starts = np.searchsorted(table["frame"], np.arange(len(view)))
-        nearest = np.array(answers["survivor"])
-        answers["survivor"] = np.where(nearest < 0, -1, nearest + starts)
-        answers["representatives"] = [
-            one + at for one, at in zip(answers["representatives"], starts, strict=True)
-        ]
+        for k, start in enumerate(starts.tolist()):
+            answers["representatives"][k] = answers["representatives"][k] + start
+            answers["survivor"][k] += start if answers["survivor"][k] >= 0 else 0
         points = with_head(table["joints"], table["head"])
-        noisy = np.array([one == "noisy" for one in frames["judged"]])[table["frame"]]
+        noisy = np.array([one == "noisy" for one in self.frames["judged"]])[table["frame"]]
         return Recovery(
             survivors=Survivors(
                 q=partial(self.person.inverse_kinematics, points),
                 margins=partial(margins, points, noisy),
                 **table,
             ),
-            frames=Frames(time=view.time, pictures=view.pictures, camera=self.sight.cameras, **frames),
+            frames=Frames(pictures=view.pictures, **self.frames),
             answer=Answer(**answers),
             settings=settings,
             tolerances=tolerances,
@@ -232,11 +205,6 @@ class Gathering:
             camera=view.camera.fields("m"),
             source=view.source,
         )
-
-
-def _mean(values: Array, probability: Array, starts: Ints) -> Array:
-    """Return the probability-weighted means (K,) of values (N,) over frames that start at some rows."""
-    return np.add.reduceat(values * probability, starts) / np.add.reduceat(probability, starts)
 
 
 def group_of(joints: Array, within: float) -> Ints:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,30 +17,14 @@ from posekit.files import DATA
 from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
-#: Relative lengths of Taylor 2000, Table 1, of a stature of 70.
-TAYLOR_LENGTHS: Final = {
-    "shoulder-elbow": 15,
-    "elbow-wrist": 14,
-    "hip-knee": 19,
-    "knee-ankle": 20,
-    "right_shoulder-left_shoulder": 18,
-    "right_hip-left_hip": 14,
-}
+#: Shares of stature by segments without sides, and the deviations of people's.
+PROPORTIONS: Final = tomllib.loads((DATA / "priors" / "proportions.toml").read_text(encoding="utf-8"))
 
 
-def _key_points() -> dict[str, Any]:
-    """Read the body between a detector's key points: shares of stature and deviations of the 17 lengths."""
-    path = DATA / "priors" / "key_points.toml"
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+def _by_segment(table: Mapping[str, float]) -> dict[str, float]:
+    """Return the entries of a table of segments without sides, for both sides."""
     sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
-    parts = {
-        part: {name: table[part][bare] for name, bare in sideless.items()}
-        for part in ("shares", "deviations")
-    }
-    return {"stature": table["stature"], **parts}
-
-
-KEY_POINTS: Final = _key_points()
+    return {name: table[bare] for name, bare in sideless.items() if bare in table}
 
 
 def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> Figure:
@@ -52,18 +37,15 @@ def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> F
     stature = settings.stature or view.stature
     base = figure or load_figure()
     lengths = dict(view.lengths)
+    people, taylor = PROPORTIONS["people"], PROPORTIONS["taylor"]
     if _of_people(view, settings) and figure is None:
         # Another body than the figure's lies between a detector's points, and in a stranger's photograph.
-        lengths = {
-            name: share * (stature or KEY_POINTS["stature"]) for name, share in KEY_POINTS["shares"].items()
-        }
+        size = stature or people["stature"]
+        lengths = {name: share * size for name, share in _by_segment(people["shares"]).items()}
         stature = None
     if settings.proportions == "taylor":
-        unit = (stature or stature_from_lengths(base.lengths)) / 70
-        for name in SEGMENT_NAMES:
-            sideless = name.replace("right_", "").replace("left_", "")
-            if found := TAYLOR_LENGTHS.get(name, TAYLOR_LENGTHS.get(sideless)):
-                lengths[name] = found * unit
+        unit = (stature or stature_from_lengths(base.lengths)) / taylor["stature"]
+        lengths |= {name: share * unit for name, share in _by_segment(taylor["shares"]).items()}
     return _person(base, stature, tuple(lengths.items()), view.shoulders, tuple(head.items()))
 
 
@@ -103,9 +85,8 @@ def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -
         return LengthUncertainty.uniform(stated)
     if own_figure:
         return STATED_LENGTHS
-    if _of_people(view, settings):
-        size = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
-        return LengthUncertainty(common=size.common, own=KEY_POINTS["deviations"])
     other = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
+    if _of_people(view, settings):
+        return LengthUncertainty(common=other.common, own=_by_segment(PROPORTIONS["people"]["deviations"]))
     own = {name: (STATED_LENGTHS if name in view.lengths else other).own[name] for name in SEGMENT_NAMES}
     return LengthUncertainty(common=STATED_LENGTHS.common if view.lengths else other.common, own=own)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import with_head
 from posekit.errors import InputError, refusal, shown
 from posekit.geometry import Array, Record, read_only
 from posekit.motion import Motion
@@ -52,6 +54,10 @@ class Table(Record):
     def __len__(self) -> int:
         """Count the rows."""
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns that are given at once, by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.metadata}  # type: ignore[arg-type]
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields for a pickle: functions of `Derived` fields are called."""
@@ -125,8 +131,7 @@ class Survivors(Table):
 
     def _columns(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> dict[str, Any]:
         """Return some rows of every column."""
-        columns = {one.name: getattr(self, one.name)[rows] for one in fields(Survivors) if one.metadata}
-        return columns | {
+        return {name: values[rows] for name, values in self.columns().items()} | {
             "q": lambda: self.q[rows],
             "margins": lambda: {name: values[rows] for name, values in self.margins.items()},
         }
@@ -315,7 +320,6 @@ class Recovery(Record):
     def __post_init__(self) -> None:
         self._set("joint_names", tuple(self.joint_names))
         self._set("configuration_names", tuple(self.configuration_names))
-        self._set("_starts", np.searchsorted(self.survivors.frame, np.arange(len(self.frames) + 1)))
 
     def __len__(self) -> int:
         """Count the frames."""
@@ -342,8 +346,11 @@ class Recovery(Record):
 
     def rows(self, k: int) -> slice:
         """Return the rows of the survivors of one frame."""
-        starts: NDArray[np.intp] = self._starts  # type: ignore[attr-defined]
-        return slice(int(starts[k]), int(starts[k + 1]))
+        return slice(int(self._starts[k]), int(self._starts[k + 1]))
+
+    @cached_property
+    def _starts(self) -> NDArray[np.intp]:
+        return np.searchsorted(self.survivors.frame, np.arange(len(self) + 1))
 
     def _facts(self) -> list[str]:
         found, empty = len(self.survivors), int((np.asarray(self.answer.survivor) < 0).sum())
@@ -365,32 +372,29 @@ class Recovery(Record):
         InputError
             If ``path`` is asked for and nothing was followed, or `which` is none of these.
         """
-        if which not in ("answer", "path", "all", "first"):
-            raise refusal(
-                self.source or "result", "which", shown(which), "answer, path, all or first", "choose one"
-            )
-        time = np.asarray(self.frames.time)
+        table, starts, time = self.survivors, self._starts, self.frames.time
+        chosen = {
+            "answer": self.answer.survivor,
+            "first": np.where(np.diff(starts) > 0, starts[:-1], -1),
+            "all": np.arange(len(table)),
+        }
         shared: dict[str, Any] = {"up": "-y", "source": self.source, "unit": self.unit}
         if which == "path":
             if self.path is None or not len(self.path):
-                raise refusal(
-                    self.source, "path", "no followed path", "a result of a film", "recover with follow"
-                )
+                got = "no followed path"
+                raise refusal(self.source, "path", got, "a result of a film", "recover with follow")
             return Motion(joints=self.path.joints[0], time=time, **shared)
-        rows = np.arange(len(self.survivors))
-        if which != "all":
-            every = [self.rows(k) for k in range(len(self))]
-            first = [own.start if own.stop > own.start else -1 for own in every]
-            rows = np.asarray(self.answer.survivor if which == "answer" else first)
-        frame = np.arange(len(self)) if which != "all" else self.survivors.frame
-        known = rows >= 0
-        joints = np.full((len(rows), len(JOINTS) + len(HEAD_POINTS), 3), np.nan)
-        joints[known, : len(JOINTS)] = self.survivors.joints[rows[known]]
-        joints[known, len(JOINTS) :] = self.survivors.head[rows[known]]
-        q = np.full((len(rows), self.survivors.q.shape[1]), np.nan)
-        q[known] = self.survivors.q[rows[known]]
+        if which not in chosen:
+            expected = "answer, path, all or first"
+            raise refusal(self.source or "result", "which", shown(which), expected, "choose one")
+        # The last row, -1, is of frames without a posture.
+        points, q = (
+            np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[chosen[which]]
+            for values in (with_head(table.joints, table.head), table.q)
+        )
+        frame = table.frame if which == "all" else np.arange(len(self))
         return Motion(
-            joints=joints,
+            joints=points,
             joint_names=(*self.joint_names, *HEAD_POINTS),
             q=q,
             q_names=self.configuration_names,
@@ -410,14 +414,11 @@ class Recovery(Record):
         """Return the survivors as a table: ``frame, time, probability, …, neck_x, …, q_0, …``."""
         import pandas
 
-        table, time = self.survivors, np.asarray(self.frames.time)
-        columns: dict[str, Any] = {"frame": table.frame, "time": time[table.frame]}
-        for name in ("probability", "chi2", "branch", "group", "scale"):
-            columns[name] = getattr(table, name)
+        table = self.survivors
+        columns: dict[str, Any] = {"frame": table.frame, "time": self.frames.time[table.frame]}
+        columns |= {name: values for name, values in table.columns().items() if values.ndim == 1}
         columns |= {f"margin_{name}": values for name, values in table.margins.items()}
         for j, joint in enumerate(self.joint_names):
             columns |= {f"{joint}_{axis}": table.joints[:, j, k] for k, axis in enumerate("xyz")}
-            columns[f"{joint}_radius"] = table.radius[:, j]
-            columns[f"{joint}_inferred"] = table.inferred[:, j]
-        columns |= {f"q_{k}": table.q[:, k] for k in range(table.q.shape[1])}
-        return pandas.DataFrame(columns)
+            columns |= {f"{joint}_radius": table.radius[:, j], f"{joint}_inferred": table.inferred[:, j]}
+        return pandas.DataFrame(columns | {f"q_{k}": values for k, values in enumerate(table.q.T)})

@@ -18,27 +18,17 @@ from posekit.solver import Problem
 if TYPE_CHECKING:
     from posekit.recovery.objects import Linkage
 
-#: Root mean square distance of annotators' points over the root of the person's area in the picture: the constants of
-#: COCO's object keypoint similarity (cocodataset.org/#keypoints-eval). Neck and pelvis are as shoulders and hips.
-ANNOTATION_SIGMAS: Final = {
-    "neck": 0.079,
-    "shoulder": 0.079,
-    "elbow": 0.072,
-    "wrist": 0.062,
-    "pelvis": 0.107,
-    "hip": 0.107,
-    "knee": 0.087,
-    "ankle": 0.089,
-}
-
 #: Root of a person's area in a picture: a convex body shows a quarter of its surface on average (Cauchy), an adult's
 #: surface is 1.8 square metres (Du Bois & Du Bois 1916).
 ROOT_AREA_METRES: Final = 0.67
 
+#: Root mean square distance of annotators' points over the root of the person's area in the picture: the constants of
+#: COCO's object keypoint similarity (cocodataset.org/#keypoints-eval), of neck and shoulders, pelvis and hips (as
+#: those), elbows, wrists, knees and ankles.
+ANNOTATION_SIGMAS: Final = np.repeat([0.079, 0.107, 0.072, 0.062, 0.087, 0.089], [3, 3, 2, 2, 2, 2])
+
 #: Standard deviation of each coordinate of a photograph's key points from the joints (14,), metres.
-PHOTOGRAPH_OFFSETS: Final = np.array([ANNOTATION_SIGMAS[name.rpartition("_")[2]] for name in JOINTS]) * (
-    ROOT_AREA_METRES / math.sqrt(2)
-)
+PHOTOGRAPH_OFFSETS: Final = ANNOTATION_SIGMAS * (ROOT_AREA_METRES / math.sqrt(2))
 
 #: Depth by which a joint is off the body's middle, and distance of a camera, where none is known.
 RELIEF_METRES, USUAL_DISTANCE_METRES = 0.25, 4.5

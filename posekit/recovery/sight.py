@@ -27,7 +27,7 @@ from posekit.recovery.scales import (
     scales_of,
 )
 from posekit.settings import RecoverSettings
-from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
+from posekit.skeleton import HEAD_POINTS, JOINTS
 
 #: Standard deviation of image points of which none is stated, pixels: of a detector's, and of others.
 KEY_POINT_PIXELS, UNSTATED_PIXELS = 3.0, 1.0
@@ -71,8 +71,6 @@ class Sight(Record):
         Head points, metres; NaN if unknown.
     size_deviation : array (H,)
         Relative deviation of the size that all lengths share.
-    lengths : LengthUncertainty
-        Uncertainty of the lengths.
     may_be_exact : bool
         Whether no deviation is stated, and no detector placed the points.
     reasons, cameras, roots
@@ -87,7 +85,6 @@ class Sight(Record):
     given: NDArray[np.bool_]
     head: Array
     size_deviation: Array
-    lengths: LengthUncertainty
     may_be_exact: bool
     reasons: list[str]
     cameras: list[dict[str, Any]]
@@ -99,6 +96,16 @@ class Sight(Record):
         return replace(
             self, camera=self.camera.take(rows), **{name: getattr(self, name)[rows] for name in names}
         )
+
+    @property
+    def scale(self) -> Array:
+        """Scales of a scaled orthographic camera (H,), pixels a metre; NaN before other cameras."""
+        return np.broadcast_to(getattr(self.camera, "scale", np.nan), len(self.frame))
+
+    @property
+    def middle(self) -> Array:
+        """Middles of the trunk's normalised image points (H, 2)."""
+        return np.asarray(np.nanmean(self.camera.normalize(self.image)[:, :6], axis=1))
 
 
 def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
@@ -127,21 +134,17 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
 def _unseen(view: View) -> list[str]:
     """Say of each frame why nothing can be sought in it; empty if it can."""
     seen = np.isfinite(view.image[:, :, 0])
-    reasons = [""] * len(view)
-    for k in range(len(view)):
-        if not seen[k].any():
-            reasons[k] = "the person is not seen: none of the joints is"
-        elif not seen[k, 1:4].any():
-            reasons[k] = (
-                "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover"
-            )
-        elif not isinstance(view.camera, ScaledOrthographicCamera) and not seen[k, 0]:
-            reasons[k] = "the neck, from which the posture grows, is not seen"
-            lacking = [name for name in ("right_shoulder", "left_shoulder") if not seen[k, JOINT[name]]]
-            if "neck" in view.derived and lacking:
-                verb = "is" if len(lacking) == 1 else "are"
-                reasons[k] = f"{' and '.join(lacking)} {verb} not seen, and the neck is between the shoulders"
-    return reasons
+    neck = "the neck, from which the posture grows, is not seen"
+    if "neck" in view.derived:
+        neck += ": a shoulder is not, and it is between the shoulders"
+    reasons = {
+        "the person is not seen: none of the joints is": ~seen.any(axis=1),
+        "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover": ~(
+            seen[:, 1:4].any(axis=1)
+        ),
+        neck: ~seen[:, 0] & view.camera.perspective,
+    }
+    return [str(reason) for reason in np.select(list(reasons.values()), list(reasons), "")]
 
 
 def _calibrated(
@@ -154,43 +157,36 @@ def _calibrated(
     reasons: list[str],
 ) -> Sight:
     """Gather what a calibrated camera sees: the root as given, or from six head points."""
-    count = len(view)
-    camera, pose = _head_pose(view, person, settings)
+    count, model = len(view), view.camera
+    assert not isinstance(model, ScaledOrthographicCamera)
+    camera, pose = _head_pose(view, model, person, settings)
     root, head = view.root.copy(), np.full((count, len(HEAD_POINTS), 3), np.nan)
-    given = np.asarray(np.isfinite(root).all(axis=1))
     if settings.root in ("head", "torso"):
-        root[:], given[:] = np.nan, False
-    _check_root(root, view, camera)
-    roots: list[dict[str, Any] | None] = [None] * count
-    if pose is not None:
-        neck = pose.point("neck")
-        unknown = ~given & (settings.root != "torso")
-        root[unknown] = neck[unknown]
-        head = person.head_points[1:] @ np.swapaxes(pose.R_cam_head, -1, -2) + root[:, None]
-        for k in np.flatnonzero(unknown & pose.found).tolist():
-            roots[k] = {"method": "head", "estimate": float(neck[k, 2]), "deviation": None}
-    if isinstance(view.camera, LeeChenCamera) and view.camera.f is None:
-        for k in range(count):
-            if not reasons[k] and (pose is None or not pose.found[k]):
-                why = (
-                    pose.reasons[k]
-                    if pose is not None
-                    else "its head is not seen, and so its camera is not known"
-                )
-                reasons[k] = why or "its camera is not known"
+        root[:] = np.nan
+    given = np.asarray(np.isfinite(root).all(axis=1))
     if settings.root == "given" and not given.any():
         raise refusal(
             view.source, "root", "no root in the view", "one a frame", "add it, or leave --root out"
         )
+    _check_root(root, view, camera)
+    roots: list[dict[str, Any] | None] = [None] * count
+    if pose is not None:
+        neck, unknown = pose.point("neck"), ~given & (settings.root != "torso")
+        root[unknown] = neck[unknown]
+        head = person.head_points[1:] @ np.swapaxes(pose.R_cam_head, -1, -2) + root[:, None]
+        for k in np.flatnonzero(unknown & pose.found).tolist():
+            roots[k] = {"method": "head", "estimate": float(neck[k, 2]), "deviation": None}
+        if isinstance(model, LeeChenCamera) and model.f is None:
+            reasons = [own or of_head for own, of_head in zip(reasons, pose.reasons, strict=True)]
     # Offsets in metres are converted by the size of the person in the image.
     depth, unplaced = root[:, 2].copy(), np.flatnonzero(~np.isfinite(root[:, 2]))
     if len(unplaced):
         depth[unplaced] = 1 / likely_scale(camera.normalize(view.image)[unplaced], person)[0]
     middle = np.nan_to_num(camera.normalize(view.image[:, 0]))
-    per_metre = np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle)))) / np.where(depth > 0, depth, 3.0)
-    lee_chen = isinstance(view.camera, LeeChenCamera)
+    focal = np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle))))
     # On a metric image plane a pixel is as large as that of a camera with a focal length of 1,000 pixels.
-    pixel = 1e-3 * np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle)))) if lee_chen else np.ones(count)
+    pixel = 1e-3 * focal if isinstance(model, LeeChenCamera) else np.ones(count)
+    per_metre = focal / np.where(depth > 0, depth, 3.0)
     own = JOINT_OFFSET if view.derived else 0.0
     confidence = view.confidence[:, : len(JOINTS)]
     sure = np.clip(np.nan_to_num(confidence, nan=UNSTATED_CONFIDENCE), LEAST_OFFSET_CONFIDENCE, 1.0)
@@ -205,7 +201,6 @@ def _calibrated(
         given=given,
         head=head,
         size_deviation=np.full(count, lengths.common),
-        lengths=lengths,
         may_be_exact=may_be_exact,
         reasons=reasons,
         cameras=[_camera_record(view, pose, k) for k in range(count)],
@@ -214,11 +209,9 @@ def _calibrated(
 
 
 def _head_pose(
-    view: View, person: Figure, settings: RecoverSettings
+    view: View, model: PinholeCamera | LeeChenCamera, person: Figure, settings: RecoverSettings
 ) -> tuple[PinholeCamera | LeeChenCamera, HeadPose | None]:
     """Return the camera of all frames, and the pose of the head where six points of it are seen."""
-    model = view.camera
-    assert not isinstance(model, ScaledOrthographicCamera)
     image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
     enough = np.isfinite(image).all(axis=2).sum(axis=1) >= ENOUGH_HEAD_POINTS
     unknown = isinstance(model, LeeChenCamera) and model.f is None
@@ -229,16 +222,9 @@ def _head_pose(
         return model, None
     stated: Mapping[str, Any] = view.head_points or {}
     origin = np.asarray(stated.get("neck", np.zeros(3)))
-    every = {
-        name: origin + at for name, at in zip(("neck", *HEAD_POINTS), person.head_points, strict=True)
-    } | dict(stated)
-    used = [
-        k
-        for k, name in enumerate(every)
-        if name in stated or len(stated) < ENOUGH_HEAD_POINTS or np.isfinite(image[:, k, 0]).any()
-    ]
-    points = HeadPoints.from_mapping({name: every[name] for k, name in enumerate(every) if k in used})
-    image = np.where(enough[:, None, None], image, np.nan)[:, used]
+    own = dict(zip(("neck", *HEAD_POINTS), origin + person.head_points, strict=True))
+    points = HeadPoints.from_mapping({**own, **stated})
+    image = np.where(enough[:, None, None], image, np.nan)
     if isinstance(model, LeeChenCamera):
         pose = calibrate(points, image, f=model.f)
         return (LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)) if unknown else model), pose
@@ -247,37 +233,26 @@ def _head_pose(
 
 def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) -> None:
     """Refuse given roots behind the camera or far from the neck's ray."""
-    known = np.isfinite(root).all(axis=1)
     _, ray = camera.rays(view.image[:, 0])
     beside = np.linalg.norm(root - (root * ray).sum(axis=1, keepdims=True) * ray, axis=1)
-    for k in np.flatnonzero(known).tolist():
-        if root[k, 2] <= 0:
-            raise refusal(
-                view.source, f"frames[{k}].root", f"z = {root[k, 2]:g} m", "z > 0, z forward", "correct it"
-            )
-        if beside[k] > ROOT_REFUSED:
-            got = f"a point {beside[k]:.3g} m beside the ray on which the neck is seen"
-            raise refusal(
-                view.source, f"frames[{k}].root", got, "the neck, camera frame", "correct it, or leave it out"
-            )
+    for k in np.flatnonzero((root[:, 2] <= 0) | (beside > ROOT_REFUSED)).tolist():
+        got = f"z = {root[k, 2]:g} m, {beside[k]:.3g} m beside the ray on which the neck is seen"
+        expected = "the neck, camera frame, z forward"
+        raise refusal(view.source, f"frames[{k}].root", got, expected, "correct it, or leave it out")
 
 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
     """Describe the camera of a frame: of Lee & Chen's the paper's [R] and position (Table 2), else of the world."""
     model = view.camera
-    record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
-    if pose is not None and pose.found[k]:
-        R, t = pose.R_cam_head[k], pose.t_cam_head[k]
-        record |= {"residual": float(pose.rms[k]), "rotation": R.tolist(), "position": (-R.T @ t).tolist()}
-        if isinstance(model, LeeChenCamera):
-            f = float(pose.f[k])
-            record |= {
-                "f": f,
-                "rotation": rotation_to_paper(R).tolist(),
-                "position": camera_position(R, t, f).tolist(),
-            }
+    record: dict[str, Any] = dict.fromkeys(("f", "rotation", "position", "residual"))
     if isinstance(model, LeeChenCamera) and model.f is not None:
         record["f"] = float(np.broadcast_to(model.f, len(view))[k])
+    if pose is not None and pose.found[k]:
+        R, t, f = pose.R_cam_head[k], pose.t_cam_head[k], float(pose.f[k])
+        record |= {"residual": float(pose.rms[k]), "rotation": R.tolist(), "position": (-R.T @ t).tolist()}
+        if isinstance(model, LeeChenCamera):
+            rotation, position = rotation_to_paper(R), camera_position(R, t, f)
+            record |= {"f": f, "rotation": rotation.tolist(), "position": position.tolist()}
     if isinstance(model, PinholeCamera) and model.R is not None and model.t is not None:
         record |= {"rotation": model.R.tolist(), "position": (-model.R.T @ model.t).tolist()}
     return record
@@ -298,9 +273,7 @@ def _photograph(
     from posekit.recovery.objects import parse_scale
 
     square = view.image * np.array([model.aspect, 1.0])
-    text = settings.scale
-    if text is None and model.scale is None:
-        text = "likely"
+    text = settings.scale or ("likely" if model.scale is None else None)
     how, value, weights = parse_scale(text) if text is not None else ("value", 0.0, {})
     likely, spread = likely_scale(square, person)
     deviation = np.where(how == "likely", spread, SCALE_DEVIATIONS.get(how, lengths.common))
@@ -344,7 +317,6 @@ def _photograph(
         given=np.zeros(len(frame), dtype=np.bool_),
         head=np.full((len(frame), len(HEAD_POINTS), 3), np.nan),
         size_deviation=np.hypot(np.broadcast_to(deviation, len(view))[frame], lengths.common),
-        lengths=lengths,
         may_be_exact=may_be_exact and how != "likely",
         reasons=reasons,
         cameras=cameras,
