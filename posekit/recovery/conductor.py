@@ -90,7 +90,8 @@ def recover(
     conductor = _Conductor(view, settings, person, lengths)
     for stage in conductor.stages():
         left = np.array(sorted(conductor.found.open), dtype=np.intp)
-        for start in watched(range(0, len(left), FRAMES_AT_ONCE), "recovering"):
+        starts = range(0, len(left), FRAMES_AT_ONCE)
+        for start in watched(starts, "recovering") if starts else ():
             stage(left[start : start + FRAMES_AT_ONCE])
     recovery = conductor.found.recovery(conductor.margins, conductor.document(), conductor.tolerances())
     if settings.clip_lengths and len(recovery.survivors):
@@ -233,7 +234,7 @@ class _Conductor:
         reason, _ = certified(self.noisy, self.checks, with_head(joints))
         volume = modes.log_evidence + 0.5 * modes.chi2
         terms = log_terms(joints, chi2=modes.chi2, log_volume=volume, up=self.up)
-        lost = {k: Counter[str]() for k in np.unique(frame).tolist()}
+        lost = {k: Counter[str]() for k in set(frame.tolist())}
         self.found.add("noisy", lost, columns, terms, reason, partial(self._covariance, modes), leave=sharp)
         if not sharp:
             self._diagnose(sight, problem, [k for k in part.tolist() if k not in lost])

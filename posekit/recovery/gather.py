@@ -118,9 +118,9 @@ class Gathering:
             held[first] = True
         else:
             held = np.ones(len(rows), dtype=np.bool_)
-        rest = frame[~held], np.ones(len(rows))[~held], probability[~held]
-        unlisted, improbable = (np.bincount(rest[0], weight, len(self.view)) for weight in rest[1:])
-        found = np.unique(frame)
+        unlisted = np.bincount(frame[~held], minlength=len(self.view))
+        improbable = np.bincount(frame[~held], probability[~held], len(self.view)).astype(np.float64)
+        found = np.array(sorted(set(frame.tolist())), dtype=np.intp)
         for k in found.tolist() if leave else lost:
             worst = max(lost[k], key=lambda name: lost[k][name], default="").replace("/", " at ")
             why = "" if k in found else f"no posture passes: most fail {worst}"
