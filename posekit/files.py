@@ -6,12 +6,14 @@ import difflib
 import gzip
 import os
 import stat
+import tomllib
 import zlib
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from posekit.errors import InputError, TooLargeError, refusal
+from posekit.errors import InputError, TooLargeError, cut, nearest, refusal, shown
 
 #: Folder of the data that comes with posekit: the figure, layouts, ranges, priors, profiles.
 DATA: Final = Path(__file__).resolve().parent / "urdf"
@@ -54,6 +56,33 @@ def read_bytes(path: str | Path) -> bytes:
     if len(data) > MAX_BYTES:
         raise _too_large(path)
     return data
+
+
+def read_table(name: str, folder: str, built_in: Sequence[str], schema: str, option: str) -> dict[str, Any]:
+    """Read a TOML table of a schema.
+
+    Parameters
+    ----------
+    name : str
+        One of `built_in`, which are files in a folder of `DATA`, or the path of a file.
+    folder, schema, option : str
+        That folder, the schema that the table must state, and the option with which it is given, for errors.
+
+    Raises
+    ------
+    InputError
+        If there is no such table, or it is not TOML of the schema.
+    """
+    path = DATA / folder / f"{name}.toml" if name in built_in else Path(name)
+    if not name or not path.is_file():
+        raise refusal(option, "", cut(name), "a name or a TOML file", nearest(name, built_in))
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise refusal(name, "", str(error), "a TOML file", "correct it") from None
+    if table.get("schema") != schema:
+        raise refusal(name, "schema", shown(table.get("schema")), schema, "state it")
+    return table
 
 
 def _names_beside(path: Path) -> list[str]:

@@ -139,6 +139,18 @@ class Judgement(Record):
         scale = np.where(np.isfinite(half) & (half > 0), half, np.where(one_end > 0, one_end, 1.0))
         return np.asarray(self.margin / scale)
 
+    @classmethod
+    def stacked(cls, parts: Sequence[Judgement]) -> Judgement:
+        """Put the places of several judgements of the same frames side by side."""
+        names = ["value", "lower", "upper", "tolerance"] + ["scale"] * (parts[0].scale is not None)
+        columns = {
+            name: np.concatenate(
+                [np.broadcast_to(getattr(one, name), one.value.shape) for one in parts], axis=1
+            )
+            for name in names
+        }
+        return cls([place for one in parts for place in one.places], **columns)
+
 
 @runtime_checkable
 class Check(Protocol):

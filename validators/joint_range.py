@@ -7,8 +7,8 @@ every angle of one way to write it is within its range and couplings.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.body import ClosedForm, Figure, load_figure
 from posekit.body.frames import torso_frame
-from posekit.geometry import Array, perpendicular, unit
+from posekit.geometry import Array, cross, dot, unit
 from posekit.skeleton import DOFS, HEAD_POINTS, HIPS, JOINT, JOINTS, TORSO
 from posekit.solver import Limits, engine
 from posekit.solver.limits import (
@@ -36,8 +36,7 @@ from posekit.solver.limits import torso_frame as torso_rows
 from posekit.tree.steps import LIMB, PELVIS, Step, step
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
-from posekit.validators.hinges import bent_backward
-from posekit.validators.ranges import load_ranges, of_person
+from posekit.validators.ranges import limits_of, load_ranges, of_person
 from posekit.validators.table1 import table1_angles
 
 #: Tolerance from which an axial rotation is not determined, degrees.
@@ -49,6 +48,19 @@ STRAIGHT_DEGREES: Final = 15.0
 
 #: Tolerance of angles that are exact, degrees: 5 µm at a wrist.
 ROUNDING_DEGREES: Final = 1e-3
+
+#: Bend from which a frame shows the axis of its hinge, degrees: carrying angles turn it by 35 at most.
+BENT_DEGREES: Final = 20.0
+
+#: Bend from which a hinge is read by the axis of its neighbours, degrees.
+LEAST_DEGREES: Final = 8.0
+
+#: Cosine between the axis of a frame and that of its neighbours below which the hinge bends backward.
+OPPOSITE_COSINE: Final = -0.8
+
+#: Time to the neighbours that show the axis, seconds: within it people seldom turn a straight arm by half a turn.
+NEAR_SECONDS: Final = 1.0
+
 
 PARTS: Final = ("neck", "pelvis", *LIMBS)
 
@@ -101,9 +113,7 @@ class JointRange:
 
     def steps(self, body: Body) -> list[Step] | None:
         """Return the check of the figure's own postures as steps of the compiled tree; the neck has none."""
-        table = load_ranges(body.settings.ranges)
-        printed = table is not None and table["kind"] in ("rotation", "projected")
-        if body.tolerance is None or printed or self.part == "neck":
+        if body.tolerance is None or self.part == "neck" or _of_table1(body):
             return None
         limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
         given: dict[str, Any] = {
@@ -118,80 +128,119 @@ class JointRange:
 
     def judge(self, body: Body) -> Judgement:
         """Measure the angles of the parts."""
-        table = load_ranges(body.settings.ranges)
         parts = (self.part,) if self.part else PARTS
-        if table is not None and table["kind"] in ("rotation", "projected"):
-            return table1_angles(body, table, parts, upper_only=self.upper_only)
+        if self.upper_only:
+            joints = body.joints.copy()
+            joints[:, ENDS[LIMBS.index(self.part)]] = np.nan
+            body = replace(body, joints=joints)
+        if table := _of_table1(body):
+            return table1_angles(body, table, parts)
         measured = body.tolerance is None and not body.settings.strict
         forward = body.person.hips_forward if measured else math.nan
         limits, ik = _limits(body.figure, body.settings.ranges, forward)
-        found = [_neck(ik, body) if part == "neck" else self._part(limits, part, body) for part in parts]
-        return _stacked(found)
-
-    def _part(self, limits: Limits, part: str, body: Body) -> Judgement:
-        joints = body.joints
-        if part == "pelvis":
-            return _pelvis(limits, body)
-        limb = LIMBS.index(part)
-        if self.upper_only:
-            joints = joints.copy()
-            joints[:, ENDS[limb]] = np.nan
-        segments = ((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
-        tolerance = body.angle_tolerance(*segments)
-        straight = self.straight_degrees if body.tolerance is None and not body.settings.strict else 0.0
-        over_time = body.dt if body.motion and body.tolerance is None and not self.upper_only else math.nan
-        return _limb_range(limits, joints, limb, tolerance, straight, over_time)
+        found = []
+        for part in parts:
+            if part == "neck":
+                found.append(_neck(ik, body))
+            elif part == "pelvis":
+                found.append(_pelvis(limits, body))
+            else:
+                found.append(
+                    _limb(limits, body, LIMBS.index(part), self.straight_degrees if measured else 0.0)
+                )
+        return Judgement.stacked(found)
 
 
-def _limb_range(
-    limits: Limits, joints: Array, limb: int, tolerance: float, straight: float, dt: float
-) -> Judgement:
-    """Judge one limb (N, 14, 3): in the usual way of writing, else in the one that is least outside.
+def _of_table1(body: Body) -> Mapping[str, Any] | None:
+    """Return the table of ranges that is asked for if its angles are those of Lee & Chen."""
+    table = load_ranges(body.settings.ranges)
+    return table if table is not None and table["kind"] in ("rotation", "projected") else None
 
-    Over time, neighbouring frames tell which way a hinge bends.
+
+def _limb(limits: Limits, body: Body, limb: int, straight: float) -> Judgement:
+    """Judge one limb: in the usual way of writing, else in the one that is least outside.
+
+    Over time, neighbouring frames of measured people tell which way a hinge bends.
     """
-    if engine.compiled and not dt > 0:
-        places, keep = _places(limits, limb)
+    joints, (places, keep) = body.joints, _places(limits, limb)
+    tolerance = body.angle_tolerance((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
+    in_time = body.motion and body.tolerance is None and body.dt > 0
+    if engine.compiled and not in_time:
         found = engine.compiled.stated(limits.numbers, limb, joints, tolerance, straight)
         return Judgement(places, *found[..., keep])
     parent = torso_rows(joints) if limb < 2 else hips_frame(joints, bool(limits.numbers["between_hips"]))
     upper_segment, lower_segment = limb_directions(joints, limb)
     rotations = limb_angles(parent, upper_segment, lower_segment)
+    least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
 
-    def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array]:
-        """Return value, lower, upper and tolerance (4, n, W, 4), degrees, and how far the worst is outside (n, W)."""
-        *found, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
-        numbers = np.empty((4, *found[0].shape))
-        np.degrees(np.stack(found), out=numbers[:3])
-        least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
-        numbers[3] = tolerance
-        numbers[3, ..., 2] /= np.maximum(np.where(np.isnan(sine), 1.0, sine), least)[:, None]
-        away = np.maximum(numbers[1] - numbers[0], numbers[0] - numbers[2]) - numbers[3]
-        open_rotation = (numbers[3, ..., 2] > UNSEEN_DEGREES) | (sine < math.sin(math.radians(straight)))[
-            :, None
-        ]
-        turned = np.where(open_rotation, np.nan, away[..., 2])
+    def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array, Array]:
+        """Return value, lower, upper and tolerance (4, n, W, 4), degrees.
+
+        And how far the worst is outside (n, W), without and with a rotation that is not determined.
+        """
+        *angles, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
+        value, lower, upper = np.degrees(np.stack(angles))
+        allowed = np.full(value.shape, tolerance)
+        allowed[..., 2] /= np.maximum(np.where(np.isnan(sine), 1.0, sine), least)[:, None]
+        away = np.maximum(lower - value, value - upper) - allowed
         strict = np.fmax.reduce(away, axis=2)
-        away[..., 2] = turned
-        numbers[0, ..., 2] = np.where(open_rotation, np.nan, numbers[0, ..., 2])
-        return numbers, np.stack([np.fmax.reduce(away, axis=2), strict])
+        unseen = (allowed[..., 2] > UNSEEN_DEGREES) | (sine < math.sin(math.radians(straight)))[:, None]
+        value[unseen, 2] = away[unseen, 2] = np.nan
+        return np.stack([value, lower, upper, allowed]), np.fmax.reduce(away, axis=2), strict
 
     # The closed form bends hinges about +y; elbows flex the other way.
-    usual = np.full(len(joints), int(limb < 2))
-    numbers, (worst, strict) = read(slice(None), usual)
-    found, outside = numbers[:, :, 0], worst[:, 0]
-    backward = np.full(len(joints), np.nan)
-    if dt > 0:
-        backward = bent_backward(upper_segment, lower_segment, strict[:, 0] <= 0, dt)
-    rows = np.flatnonzero((outside > 0) | (backward < 0))
+    numbers, worst, strict = read(slice(None), np.full(len(joints), int(limb < 2)))
+    found, backward = numbers[:, :, 0], np.zeros(len(joints), dtype=np.bool_)
+    if in_time:
+        backward = bent_backward(upper_segment, lower_segment, strict[:, 0] <= 0, body.dt)
+    rows = np.flatnonzero((worst[:, 0] > 0) | backward)
     if len(rows):
-        numbers, (worst, _) = read(rows, None)
-        worst = np.where((backward[rows] < 0)[:, None] & (numbers[0, ..., 3] >= 0), np.inf, worst)
+        numbers, worst, _ = read(rows, None)
+        worst = np.where(backward[rows][:, None] & (numbers[0, ..., 3] >= 0), np.inf, worst)
         best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)
         found[:, rows] = numbers[:, np.arange(len(rows)), best]
-    found[0, backward < 0, 2] = np.nan  # the hinge is named, not the ball joint above it
-    places, keep = _places(limits, limb)
+    found[0, backward, 2] = np.nan  # the hinge is named, not the ball joint above it
     return Judgement(places, *found[..., keep])
+
+
+def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
+    """Return in which frames an elbow or a knee bends backward, as neighbouring frames show.
+
+    Two directions alone do not separate a limb that bends backward from one that is turned by half a turn about its
+    upper segment. Motion does: an arm turns about itself by a few degrees a frame, not by half a turn.
+
+    Parameters
+    ----------
+    upper, lower : array (T, 3)
+        Unit directions of the two segments, frame after frame.
+    legal : bool array (T,)
+        Whether the limb is within its ranges if the hinge bends forward.
+    dt : float
+        Seconds from a frame to the next.
+    """
+    found = np.zeros(len(upper), dtype=np.bool_)
+    normal = cross(upper, lower)
+    bend = np.degrees(np.arctan2(np.sqrt(dot(normal, normal)), dot(upper, lower)))
+    shows = np.flatnonzero(legal & (bend >= BENT_DEGREES))
+    asked = np.flatnonzero((bend >= LEAST_DEGREES) & (~legal | (bend < BENT_DEGREES)))
+    if not len(shows) or not len(asked):
+        return found
+    axis = unit(normal)
+    after = np.searchsorted(shows, asked)
+    opposite = np.zeros(len(asked), dtype=np.bool_)
+    agree = np.ones(len(asked), dtype=np.bool_)
+    for neighbour in (after - 1, after):
+        inside = (neighbour >= 0) & (neighbour < len(shows))
+        other = shows[np.clip(neighbour, 0, len(shows) - 1)]
+        near = inside & (np.abs(other - asked) * dt <= NEAR_SECONDS)
+        # The shortest rotation from one upper segment to the other carries the axis along.
+        a, b = upper[other], upper[asked]
+        carried = axis[other] - (dot(axis[other], b) / np.maximum(1.0 + dot(a, b), 0.1))[:, None] * (a + b)
+        turned = dot(carried, axis[asked]) < OPPOSITE_COSINE
+        opposite |= near & turned
+        agree &= ~near | turned
+    found[asked[opposite & agree]] = True
+    return found
 
 
 def _places(limits: Limits, limb: int) -> tuple[list[str], list[int]]:
@@ -224,48 +273,23 @@ def _neck(ik: ClosedForm, body: Body) -> Judgement:
     return Judgement(DOFS[:3], value, lower, upper, body.angle_tolerance())
 
 
-def _stacked(found: Sequence[Judgement]) -> Judgement:
-    """Put the places of several judgements of the same frames side by side."""
-    columns: dict[str, list[Array]] = {"value": [], "lower": [], "upper": [], "tolerance": []}
-    for one in found:
-        for name, arrays in columns.items():
-            arrays.append(np.broadcast_to(np.asarray(getattr(one, name), dtype=np.float64), one.value.shape))
-    stacked = {name: np.concatenate(arrays, axis=1) for name, arrays in columns.items()}
-    return Judgement([place for one in found for place in one.places], **stacked)
-
-
 @lru_cache(maxsize=32)
 def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedForm]:
     """Return the ranges of a figure as numbers, and its closed form with the same limits of the neck.
 
     The hips of a measured person lie `forward` degrees before the trunk's line.
     """
-    table, anatomical = load_ranges(name) or {}, False
-    own = np.degrees(np.stack([figure.limits.lower, figure.limits.upper], axis=1))
-    ends = own[:3].copy()
-    if table.get("kind") == "configuration":
-        joints = {joint: one for joint, one in table.items() if isinstance(one, dict)}
-        angles = {
-            f"{joint}.{angle}": limits for joint, one in joints.items() for angle, limits in one.items()
-        }
-        table = {"kind": "configuration", "joints": angles}
-        ends = np.array([angles.get(dof, own[k]) for k, dof in enumerate(DOFS[:3])])
-    elif table.get("kind") == "anatomical":
-        anatomical = True
-        table = of_person(table, forward, _hips_outward(figure)) if math.isfinite(forward) else table
-        signs = (("lower", -table["spreads"]), ("upper", table["spreads"]))
-        neck = [table["neck"][dof.partition(".")[2]] for dof in DOFS[:3]]
-        ends = np.array([[one[end]["mean"] + out * one[end]["spread"] for end, out in signs] for one in neck])
-    pelvis, right, left = (figure.neutral_points[JOINT[joint]] for joint in HIPS)
-    limits = Limits.of(
-        table if anatomical or "joints" in table else None,
-        own,
-        above_hips=float(np.linalg.norm(perpendicular(right - pelvis, unit(left - right)))),
-        pelvis_between_hips=figure.pelvis_between_hips,
-    )
+    table = load_ranges(name)
+    if table is None or table["kind"] != "anatomical":
+        return limits_of(figure, None), figure.ik
+    if math.isfinite(forward):
+        table = of_person(table, forward, _hips_outward(figure))
+    neck = [table["neck"][dof.partition(".")[2]] for dof in DOFS[:3]]
+    signs = (("lower", -table["spreads"]), ("upper", table["spreads"]))
+    ends = np.array([[one[end]["mean"] + out * one[end]["spread"] for end, out in signs] for one in neck])
     lower, upper = figure.limits.lower.copy(), figure.limits.upper.copy()
     lower[:3], upper[:3] = np.radians(ends).T
-    return limits, figure.ik.with_limits(lower, upper)
+    return limits_of(figure, table), figure.ik.with_limits(lower, upper)
 
 
 def _hips_outward(figure: Figure) -> float:

@@ -1,41 +1,31 @@
 """Tables of joint ranges, read from TOML of schema ``posekit.ranges/1``.
 
 A table of kind ``anatomical`` has a mean and a spread over people for each end of each angle, and couplings between
-angles; ``configuration`` has limits of the URDF's own angles; ``rotation`` and ``projected`` have limits of the angles
-of Lee & Chen 1985, §3.2.A, as rotations from standing and as printed; ``joints`` has limits of a robot's joints.
+angles; ``rotation`` and ``projected`` have limits of the angles of Lee & Chen 1985, §3.2.A, as rotations from standing
+and as printed; ``joints`` has limits of a robot's joints.
 """
 
 from __future__ import annotations
 
 import copy
 import math
-import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final
 
-from posekit.errors import cut, nearest, refusal, shown
-from posekit.files import DATA
-from posekit.skeleton import DOFS
+import numpy as np
+
+from posekit.body import Figure
+from posekit.errors import nearest, refusal, shown
+from posekit.files import read_table
+from posekit.geometry import perpendicular, unit
+from posekit.skeleton import DOFS, HIPS, JOINT
+from posekit.solver import Limits
 
 RANGES_SCHEMA: Final = "posekit.ranges/1"
-KINDS: Final = ("anatomical", "configuration", "rotation", "projected", "joints")
+KINDS: Final = ("anatomical", "rotation", "projected", "joints")
 #: Tables by name; ``urdf`` stands for the URDF's own limits.
 NAMED: Final = ("urdf", "anatomical", "table1", "table1-printed", "human_as_stick_figure")
-
-#: Angles of Lee & Chen 1985, §3.2.A, by joint; of both sides.
-TABLE1_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
-    "shoulder": ("flexion", "abduction"),
-    "elbow": ("flexion",),
-    "hip": ("flexion", "flexion_with_straight_knee", "abduction"),
-    "knee": ("flexion",),
-    "pelvis": ("flexion", "rotation", "bending"),
-    "neck": ("flexion", "rotation", "bending"),
-}
-
-#: Angles of the figure without their side.
-SIDELESS: Final = tuple(dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS))
 
 #: Standard deviation of how people hold their pelvis under the trunk in the median frame of a recording, degrees: 8
 #: between 16 recordings of one skeleton, which walks, runs, jumps and crouches.
@@ -62,20 +52,8 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
     if name == "urdf":
         return None
     if name == "table1-printed":
-        return {**_read("table1"), "kind": "projected"}
-    return _read(name)
-
-
-def _read(name: str) -> Mapping[str, Any]:
-    path = DATA / "ranges" / f"{name}.toml" if name in NAMED else Path(name)
-    if not name or not path.is_file():
-        raise refusal("--ranges", "", cut(name), "a table or a TOML file", nearest(name, NAMED))
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise refusal(name, "", str(error), "a TOML file", "correct it") from None
-    if table.get("schema") != RANGES_SCHEMA:
-        raise refusal(name, "schema", shown(table.get("schema")), RANGES_SCHEMA, "state it")
+        return {**(load_ranges("table1") or {}), "kind": "projected"}
+    table = read_table(name, "ranges", NAMED, RANGES_SCHEMA, "--ranges")
     kind = table.get("kind")
     if kind not in KINDS:
         raise refusal(name, "kind", shown(kind), f"one of {', '.join(KINDS)}", "state it")
@@ -84,23 +62,19 @@ def _read(name: str) -> Mapping[str, Any]:
     elif kind == "joints":
         for joint, limits in table.get("limits", {}).items():
             _check_limits(limits, name, f"limits.{joint}")
-    else:
-        _check_angles(table, name, kind)
+    elif name != "table1":
+        given, known = _angles(table), _angles(load_ranges("table1") or {})
+        for angle in [*given, *known]:
+            if angle not in known:
+                raise refusal(name, angle, "an unknown angle", "a known one", nearest(angle, known))
+            _check_limits(given.get(angle), name, angle)
     return table
 
 
-def _check_angles(table: Mapping[str, Any], source: str, kind: str) -> None:
-    tables = {joint: angles for joint, angles in table.items() if isinstance(angles, dict)}
-    given = {f"{joint}.{angle}": ends for joint, angles in tables.items() for angle, ends in angles.items()}
-    named = [f"{joint}.{angle}" for joint, angles in TABLE1_ANGLES.items() for angle in angles]
-    known = [*DOFS, *SIDELESS] if kind == "configuration" else named
-    for angle, limits in given.items():
-        if angle not in known:
-            raise refusal(source, angle, "an unknown angle", "a known one", nearest(angle, known))
-        _check_limits(limits, source, angle)
-    for angle in [] if kind == "configuration" else named:
-        if angle not in given:
-            raise refusal(source, angle, "nothing", "[lower, upper] in degrees", "add it")
+def _angles(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the limits of a table by the names of joint and angle."""
+    joints = {joint: angles for joint, angles in table.items() if isinstance(angles, dict)}
+    return {f"{joint}.{angle}": ends for joint, angles in joints.items() for angle, ends in angles.items()}
 
 
 def _check_limits(limits: Any, source: str, field: str) -> None:
@@ -111,7 +85,7 @@ def _check_limits(limits: Any, source: str, field: str) -> None:
 
 def _check_anatomical(table: Mapping[str, Any], source: str) -> None:
     numbers = {"spreads": table.get("spreads")}
-    for dof in SIDELESS:
+    for dof in dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS):
         joint, angle = dof.split(".")
         for end in ("lower", "upper"):
             one = table.get(joint, {}).get(angle, {}).get(end, {})
@@ -123,6 +97,17 @@ def _check_anatomical(table: Mapping[str, Any], source: str) -> None:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
+    """Return the ranges of a figure's pelvis and limbs: those of a table of kind ``anatomical``, else its own."""
+    pelvis, right, left = (figure.neutral_points[JOINT[joint]] for joint in HIPS)
+    return Limits.of(
+        table if table and table["kind"] == "anatomical" else None,
+        np.degrees(np.stack([figure.limits.lower, figure.limits.upper], axis=1)),
+        above_hips=float(np.linalg.norm(perpendicular(right - pelvis, unit(left - right)))),
+        pelvis_between_hips=figure.pelvis_between_hips,
+    )
 
 
 def of_person(table: Mapping[str, Any], forward: float, outward: float) -> Mapping[str, Any]:

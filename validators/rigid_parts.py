@@ -84,20 +84,13 @@ class RigidParts:
         length = np.array([body.lengths[name] for name in names])
         value = body.segment_lengths[[SEGMENTS.index(segment) for segment in self.segments]].T
         tolerance = np.array([body.rigid_tolerance(segment) for segment in self.segments])
+        bones = Judgement(names, value, length, length, tolerance, np.maximum(tolerance, LEAST_SCALE))
         if not self.torso:
-            return Judgement(
-                names, value, length, length, tolerance, scale=np.maximum(tolerance, LEAST_SCALE)
-            )
+            return bones
         exact = body.tolerance is not None and body.tolerance.exact
-        torso, lower, upper = self._placement(body) if exact else self._side(body)
-        return Judgement(
-            [*names, "torso"],
-            np.column_stack([value, torso]),
-            np.append(length, lower),
-            np.append(length, upper),
-            np.append(tolerance, 0.0),
-            np.maximum(np.append(tolerance, body.rigid_tolerance(RIGID_SEGMENTS[0])), LEAST_SCALE),
-        )
+        torso, lower, upper = (self._placement if exact else self._side)(body)
+        scale = max(body.rigid_tolerance(RIGID_SEGMENTS[0]), LEAST_SCALE)
+        return Judgement.stacked([bones, Judgement(["torso"], torso, lower, upper, scale=scale)])
 
     @staticmethod
     def _side(body: Body) -> tuple[Array, float, float]:

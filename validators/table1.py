@@ -16,6 +16,7 @@ projection without direction is undecided, and an angle jumps where a limb passe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -39,30 +40,16 @@ LEAST_SINE: Final = 1e-12
 ROUNDING_DEGREES: Final = 1e-3
 
 
-def table1_angles(
-    body: Body, table: Mapping[str, Any], parts: Sequence[str], *, upper_only: bool = False
-) -> Judgement:
+def table1_angles(body: Body, table: Mapping[str, Any], parts: Sequence[str]) -> Judgement:
     """Judge parts of postures by a table of kind ``rotation`` or ``projected``."""
     R = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
     axes = np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
-    places: list[str] = []
-    columns: dict[str, list[Array]] = {"value": [], "lower": [], "upper": [], "tolerance": []}
-    for part in parts:
-        if part in ("neck", "pelvis"):
-            names, found = table1_plane(body, axes, table, part)
-        else:
-            names, found = table1_limb(body, axes, table, part, upper_only=upper_only)
-        places += names
-        for name, one in zip(columns, found, strict=True):
-            columns[name].append(np.broadcast_to(one, found[0].shape))
-    return Judgement(places, **{name: np.concatenate(one, axis=1) for name, one in columns.items()})
+    return Judgement.stacked(
+        [(_plane if part in ("neck", "pelvis") else _limb)(body, axes, table, part) for part in parts]
+    )
 
 
-#: Value, lower, upper and tolerance (N, K).
-Found = tuple[Array, Array, Array, Array]
-
-
-def table1_plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> tuple[list[str], Found]:
+def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
     """Judge a plane against the torso's (§3.2.A iii and iv): the hips', or the head's, whose normal is its facing."""
     joints = body.joints
     if part == "pelvis":
@@ -91,44 +78,37 @@ def table1_plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -
             axis=-1,
         )
     lower, upper = np.array([table[part][angle] for angle in PLANE_ANGLES], dtype=np.float64).T
-    tolerance = np.full(value.shape, body.angle_tolerance())
-    return [f"{part}.{angle}" for angle in PLANE_ANGLES], (value * signs, lower, upper, tolerance)
+    places = [f"{part}.{angle}" for angle in PLANE_ANGLES]
+    return Judgement(places, value * signs, lower, upper, body.angle_tolerance())
 
 
-def table1_limb(
-    body: Body, axes: Array, table: Mapping[str, Any], part: str, *, upper_only: bool
-) -> tuple[list[str], Found]:
+def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
     """Judge a limb (§3.2.A i and ii); the hip's range is the wide one only if the knee is flexed (Table 1, note a)."""
     side, ball = part.split("_")
     hinge, end = ("elbow", "wrist") if ball == "shoulder" else ("knee", "ankle")
-    points = [body.joints[:, JOINT[f"{side}_{name}"]] for name in (ball, hinge, end)]
-    u, v = (np.einsum("nij,nj->ni", axes, b - a) for a, b in ((points[0], points[1]), (points[1], points[2])))
     joints = [JOINT[f"{side}_{name}"] for name in (ball, hinge, end)]
-    tolerance = body.angle_tolerance((joints[0], joints[1]), (joints[1], joints[2]))
+    segments = tuple(pairwise(joints))
+    u, v = (np.einsum("nij,nj->ni", axes, body.joints[:, b] - body.joints[:, a]) for a, b in segments)
+    tolerance = body.angle_tolerance(*segments)
     value, gain = _ball(u, ball, 1.0 if side == "left" else -1.0, table, tolerance)
-    limits = [table[ball]["flexion"], table[ball]["abduction"]]
-    lower, upper = (np.tile(np.array(limits, dtype=np.float64)[:, k], (len(u), 1)) for k in range(2))
-    places = [f"{part}.flexion", f"{part}.abduction"]
-    if upper_only:
-        return places, (value, lower, upper, tolerance * gain)
     flexion, hinge_gain = _hinge(u, v, hinge, table, tolerance)
-    ends = np.tile(np.array(table[hinge]["flexion"], dtype=np.float64), (len(u), 1))
+    limits = [table[ball]["flexion"], table[ball]["abduction"], table[hinge]["flexion"]]
+    ends = np.tile(np.array(limits, dtype=np.float64), (len(u), 1, 1))
     if ball == "hip":
-        known = ~np.isnan(flexion)
+        least = table.get("knee_flexed", 5.0)
+        share = np.clip(flexion / max(least, ROUNDING_DEGREES), 0.0, 1.0)
         if table["kind"] == "projected":
-            share = (flexion > table.get("knee_flexed", 5.0)).astype(np.float64)
-        else:
-            share = np.clip(flexion / max(table.get("knee_flexed", 5.0), ROUNDING_DEGREES), 0.0, 1.0)
-        for k, bound in enumerate((lower, upper)):
-            straight, bent = table["hip"]["flexion_with_straight_knee"][k], table["hip"]["flexion"][k]
-            bound[known, 0] = ((1 - share) * straight + share * bent)[known]
-    found = (
+            share = np.where(flexion > least, 1.0, 0.0)
+        narrow = np.array(table["hip"]["flexion_with_straight_knee"], dtype=np.float64)
+        known = ~np.isnan(flexion)
+        ends[known, 0] += ((1 - share)[:, None] * (narrow - ends[:, 0]))[known]
+    return Judgement(
+        [f"{part}.flexion", f"{part}.abduction", f"{side}_{hinge}.flexion"],
         np.column_stack([value, flexion]),
-        np.column_stack([lower, ends[:, 0]]),
-        np.column_stack([upper, ends[:, 1]]),
+        ends[..., 0],
+        ends[..., 1],
         tolerance * np.column_stack([gain, hinge_gain]),
     )
-    return [*places, f"{side}_{hinge}.flexion"], found
 
 
 def _ball(

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, LengthUncertainty
-from posekit.geometry import Array, perpendicular, unit
+from posekit.geometry import Array
 from posekit.recovery.person import sided
 from posekit.settings import MEASURED, RecoverSettings, Tolerance
-from posekit.skeleton import HIPS, JOINT
 from posekit.solver import Limits
 from posekit.validators.check import Check
 from posekit.validators.judge import PostureJudge, judge_postures
-from posekit.validators.ranges import load_ranges
+from posekit.validators.ranges import limits_of, load_ranges
 
 #: Standard deviations of lengths and of joint limits that do not contradict a posture.
 ALLOWED_DEVIATIONS: Final = 3.0
@@ -80,18 +79,5 @@ def noisy_judge(
 def solver_limits(figure: Figure, checks: Iterable[Check], ranges: str) -> Limits | None:
     """Return the joint ranges that pull at the solver's postures; None if no check asks for them."""
     table = load_ranges(ranges)
-    if "joint-range" not in [check.name for check in checks] or (
-        table is not None and table["kind"] not in ("anatomical", "configuration")
-    ):
-        return None
-    pelvis, right, left = (figure.neutral_points[JOINT[name]] for name in HIPS)
-    if table is not None and table["kind"] == "configuration":
-        joints = {name: one for name, one in table.items() if isinstance(one, dict)}
-        angles = {f"{joint}.{angle}": ends for joint, one in joints.items() for angle, ends in one.items()}
-        table = {"kind": "configuration", "joints": angles}
-    return Limits.of(
-        table,
-        np.degrees(np.stack([figure.limits.lower, figure.limits.upper], axis=1)),
-        above_hips=float(np.linalg.norm(perpendicular(right - pelvis, unit(left - right)))),
-        pelvis_between_hips=figure.pelvis_between_hips,
-    )
+    asked = "joint-range" in [check.name for check in checks]
+    return limits_of(figure, table) if asked and (table is None or table["kind"] == "anatomical") else None

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final
 
 from posekit.errors import cut, nearest, refusal, shown
-from posekit.files import DATA
+from posekit.files import read_table
 from posekit.validators.check import FunctionCheck
 from posekit.validators.motion import frames, orientation, published, sliding, speed, standing
 
@@ -42,16 +40,7 @@ def load_profile(name: str) -> Profile:
     InputError
         If there is no such profile, or it is not as the schema says.
     """
-    path = DATA / "profiles" / f"{name}.toml" if name in BUILT_IN else Path(name)
-    if not name or not path.is_file():
-        raise refusal("--profile", "", cut(name), "a profile or a TOML file", nearest(name, BUILT_IN))
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise refusal(name, "", str(error), "a TOML file", "correct it") from None
-    if document.get("schema") != PROFILE_SCHEMA:
-        raise refusal(name, "schema", shown(document.get("schema")), PROFILE_SCHEMA, "state it")
-    asked = document.get("checks", {})
+    asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "--profile").get("checks", {})
     for key in asked:
         if key not in MOTION_CHECKS:
             raise refusal(name, "checks", cut(key), "a check over time", nearest(key, MOTION_CHECKS))
