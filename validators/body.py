@@ -107,9 +107,7 @@ class Body(Record):
 
         Its points are those of `robot` where it has configurations only, and unless they are not wanted (`placed`).
         """
-        named = motion.joints is not None and tuple(motion.joint_names[: len(JOINTS)]) == JOINTS
-        joints = motion.joints[:, : len(JOINTS)] if named else motion.figure_joints  # type: ignore[index]
-        feet = motion.feet
+        joints = motion.figure_joints
         if robot is not None and motion.joints is None and motion.q is not None:
             joints = np.full((len(motion), len(JOINTS), 3), np.nan)
             known = np.isfinite(motion.q).all(axis=1)
@@ -118,7 +116,7 @@ class Body(Record):
         return cls(
             joints=joints,
             head=motion.head,
-            feet=feet,
+            feet=motion.feet,
             time=np.asarray(motion.time),
             q=motion.q if robot is not None else None,
             robot=robot,
@@ -185,6 +183,11 @@ class Body(Record):
         """Length of each of `posekit.skeleton.SEGMENTS` in each frame (17, T), metres."""
         return segment_lengths(self.joints)
 
+    @property
+    def measured(self) -> bool:
+        """Whether the frames show people that were measured, not the figure itself."""
+        return self.tolerance is None and not self.settings.strict
+
     @cached_property
     def noise(self) -> float:
         """Standard deviation of measured coordinates that checks over time allow for, metres."""
@@ -204,10 +207,9 @@ class Body(Record):
     @cached_property
     def figure(self) -> Figure:
         """The figure that positions are compared with: the base, with the person's lengths if people were measured."""
-        base = self.base_figure
-        if self.tolerance is not None or self.settings.strict or not self.person.lengths:
-            return base
-        return figure_of(base, tuple(self.person.lengths.items()), self.person.behind)
+        if not self.measured or not self.person.lengths:
+            return self.base_figure
+        return figure_of(self.base_figure, tuple(self.person.lengths.items()), self.person.behind)
 
     @property
     def lengths(self) -> Mapping[str, float]:
@@ -223,16 +225,13 @@ class Body(Record):
         """Return by how much noise may change the distance between the ends of a segment, or of any two, metres."""
         noise = self.settings.noise
         if noise is None:
-            measured = (
-                self.tolerance is None and not self.settings.strict and math.isfinite(self.person.noise)
-            )
-            noise = self.person.noise_of(segment) if measured else 0.0
+            noise = self.person.noise_of(segment) if self.measured else 0.0
         return ALLOWED_DEVIATIONS * math.sqrt(2) * noise
 
     @property
     def contact_margin(self) -> float:
         """Distance that capsules of the figure must keep, metres; negative allows overlap."""
-        made_up = MADE_UP_METRES if self.tolerance is None and not self.settings.strict else 0.0
+        made_up = MADE_UP_METRES if self.measured else 0.0
         return self.settings.contact_margin - made_up - self.noise_allowed()
 
     def rigid_tolerance(self, segment: tuple[int, int]) -> float:
@@ -276,10 +275,9 @@ class Body(Record):
             }
         angles = [self.angle_tolerance(one) for one in SEGMENTS if one not in RIGID_SEGMENTS]
         bones = [100 * self.rigid_tolerance(one) for one in SEGMENTS]
-        measured = self.tolerance is None and not self.settings.strict
         return {
             "judged": "joint positions",
-            "lengths": "measured" if measured else "figure",
+            "lengths": "measured" if self.measured else "figure",
             "noise": self.noise,
             "angle_tolerance": f"{min(angles):.2g} to {max(angles):.2g} deg",
             "rigid_tolerance": f"{min(bones):.2g} to {max(bones):.2g} cm",
@@ -289,14 +287,12 @@ class Body(Record):
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:
     """Let several checks share what is found in a body: it is computed once and kept as long as the body is."""
-    name = f"_once_{find.__module__}_{find.__name__}"
 
     @wraps(find)
     def found(body: Body) -> Found:
-        kept = body.__dict__
-        if name not in kept:
-            kept[name] = find(body)
-        value: Found = kept[name]
-        return value
+        kept: dict[Any, Found] = body.__dict__.setdefault("_once", {})
+        if find not in kept:
+            kept[find] = find(body)
+        return kept[find]
 
     return found

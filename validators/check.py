@@ -20,7 +20,6 @@ the interpretation tree asks it as soon as these are placed. It may have `residu
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import re
 import sys
@@ -43,8 +42,17 @@ if TYPE_CHECKING:
 #: Entry-point group in which other packages register their checks.
 ENTRY_POINTS: Final = "posekit.checks"
 
-#: Parts of a body that a check may declare to read; it is not asked about a body that lacks one of them.
-READABLE: Final = ("joints", "head", "feet", "q", "robot", "time", "up", "ground")
+#: Parts of a body that a check may declare to read, and why it is not asked about a body that lacks one.
+READABLE: Final[Mapping[str, str]] = {
+    "joints": "no joint positions are known",
+    "head": "no head points are known",
+    "feet": "no toes or heels are known",
+    "q": "there are no configurations of a robot (--urdf)",
+    "robot": "there are no configurations of a robot (--urdf)",
+    "time": "the frame rate is not known (--rate)",
+    "up": "the direction up is not known (--up)",
+    "ground": "the height of the ground is not known (--up, --ground)",
+}
 
 #: Form of a check's name.
 CHECK_NAME: Final = re.compile(r"[a-z][a-z0-9-]*")
@@ -94,29 +102,26 @@ class Judgement(Record):
             raise refusal("judge", "value", f"shape {value.shape}", expected, "return one column a place")
         object.__setattr__(self, "places", tuple(self.places))
         object.__setattr__(self, "value", value)
+        for name in ("lower", "upper", "tolerance"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
 
     @property
     def low(self) -> Array:
         """Lower bounds (T, K) with the tolerance."""
-        return np.broadcast_to(np.asarray(self.lower, dtype=np.float64) - self.tolerance, self.value.shape)
+        return np.broadcast_to(self.lower - self.tolerance, self.value.shape)
 
     @property
     def high(self) -> Array:
         """Upper bounds (T, K) with the tolerance."""
-        return np.broadcast_to(np.asarray(self.upper, dtype=np.float64) + self.tolerance, self.value.shape)
+        return np.broadcast_to(self.upper + self.tolerance, self.value.shape)
 
     @cached_property
     def margin(self) -> Array:
         """Distance inside the nearer bound, tolerance included (T, K): negative outside, NaN undecided."""
-        lower = np.asarray(self.lower, dtype=np.float64) - self.tolerance
-        upper = np.asarray(self.upper, dtype=np.float64) + self.tolerance
-        with np.errstate(invalid="ignore"):
-            inside = (
-                self.value - lower
-                if np.isfinite(lower).any()
-                else np.where(np.isnan(self.value), np.nan, np.inf)
-            )
-            return np.minimum(inside, upper - self.value) if np.isfinite(upper).any() else inside
+        low, high = self.low, self.high
+        with np.errstate(invalid="ignore"):  # an infinite value has no distance from an infinite bound
+            nearer = np.fmin(self.value - low, high - self.value)
+        return np.where(np.isnan(low) | np.isnan(high), np.nan, nearer)
 
     @property
     def violated(self) -> NDArray[np.bool_]:
@@ -128,16 +133,14 @@ class Judgement(Record):
         """Margins as shares of the range (T, K), comparable between checks: 1 in its middle, negative outside."""
         if self.scale is not None:
             return np.asarray(self.margin / self.scale)
-        lower, upper = np.broadcast_arrays(
-            *(np.asarray(one, dtype=np.float64) for one in (self.lower, self.upper))
-        )
+        lower, upper = np.asarray(self.lower), np.asarray(self.upper)
         with np.errstate(invalid="ignore"):
             half = (upper - lower) / 2
-        one_end = np.where(
-            np.isfinite(lower), np.abs(lower), np.where(np.isfinite(upper), np.abs(upper), 1.0)
+        bounded = np.isfinite(half) & (half > 0)
+        size = np.abs(np.where(np.isfinite(lower), lower, upper))
+        return np.asarray(
+            self.margin / np.select([bounded, np.isfinite(size) & (size > 0)], [half, size], 1.0)
         )
-        scale = np.where(np.isfinite(half) & (half > 0), half, np.where(one_end > 0, one_end, 1.0))
-        return np.asarray(self.margin / scale)
 
     @classmethod
     def stacked(cls, parts: Sequence[Judgement]) -> Judgement:
@@ -260,21 +263,6 @@ def message_of(one: Check) -> str:
     return (inspect.getdoc(one) or one.name).split("\n\n")[0].replace("\n", " ").rstrip(".")
 
 
-def lacking(one: Check, body: Body) -> str:
-    """Return why a check cannot be asked about a body; empty if it can."""
-    reasons: Mapping[str, str] = {
-        "joints": "no joint positions are known",
-        "head": "no head points are known",
-        "feet": "no toes or heels are known",
-        "q": "there are no configurations of a robot (--urdf)",
-        "robot": "there are no configurations of a robot (--urdf)",
-        "time": "the frame rate is not known (--rate)",
-        "up": "the direction up is not known (--up)",
-        "ground": "the height of the ground is not known (--up, --ground)",
-    }
-    return next((reasons[name] for name in one.reads if not body.knows(name)), "")
-
-
 def judged(one: Check, body: Body) -> Judgement:
     """Ask a check about a body, and refuse an answer that is none.
 
@@ -285,8 +273,9 @@ def judged(one: Check, body: Body) -> Judgement:
     InputError
         If it does not return a `Judgement` with a row a frame, or rejects what it does not know.
     """
-    if reason := lacking(one, body):
-        raise NotAskedError(reason)
+    for name in one.reads:
+        if not body.knows(name):
+            raise NotAskedError(READABLE[name])
     try:
         found = one.judge(body)
     except PosekitError:
@@ -319,45 +308,8 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
     InputError
         If there is no such check or it lacks a member.
     """
-    if not isinstance(given, str):
-        return _proven(given() if isinstance(given, type) else given)
-    name = given.replace("_", "-") if ":" not in given else given
-    if name in known:
-        return known[name]
-    from importlib.metadata import entry_points
-
-    entries = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
-    module, _, inside = given.partition(":")
-    if name not in entries and not (module and inside):
-        names = (*known, *sorted(entries))
-        raise refusal("--checks", "", repr(cut(given)), "a check", nearest(given, names))
-    try:
-        found = entries[name].load() if name in entries else _imported(module, inside)
-    except (ImportError, AttributeError) as error:
-        raise refusal(
-            "--checks", "", cut(given), "a module and a name in it", f"it cannot be imported ({error})"
-        ) from None
-    return _proven(found() if isinstance(found, type) else found)
-
-
-def _imported(module: str, inside: str) -> Any:
-    """Import ``module:Name``, looking into the current folder first."""
-    here = str(Path.cwd())
-    added = here not in sys.path
-    if added:
-        sys.path.insert(0, here)
-    try:
-        found: Any = importlib.import_module(module)
-    finally:
-        if added:
-            sys.path.remove(here)
-    for part in inside.split("."):
-        found = getattr(found, part)
-    return found
-
-
-def _proven(found: Any) -> Check:
-    """Refuse an object that lacks a member of `Check`, or whose members are impossible."""
+    found = _named(given, known) if isinstance(given, str) else given
+    found = found() if isinstance(found, type) else found
     what = getattr(found, "name", None) or type(found).__name__
     if not isinstance(found, Check):
         missing = [name for name in ("name", "unit", "reads", "judge") if not hasattr(found, name)]
@@ -373,3 +325,26 @@ def _proven(found: Any) -> Check:
             "--checks", f"{what}: reads", repr(wrong[0]), f"some of {', '.join(READABLE)}", "correct it"
         )
     return found
+
+
+def _named(given: str, known: Mapping[str, Any]) -> Any:
+    """Return what a name stands for; a module is looked for in the current folder first."""
+    name = given if ":" in given else given.replace("_", "-")
+    if name in known:
+        return known[name]
+    from importlib.metadata import EntryPoint, entry_points
+
+    entries = entry_points(group=ENTRY_POINTS)
+    if name not in entries.names and ":" not in given:
+        names = (*known, *sorted(entries.names))
+        raise refusal("--checks", "", repr(cut(given)), "a check", nearest(given, names))
+    entry = entries[name] if name in entries.names else EntryPoint(given, given, ENTRY_POINTS)
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        got, remedy = cut(given), f"it cannot be imported ({error})"
+        raise refusal("--checks", "", got, "a module and a name in it", remedy) from None
+    finally:
+        sys.path.remove(here)

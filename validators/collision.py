@@ -137,7 +137,7 @@ def _built_in_pairs() -> tuple[tuple[str, str], ...]:
 
 def _slimness(body: Body, link: str) -> float:
     """Return the factor of a capsule's radius: legs of people whose hips are nearer together are as much slimmer."""
-    if body.tolerance is not None or body.settings.strict or not link.endswith(("thigh", "shank")):
+    if not body.measured or not link.endswith(("thigh", "shank")):
         return 1.0
     hips, thigh = "right_hip-left_hip", "right_hip-right_knee"
     usual = body.base_figure.lengths

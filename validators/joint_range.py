@@ -135,8 +135,7 @@ class JointRange:
             body = replace(body, joints=joints)
         if table := _of_table1(body):
             return table1_angles(body, table, parts)
-        measured = body.tolerance is None and not body.settings.strict
-        forward = body.person.hips_forward if measured else math.nan
+        forward = body.person.hips_forward if body.measured else math.nan
         limits, ik = _limits(body.figure, body.settings.ranges, forward)
         found = []
         for part in parts:
@@ -146,7 +145,7 @@ class JointRange:
                 found.append(_pelvis(limits, body))
             else:
                 found.append(
-                    _limb(limits, body, LIMBS.index(part), self.straight_degrees if measured else 0.0)
+                    _limb(limits, body, LIMBS.index(part), self.straight_degrees if body.measured else 0.0)
                 )
         return Judgement.stacked(found)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from posekit.body import Figure, load_figure, with_head
 from posekit.errors import InputError, PosekitError, refusal, shown
@@ -23,7 +23,7 @@ from posekit.validators.check import Check, Judgement, NotAskedError, find_check
 from posekit.validators.collision import Collision
 from posekit.validators.joint_range import JointRange
 from posekit.validators.motion.hints import hints
-from posekit.validators.motion.profile import MOTION_CHECKS, load_profile, some_of
+from posekit.validators.motion.profile import MOTION_CHECKS, load_profile
 from posekit.validators.motion.rate import rate_doubts
 from posekit.validators.motion.standing import balance
 from posekit.validators.report import NUMBERS, Report, joined
@@ -83,48 +83,24 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
         If a name is no check.
     """
     own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
-    profile = load_profile(getattr(settings, "profile", "posekit"))
+    profile = load_profile(settings.profile) if isinstance(settings, ValidateSettings) else ()
     if settings.checks is None:
         usual = USUAL_ROBOT_CHECKS if of_robot else USUAL_POSTURE_CHECKS
         return [*(own[name] for name in usual), *(profile if in_time else ())]
     if not settings.checks:
         raise refusal("--checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
-    found: list[Any] = [find_check(given, KNOWN) for given in settings.checks]
-    over_time = [one.name for one in found if _is_own(one, MOTION_CHECKS)]
-    made = [own.get(one.name, one) if _is_own(one, KNOWN) else one for one in found]
-    rank = {name: place for place, name in enumerate(own)}
-    made = sorted(
-        (one for one in made if one.name not in over_time), key=lambda one: rank.get(one.name, len(rank))
-    )
-    return [*made, *some_of(profile, over_time)]
-
-
-def _is_own(one: Check, known: Mapping[str, Check]) -> bool:
-    return known.get(one.name) is one
+    over_time = {**MOTION_CHECKS, **{one.name: one for one in profile}}
+    found = [find_check(given, {**KNOWN, **over_time, **own}) for given in settings.checks]
+    # Checks of one's own come after those of postures, before those over time.
+    rank = {name: place for place, name in enumerate((*own, "", *over_time))}
+    return sorted(found, key=lambda one: rank.get(one.name, rank[""]))
 
 
 def early_checks(settings: Settings) -> list[Check]:
-    """Return the checks of postures for a tree: in parts that read few points, each with its ``points``."""
-    found: list[Check] = []
-    for check in chosen_checks(settings, of_robot=False, in_time=False):
-        if getattr(check, "over_time", False):
-            continue
-        if isinstance(check, RigidParts | JointRange | Collision):
-            found += check.parts
-        else:
-            found.append(check if getattr(check, "points", ()) else Pointed(check))
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class Pointed:
-    """A check that does not name the points that it reads, for the tree: it reads all joints."""
-
-    check: Check
-    points: Sequence[str] = JOINTS
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.check, name)
+    """Return the checks of postures for a tree: those that have `parts` in parts, which read few points."""
+    asked = chosen_checks(settings, of_robot=False, in_time=False)
+    postures = [check for check in asked if not getattr(check, "over_time", False)]
+    return [part for check in postures for part in getattr(check, "parts", (check,))]
 
 
 class PostureJudge:
@@ -145,13 +121,8 @@ class PostureJudge:
     def __init__(
         self, figure: Figure, settings: Settings, tolerance: Tolerance | None, up: Array | None = None
     ) -> None:
-        self.figure, self.settings, self.tolerance, self.up = (
-            figure,
-            _validate_settings(settings),
-            tolerance,
-            up,
-        )
-        self._unnamed = replace(self.settings, checks=None)
+        self.figure, self.settings = figure, _validate_settings(settings)
+        self.tolerance, self.up = tolerance, up
 
     def __call__(self, check: Check, points: Array) -> Judgement:
         """Return the judgement of a check; it has no place where the check cannot be asked."""
@@ -160,23 +131,22 @@ class PostureJudge:
         )
         return found.get(check.name) or Judgement((), np.empty((len(points), 0)))
 
-    def steps(self, check: Check) -> list[Step] | None:
+    def steps(self, check: Any) -> list[Step] | None:
         """Return a check as steps of the compiled tree; None if it has no such form."""
-        if not isinstance(check, RigidParts | JointRange | Collision):
+        if not hasattr(check, "steps"):
             return None
-        return _steps(check, self.figure, self._unnamed, self.tolerance)
+        return _steps(check, self.figure, replace(self.settings, checks=None), self.tolerance)
 
 
 @lru_cache(maxsize=128)
 def _steps(
-    check: RigidParts | JointRange | Collision,
-    figure: Figure,
-    settings: ValidateSettings,
-    tolerance: Tolerance | None,
+    check: Any, figure: Figure, settings: ValidateSettings, tolerance: Tolerance | None
 ) -> list[Step] | None:
     """Return a check of postures of a figure as steps of the compiled tree."""
     none = np.empty((0, len(JOINTS), 3))
-    return check.steps(Body(joints=none, base=figure, settings=settings, tolerance=tolerance, motion=False))
+    body = Body(joints=none, base=figure, settings=settings, tolerance=tolerance, motion=False)
+    found: list[Step] | None = check.steps(body)
+    return found
 
 
 def judge_postures(
@@ -219,8 +189,7 @@ def _asked(checks: Iterable[Check], body: Body) -> Iterator[tuple[Check, Judgeme
 def _validate_settings(settings: Settings) -> ValidateSettings:
     if isinstance(settings, ValidateSettings):
         return settings
-    shared = ("checks", "ranges", "rules", "walkers", "contact_margin", "rigid_tolerance", "angle_tolerance")
-    return ValidateSettings(**{name: getattr(settings, name) for name in shared})
+    return ValidateSettings(**{one.name: getattr(settings, one.name) for one in fields(Settings)})
 
 
 def validate_motion(
@@ -296,33 +265,29 @@ def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[R
 def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
     """Ask all checks about one recording."""
     asked = list(_asked(checks, body))
-    found = {check.name: (check, one) for check, one, _ in asked if one is not None}
+    found = list({check.name: (check, one) for check, one, _ in asked if one is not None}.values())
     quiet = OF_SOME_ROBOTS if body.settings.checks is None else ()
     not_asked = {one.name: reason for one, _, reason in asked if reason and one.name not in quiet}
     count = len(body)
-    places = tuple(dict.fromkeys(place for _, one in found.values() for place in one.places))
+    places = tuple(dict.fromkeys(place for _, one in found for place in one.places))
     place_at = {place: k for k, place in enumerate(places)}
-    margins = np.full((count, len(found)), np.nan)
-    silent = np.zeros((count, len(found)), dtype=np.bool_)
-    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in (*WHOLE, *NUMBERS)}
-    for k, (check, one) in enumerate(found.values()):
-        if one.places:
-            margins[:, k] = np.fmin.reduce(one.share, axis=1)
-        if not getattr(check, "over_time", False):
-            silent[:, k] = np.isnan(margins[:, k])
-        margins[np.isinf(margins[:, k]), k] = np.nan
-        row, place = np.nonzero(one.margin < 0)
-        at = np.array([place_at[one_place] for one_place in one.places], dtype=np.intp)
+    shares = [np.fmin.reduce(one.share, axis=1, initial=np.nan) for _, one in found]
+    margins = np.array(shares, dtype=np.float64).reshape(len(found), count).T
+    of_postures = [not getattr(check, "over_time", False) for check, _ in found]
+    silent = np.isnan(margins) & np.array(of_postures, dtype=np.bool_)
+    margins = np.where(np.isinf(margins), np.nan, margins)
+    parts = [np.empty((len(WHOLE) + len(NUMBERS), 0))]
+    for k, (_, one) in enumerate(found):
+        row, place = np.nonzero(one.violated)
+        at = np.array([place_at[name] for name in one.places], dtype=np.intp)[place]
         low, high = (np.where(np.isinf(ends), np.nan, ends)[row, place] for ends in (one.low, one.high))
         numbers = (one.value[row, place], low, high, one.margin[row, place])
-        cells = (row, np.full(len(row), k), at[place], *numbers)
-        for column, values in zip(columns.values(), cells, strict=True):
-            column.append(values)
-    findings = {name: np.concatenate([np.empty(0), *values]) for name, values in columns.items()}
-    order = np.lexsort((findings["check"], findings["row"]))
+        parts.append(np.stack([row, np.full(len(row), k), at, *numbers]))
+    cells = np.concatenate(parts, axis=1)
+    cells = cells[:, np.lexsort((cells[1], cells[0]))]
     findings = {
-        name: values[order].astype(np.intp if name in WHOLE else np.float64)
-        for name, values in findings.items()
+        name: column.astype(np.intp if name in WHOLE else np.float64)
+        for name, column in zip((*WHOLE, *NUMBERS), cells, strict=True)
     }
     known = body.joints if body.q is None else body.q
     return Report(
@@ -331,19 +296,19 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         time=np.asarray(motion.time),
         files=(motion.source,),
         names=(name,),
-        checks=tuple(found),
-        units=tuple(check.unit for check, _ in found.values()),
+        checks=tuple(check.name for check, _ in found),
+        units=tuple(check.unit for check, _ in found),
         places=places,
         findings=findings,
         margins=margins,
         silent=silent,
         incomplete=np.asarray(~np.isfinite(known.reshape(count, -1)).all(axis=1)),
-        messages={name: message_of(check) for name, (check, _) in found.items()},
+        messages={check.name: message_of(check) for check, _ in found},
         not_asked=not_asked,
         settings={**body.settings.to_json(), **body.allowed()},
         notes=(
             *motion.notes,
-            *hints(body, {name: one for name, (_, one) in found.items()}, np.asarray(motion.frame)),
+            *hints(body, {check.name: one for check, one in found}, np.asarray(motion.frame)),
         ),
         warnings=(*motion.warnings, *rate_doubts(body)),
     )
@@ -394,19 +359,22 @@ class Validator:
         chosen_checks(self.settings, of_robot=self.robot is not None, in_time=True)
 
     def __repr__(self) -> str:
-        return f"Validator({self.figure or self.robot!r})"
+        return f"Validator({self.body!r})"
+
+    @property
+    def body(self) -> Robot:
+        """The figure or the robot."""
+        return self.figure or self.robot  # type: ignore[return-value]
 
     @property
     def model(self) -> Any:
         """Pinocchio's model of the figure or robot."""
-        return (self.figure or self.robot).model  # type: ignore[union-attr]
+        return self.body.model
 
     @property
     def configuration_names(self) -> tuple[str, ...]:
         """Name of each entry of q."""
-        body: Any = self.figure or self.robot
-        names: tuple[str, ...] = body.configuration_names
-        return names
+        return self.body.configuration_names
 
     def check(
         self, given: Motion | ArrayLike, *, head: ArrayLike | None = None, tolerance: Tolerance | None = None
@@ -439,10 +407,7 @@ class Validator:
             if not self._by_ranges:  # by the limits of the URDF
                 robot = figure
             else:
-                known = np.isfinite(motion.q).all(axis=1)
-                joints = np.full((len(motion), len(JOINTS), 3), np.nan)
-                joints[known] = figure.points(motion.q[known])
-                motion = replace(motion, joints=joints, joint_names=JOINTS)
+                motion = replace(motion, joints=figure.points(motion.q), joint_names=JOINTS)
         return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
 
     def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
@@ -458,11 +423,10 @@ class Validator:
         try:
             values = np.asarray(given).astype(np.float64, casting="same_kind")
         except (TypeError, ValueError):
-            raise refusal("postures", "", shown(type(given).__name__), expected, "give an array") from None
-        if values.ndim == 0 or np.iscomplexobj(given):
-            raise refusal(
-                "postures", "", shown(type(given).__name__), expected, "give an array of real numbers"
-            )
+            values = np.empty(())
+        if not values.ndim:
+            got, remedy = shown(type(given).__name__), "give an array of real numbers"
+            raise refusal("postures", "", got, expected, remedy)
         if values.ndim == 1 or values.shape in ((len(JOINTS), 3), (len(POINTS), 3)):
             values = values[None]
         still: dict[str, Any] = {"frame": np.zeros(len(values), dtype=np.intp)} if len(values) > 1 else {}
@@ -471,7 +435,7 @@ class Validator:
                 raise refusal("postures", "", "a coordinate of kilometres", "metres", "scale them")
             points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
             return Motion(joints=points, joint_names=POINTS, **still)
-        body: Any = self.figure or self.robot
+        body = self.body
         if body.free_flyer and values.shape[1:] == (count - 7,):  # angles alone: the root is at neutral
             root = np.broadcast_to(body.neutral[:7], (len(values), 7))
             values = np.concatenate([root, values], axis=1)

@@ -91,7 +91,12 @@ class Person(Record):
     hips_forward: float
 
     def noise_of(self, segment: str) -> float:
-        """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse."""
+        """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse.
+
+        0 where too few frames show it.
+        """
+        if math.isnan(self.noise):
+            return 0.0
         own = self.limb_noise.get(segment, self.noise)
         return min(max(own, self.noise), WORST_OF_USUAL * self.noise)
 

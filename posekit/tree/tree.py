@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.cameras import Camera
 from posekit.geometry import Array, Ints
-from posekit.skeleton import JOINTS, POINT, POINTS, SEGMENTS
+from posekit.skeleton import JOINTS, POINT, SEGMENTS
 from posekit.tree import steps
 from posekit.tree.candidates import (
     DEPTH,
@@ -165,7 +165,7 @@ def grow(
     lengths : array (17,) or (F, 17)
         Metres, in the order of `posekit.skeleton.SEGMENTS`.
     checks : sequence of checks
-        Asked in this order at the first level where all their ``points`` are placed.
+        Asked in this order at the first level where all their ``points`` are placed; by default all joints.
     judge : callable, optional
         ``judge(check, points (N, 19, 3))`` returns the check's judgement of postures with head points; NaN marks points
         that the check does not read. By default ``check.judge(points)``. It may have a method ``steps(check)`` that
@@ -234,7 +234,7 @@ def _planned(
     branch = [step(BRANCH, ())] if steps.compiled else None
     plan = [_Planned(level, None, (), branch) for level in range(1, DEPTH + 1)]
     for check in checks:
-        points = tuple(POINT[name] for name in getattr(check, "points", ()) or POINTS)
+        points = tuple(POINT[name] for name in getattr(check, "points", ()) or JOINTS)
         if max(points) > DEPTH and not np.isfinite(head).any():
             continue  # a check that reads head points is not asked without them
         level = max([1, *(point for point in points if point <= DEPTH)])

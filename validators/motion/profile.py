@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any, Final
 
@@ -46,12 +45,6 @@ def load_profile(name: str) -> Profile:
             raise refusal(name, "checks", cut(key), "a check over time", nearest(key, MOTION_CHECKS))
         _check_thresholds(MOTION_CHECKS[key], asked[key], name)
     return tuple(one.with_thresholds(**asked[key]) for key, one in MOTION_CHECKS.items() if key in asked)
-
-
-def some_of(profile: Profile, names: Iterable[str]) -> Profile:
-    """Return checks over time by name; those that a profile lacks have their own thresholds."""
-    mine, wanted = {one.name: one for one in profile}, set(names)
-    return tuple(mine.get(name, one) for name, one in MOTION_CHECKS.items() if name in wanted)
 
 
 def _check_thresholds(one: FunctionCheck, thresholds: dict[str, Any], source: str) -> None:
