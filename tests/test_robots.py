@@ -305,7 +305,7 @@ def test_points_and_jacobians_are_those_of_pinocchio(name: str) -> None:
     model, data = robot.model, robot.model.createData()
     offset = (0.1, -0.2, 0.3)
     joints = range(1, model.njoints)
-    kinematics = Kinematics(model, [[Site(joint, offset, 1.0)] for joint in joints])
+    kinematics = Kinematics(model, [Site(joint, offset) for joint in joints])
     q = configurations(robot, 4)
     points, jacobians = kinematics.jacobians(q)
     assert np.allclose(points, kinematics.positions(q))
@@ -476,7 +476,7 @@ def test_mimicking_joints_follow_in_inverse_kinematics(tmp_path: Path) -> None:
     (tmp_path / "map.toml").write_text(
         'schema = "posekit.joint_map/1"\n[points]\n'
         'pelvis = "a"\nneck = "b"\nright_shoulder = {frame = "e", offset = [0.1, 0.2, 0.3]}\nleft_shoulder = "f"\n'
-        'right_hip = {mean = ["a", "c"]}\nleft_hip = "d"\n'
+        'right_hip = "c"\nleft_hip = "d"\n'
     )
     robot = Robot(urdf=ALL_KINDS, joint_map_file=str(tmp_path / "map.toml"))
     q = robot.with_mimics(configurations(robot, 5, 0.1))

@@ -185,7 +185,7 @@ def sole_points(robot: Robot, q: Array) -> Array:
     if soles is not None:
         from posekit.robots.kinematics import Kinematics, Site
 
-        sites = [[Site(joint, tuple(place.tolist()), 1.0)] for joint, place in zip(*soles, strict=True)]
+        sites = [Site(joint, tuple(place.tolist())) for joint, place in zip(*soles, strict=True)]
         known = np.asarray(np.isfinite(q).all(axis=1))
         points[known] = Kinematics(robot.model, sites).positions(q[known])
     return points

@@ -33,8 +33,7 @@ from posekit.files import DATA
 from posekit.geometry import Array, Ints, coordinate_rotation, frame_along, read_only, unit
 from posekit.geometry.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from posekit.robots.capsules import PARTS
-from posekit.robots.robot import Robot
-from posekit.robots.urdf import read_text
+from posekit.robots.robot import Robot, read_text
 from posekit.skeleton import (
     DOFS,
     HEAD,

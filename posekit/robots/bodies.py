@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import copy
 import re
-from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, Literal
-from xml.etree import ElementTree
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from posekit.errors import cut, refusal, shown
-from posekit.robots.urdf import Element, need, parse_xml, shapes
+from posekit.robots.urdf import Element, need, parse_xml, text_with
 
 Kind = Literal["collision", "visual"]
+KINDS: Final = {"collision": pin.GeometryType.COLLISION, "visual": pin.GeometryType.VISUAL}
 
 #: Bytes of one mesh; those of published robots have at most 29 MB.
 MAX_MESH_BYTES: Final = 64_000_000
@@ -56,9 +55,13 @@ def build_bodies(
     InputError
         If a mesh is outside of `package_dirs`, missing, too large or damaged, or a body was not loaded.
     """
-    resolved = copy.deepcopy(robot)
-    sizes: dict[Path, int] = {}
-    for link, shape in shapes(resolved, kind):
+    resolved, sizes = copy.deepcopy(robot), dict[Path, int]()
+    shapes = [
+        (str(link.get("name")), shape)
+        for link in resolved.findall("link")
+        for shape in link.findall(f"{kind}/geometry/*")
+    ]
+    for link, shape in shapes:
         if shape.tag == "mesh":
             path = resolve_mesh(shape.get("filename", ""), package_dirs, source, f"link {link!r}")
             if path not in sizes:
@@ -66,16 +69,25 @@ def build_bodies(
             shape.set("filename", str(path))
     total, most = sum(sizes.values()) / 1e6, MAX_MESHES_BYTES / 1e6
     need(source, total <= most, "", f"meshes of {total:,.0f} MB", f"at most {most:,.0f} MB", "simplify them")
-    text = ElementTree.tostring(resolved, encoding="unicode")
-    wanted = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
     try:
-        geometry = pin.buildGeomFromUrdfString(model, text, wanted)
+        geometry = pin.buildGeomFromUrdfString(model, text_with(resolved, kind), KINDS[kind])
     except (ValueError, RuntimeError) as error:
         _, _, message = str(error).rpartition("message: ")
         lines = [line.rpartition("/")[2] for line in message.splitlines() if not line.startswith("Hint")]
-        got = f"a {kind} mesh that coal cannot load ({cut(', '.join(lines[:2]))})"
-        raise refusal(source, "", got, "a mesh of triangles", "export the mesh again") from None
-    _check_loaded(model, geometry, resolved, source, kind)
+        got = f"a {kind} body that cannot be loaded ({cut(', '.join(lines[:2]))})"
+        raise refusal(source, "", got, "a shape, or a mesh of triangles", "correct it") from None
+    got, declared = f"{geometry.ngeoms} {kind} bodies loaded", len(resolved.findall(f"link/{kind}"))
+    need(source, geometry.ngeoms == declared, "", got, f"all {declared}", "check the spelling of the others")
+    for body in geometry.geometryObjects:
+        mesh, place = body.geometry, f"link {link_of(model, body)!r}"
+        if isinstance(mesh, coal.BVHModelBase):
+            got, few = f"a mesh of {mesh.num_tris:,} triangles", f"1 to {MAX_TRIANGLES:,}"
+            need(source, 0 < mesh.num_tris <= MAX_TRIANGLES, place, got, few, "simplify it")
+            ok, expected = (
+                (np.abs(mesh.vertices()) <= MAX_COORDINATE).all(),
+                f"coordinates up to {MAX_COORDINATE:,.0f}",
+            )
+            need(source, ok, place, "a mesh with other vertices", expected, "export it again")
     return geometry
 
 
@@ -150,25 +162,6 @@ def _check_mesh_file(path: Path) -> int:
         ok = plain and not beside.is_symlink() and (beside.is_file() or not beside.exists())
         check(ok, "", f"mtllib {shown(library)}", "the name of a file beside the mesh", "remove the line")
     return size
-
-
-def _check_loaded(model: pin.Model, bodies: pin.GeometryModel, tree: Element, name: str, kind: Kind) -> None:
-    """Compare the loaded bodies with the declared ones, and refuse meshes that cannot be used."""
-    check, loaded = partial(need, name), Counter[tuple[str, str]]()
-    for body in bodies.geometryObjects:
-        mesh, link, shape = body.geometry, link_of(model, body), type(body.geometry).__name__
-        loaded[link, "mesh" if shape.startswith(("BVHModel", "Convex")) else shape.lower()] += 1
-        if isinstance(mesh, coal.BVHModelBase):
-            got = f"a mesh of {mesh.num_tris:,} triangles"
-            few, most = mesh.num_tris <= MAX_TRIANGLES, f"at most {MAX_TRIANGLES:,}"
-            check(few, f"link {link!r}", got, most, "simplify it")
-            ok = (np.abs(mesh.vertices()) <= MAX_COORDINATE).all()
-            expected = f"coordinates within {MAX_COORDINATE:,.0f}"
-            check(ok, f"link {link!r}", "a mesh with other vertices", expected, "export it again")
-    declared = Counter((link, shape.tag) for link, shape in shapes(tree, kind))
-    for link, shape in (declared - loaded) | (loaded - declared):
-        got = f"{loaded[link, shape]} of {declared[link, shape]} {shape} bodies loaded"
-        check(False, f"link {link!r}", got, "every declared body", "check its spelling and its mesh")
 
 
 def link_of(model: pin.Model, body: pin.GeometryObject) -> str:

@@ -13,8 +13,7 @@ import pinocchio as pin
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.robots.bodies import build_bodies
-from posekit.robots.joint_map import JointMap
+from posekit.robots.bodies import build_bodies, link_of
 from posekit.skeleton import SIDES
 
 if TYPE_CHECKING:
@@ -22,9 +21,6 @@ if TYPE_CHECKING:
 
 #: Metres: a shorter part gets no capsule.
 SHORTEST: Final = 1e-3
-
-#: Start and end of a capsule's axis, and its radius, in shares of its segment's length.
-Shape = tuple[float, float, float]
 
 #: Parts of a humanoid, named as the stick figure's links, and the joints at their ends.
 PARTS: Final[Mapping[str, tuple[str, str]]] = {
@@ -46,12 +42,15 @@ PARTS: Final[Mapping[str, tuple[str, str]]] = {
 def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     """Build the collision bodies of a robot with capsules in place of meshes.
 
+    Capsules are laid along the segments between mapped joints. A segment with joints inside it, as a spine, is cut
+    there; each body carries its own part, named after the segment, with a number if there are several.
+
     Parameters
     ----------
     robot : Robot
         Its own primitive shapes stay. A humanoid without any body gets a capsule for every part.
     figure : Robot
-        The stick figure, whose capsules are laid along the limbs of a humanoid.
+        The stick figure, whose capsules are laid along the limbs in the same proportions.
     """
     model, plain, meshed = robot.model, copy.deepcopy(robot.tree), set[int]()
     for link in plain.findall("link"):
@@ -61,76 +60,46 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
                 frame = model.getFrameId(link.get("name", ""), pin.FrameType.BODY)
                 meshed.add(int(model.frames[frame].parentJoint))
     geometry = build_bodies(model, plain, (), robot.source, "collision")
-    only = meshed if meshed or len(geometry.geometryObjects) else None
     try:
-        joint_map = robot.joint_map
+        place = _neutral_points(robot)
     except InputError:  # no humanoid: nothing is known of its shape
         return geometry
-    shapes = part_shapes(figure.model, figure.geometry, figure.joint_map)
-    for body in limb_capsules(model, joint_map, shapes, only):
-        geometry.addGeometryObject(body)
+    only = meshed if meshed or geometry.ngeoms else range(model.njoints)
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    shapes = _proportions(figure)
+    for part, joints in PARTS.items():
+        if not place.keys() >= {*joints}:
+            continue
+        first, last, radius = shapes[part]
+        start, end = (place[name] for name in joints)
+        length = max(float(np.linalg.norm(end - start)), SHORTEST)
+        up, down = (list(model.supports[robot.joint_map[name].joint]) for name in joints)
+        common = len(set(up) & set(down))
+        carriers = [*reversed(up[common:]), *down[common - 1 :]]
+        # The joint between two bodies is the one further from the root.
+        places = [data.oMi[max(pair)].translation for pair in pairwise(carriers)]
+        edges = [float((place - start) @ (end - start)) / length**2 for place in places]
+        cuts = pairwise(np.clip([0.0, *edges, 1.0], first, last))
+        pieces = [
+            (joint, cut) for joint, cut in zip(carriers, cuts, strict=True) if np.ptp(cut) * length > SHORTEST
+        ]
+        for number, (joint, cut) in enumerate(pieces, 1):
+            if joint in only:
+                name = part if len(pieces) == 1 else f"{part}_{number}"
+                a, b = (data.oMi[joint].actInv(start + share * (end - start)) for share in cut)
+                geometry.addGeometryObject(_capsule(model, name, joint, a, b, radius * length))
     return geometry
 
 
-def limb_capsules(
-    model: pin.Model, joint_map: JointMap, shapes: Mapping[str, Shape], only: set[int] | None
-) -> list[pin.GeometryObject]:
-    """Lay the stick figure's capsules along the segments between mapped joints.
-
-    A segment with joints inside it, as a spine, is cut there; each body carries its own part.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-    joint_map : JointMap
-    shapes : dict
-        Capsule of each part in shares of its length; see `part_shapes`.
-    only : set of int, optional
-        Joints whose bodies get capsules; all by default.
-
-    Returns
-    -------
-    list of pinocchio.GeometryObject
-        Named after their part, with a number if there are several.
-    """
-    data = model.createData()
-    q = pin.neutral(model)
-    pin.forwardKinematics(model, data, q)
-    place = dict(zip(joint_map.points, _neutral_points(data, joint_map), strict=True))
-    bodies = []
-    for part, ends in PARTS.items():
-        if not place.keys() >= {*ends} or part not in shapes:
-            continue
-        a, along = place[ends[0]], place[ends[1]] - place[ends[0]]
-        length = float(np.linalg.norm(along))
-        carriers = _path(model, *(joint_map.points[name][0].joint for name in ends))
-        first, last, radius = shapes[part]
-        edges = [0.0]
-        for one, other in pairwise(carriers):
-            between = max(one, other)  # the joint between two bodies is the one further from the root
-            edges.append(float((data.oMi[between].translation - a) @ along) / max(length, SHORTEST) ** 2)
-        cuts = np.clip([*edges, 1.0], first, last)
-        parts = [
-            (joint, low, high)
-            for joint, low, high in zip(carriers, cuts[:-1], cuts[1:], strict=True)
-            if (high - low) * length > SHORTEST
-        ]
-        for number, (joint, low, high) in enumerate(parts):
-            if only is None or joint in only:
-                name = part if len(parts) == 1 else f"{part}_{number + 1}"
-                begin, end = (data.oMi[joint].actInv(a + share * along) for share in (low, high))
-                bodies.append(capsule(model, name, joint, begin, end, radius * length))
-    return bodies
-
-
-def part_shapes(model: pin.Model, geometry: pin.GeometryModel, joint_map: JointMap) -> dict[str, Shape]:
-    """Return the capsules of the stick figure in shares of the lengths of their parts."""
-    data, geometry_data = model.createData(), geometry.createData()
+def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
+    """Return the figure's capsules: start and end of the axis, and radius, in shares of their part's length."""
+    model, place, found = figure.model, _neutral_points(figure), {}
+    geometry: pin.GeometryModel = figure.geometry
+    data, geometry_data = model.createData(), pin.GeometryData(geometry)
     pin.updateGeometryPlacements(model, data, geometry, geometry_data, pin.neutral(model))
-    place = dict(zip(joint_map.points, _neutral_points(data, joint_map), strict=True))
-    found = {}
     for body, M in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):
-        part = str(model.frames[body.parentFrame].name)
+        part = link_of(model, body)
         if part in PARTS:
             start, end = (place[name] for name in PARTS[part])
             length = float(np.linalg.norm(end - start))
@@ -140,28 +109,22 @@ def part_shapes(model: pin.Model, geometry: pin.GeometryModel, joint_map: JointM
     return found
 
 
-def capsule(model: pin.Model, name: str, joint: int, a: Array, b: Array, radius: float) -> pin.GeometryObject:
+def _neutral_points(robot: Robot) -> dict[str, Array]:
+    """Return the mapped points at Pinocchio's neutral configuration, metres."""
+    points = robot.kinematics.positions(pin.neutral(robot.model)[None])[0]
+    return dict(zip(robot.joint_map, points, strict=True))
+
+
+def _capsule(
+    model: pin.Model, name: str, joint: int, a: Array, b: Array, radius: float
+) -> pin.GeometryObject:
     """Return a capsule between two places in a joint's frame, on the link of the joint."""
     length = float(np.linalg.norm(b - a))
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b - a) / length)
-    links = [k for k, frame in enumerate(model.frames) if frame.parentJoint == joint]
-    link = next((k for k in links if model.frames[k].type == pin.FrameType.BODY), links[0])
-    placement = pin.SE3(turn.toRotationMatrix(), (a + b) / 2)
-    return pin.GeometryObject(name, joint, link, placement, coal.Capsule(radius, length))
-
-
-def _neutral_points(data: pin.Data, joint_map: JointMap) -> list[Array]:
-    return [
-        np.sum([site.share * data.oMi[site.joint].act(np.array(site.offset)) for site in sites], axis=0)
-        for sites in joint_map.points.values()
+    frames = [
+        (frame.type != pin.FrameType.BODY, k)
+        for k, frame in enumerate(model.frames)
+        if frame.parentJoint == joint
     ]
-
-
-def _path(model: pin.Model, one: int, other: int) -> list[int]:
-    """List the joints whose bodies lead from one to another."""
-    up, down = [one], [other]
-    for chain in (up, down):
-        while chain[-1]:
-            chain.append(int(model.parents[chain[-1]]))
-    common = next(joint for joint in up if joint in down)
-    return [*up[: up.index(common)], common, *reversed(down[: down.index(common)])]
+    placement = pin.SE3(turn.toRotationMatrix(), (a + b) / 2)
+    return pin.GeometryObject(name, joint, min(frames)[1], placement, coal.Capsule(radius, length))

@@ -66,40 +66,37 @@ def set_joint(model: pin.Model, q: Array, joint: str, values: Array) -> None:
 
 def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
     """Order the columns of a table as q: see `Robot.q_from_columns`."""
-    table, check, model = np.asarray(values, dtype=np.float64), partial(need, ""), robot.model
+    table, check = np.asarray(values, dtype=np.float64), partial(need, "")
     ok = table.ndim == 2 and table.shape[1] == len(names)
     check(ok, "values", f"shape {table.shape}", f"(N, {len(names)})", "give each column a name")
-    q = np.tile(robot.neutral, (len(table), 1))
-    own: dict[str, tuple[int, ...]] = {_key(n): (k,) for k, n in enumerate(robot.configuration_names)}
-    joints = {}
-    for index in range(1, model.njoints):
-        if model.nvs[index] == 1:
-            at, width = int(model.idx_qs[index]), int(model.nqs[index])
-            joints[_key(model.names[index])] = str(model.names[index])
-            own[_key(model.names[index])] = tuple(range(at, at + width))
-    placed, ignored = list[int](), list[str]()
-    for column, name in zip(table.T, names, strict=True):
-        key = _key(name)
-        if key not in own:
-            ignored.append(str(name))
-            continue
-        check(not {*own[key]} & {*placed}, "columns", f"{shown(name)} twice", "each once", "remove one")
-        placed += own[key]
-        if key in joints:
-            set_joint(model, q, joints[key], column)
+    entries = {_key(name): k for k, name in enumerate(robot.configuration_names)}
+    columns, ignored = dict[str, Array](), list[str]()
+    for name, column in zip(names, table.T, strict=True):
+        key, found = _key(name), {_key(name): column}
+        if f"{key}.sin" in entries and f"{key}.x" not in entries:  # a continuous joint as one angle
+            found = {f"{key}.cos": np.cos(column), f"{key}.sin": np.sin(column)}
+        if entries.keys() >= found.keys():
+            check(not found.keys() & columns, "columns", f"{shown(name)} twice", "each once", "remove one")
+            columns |= found
         else:
-            q[:, own[key][0]] = column
+            ignored.append(str(name))
     remedy = nearest(ignored[0], robot.configuration_names) if ignored else "name the columns"
-    ok = bool(placed) and len(ignored) <= len(names) / 2
+    ok = bool(columns) and len(ignored) <= len(names) / 2
     check(ok, "columns", shown(ignored), f"joints of {robot.name}", remedy)
-    left = [name for k, name in enumerate(robot.configuration_names) if k not in placed]
-    for mimic in robot.mimics:
-        if mimic.joint in left:
-            left.remove(mimic.joint)
-            set_joint(model, q, mimic.joint, mimic.value(joint_values(model, q, mimic.target)))
+    q = np.tile(robot.neutral, (len(table), 1))
+    for key, column in columns.items():
+        q[:, entries[key]] = column
+    following = {_key(mimic.joint): mimic for mimic in robot.mimics}
+    for key, mimic in following.items():
+        if not {key, f"{key}.cos"} & columns.keys():
+            set_joint(robot.model, q, mimic.joint, mimic.value(joint_values(robot.model, q, mimic.target)))
+    absent = [name for name in robot.configuration_names if _key(name) not in columns]
+    left = [name for name in absent if _key(name).removesuffix(".cos").removesuffix(".sin") not in following]
     notes = []
     if left:
-        notes.append(f"{len(left)} of {model.nq} entries have no column and are neutral: {_listed(left)}.")
+        notes.append(
+            f"{len(left)} of {len(entries)} entries have no column and are neutral: {_listed(left)}."
+        )
     if ignored:
         notes.append(f"Columns that are no joint of {robot.name} are ignored: {_listed(ignored)}.")
     return q, tuple(notes)

@@ -55,13 +55,20 @@ class _Problem:
         if robot.free_flyer:
             self.pull[:6] = 0.0
         # A mimicking joint moves with its target: v = S u, u the entries of the other joints.
-        self.follow = np.eye(model.nv)
+        follow = np.eye(model.nv)
         for mimic in robot.mimics:
             one, other = (model.idx_vs[model.getJointId(name)] for name in (mimic.joint, mimic.target))
-            self.follow[one] = mimic.multiplier * self.follow[other]
-        self.free = np.flatnonzero(self.follow.any(axis=0))
-        rows = [int(model.idx_vs[model.getJointId(one.joint)]) for one in robot.mimics if one.multiplier]
-        self.mimicking = [(k, int(np.argmax(self.follow[k] != 0))) for k in rows if self.follow[k].any()]
+            follow[one] = mimic.multiplier * follow[other]
+        # Limits of a mimicking joint bound its target.
+        self.lower, self.upper = np.array(robot.lower), np.array(robot.upper)
+        for mimic in reversed(robot.mimics):
+            one, other = (model.getJointId(name) for name in (mimic.joint, mimic.target))
+            if mimic.multiplier and model.nqs[other] == 1:
+                at, to = model.idx_qs[one], model.idx_qs[other]
+                ends = sorted((end[at] - mimic.offset) / mimic.multiplier for end in (self.lower, self.upper))
+                self.lower[to], self.upper[to] = max(self.lower[to], ends[0]), min(self.upper[to], ends[1])
+        self.free = np.flatnonzero(follow.any(axis=0))
+        self.follow = follow[:, self.free]
 
     def cost(self, q: Array, start: Array, rows: Ints) -> Array:
         """Return half the sum of squared distances, and of the pull toward the start (n,)."""
@@ -79,13 +86,9 @@ class _Problem:
         gradient = (gap[:, None] @ J)[:, 0] + away * self.pull
         H = J.transpose(0, 2, 1) @ J + np.diag(self.pull)
         lowest, highest = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
-        lowest[:, self.at_v] = self.robot.lower[self.at_q] - q[:, self.at_q]
-        highest[:, self.at_v] = self.robot.upper[self.at_q] - q[:, self.at_q]
-        for one, other in self.mimicking:  # limits of a mimicking joint bound its target
-            ends = lowest[:, one] / self.follow[one, other], highest[:, one] / self.follow[one, other]
-            lowest[:, other] = np.maximum(lowest[:, other], np.minimum(np.minimum(*ends), 0.0))
-            highest[:, other] = np.minimum(highest[:, other], np.maximum(np.maximum(*ends), 0.0))
-        S = self.follow[:, self.free]
+        lowest[:, self.at_v] = self.lower[self.at_q] - q[:, self.at_q]
+        highest[:, self.at_v] = self.upper[self.at_q] - q[:, self.at_q]
+        S = self.follow
         gradient, H = gradient @ S, S.T @ H @ S
         lowest, highest = lowest[:, self.free], highest[:, self.free]
         diagonal = np.arange(len(self.free))
@@ -96,7 +99,7 @@ class _Problem:
         """Take steps (n, nv); rounding does not pass a limit."""
         out = np.array([pin.integrate(self.model, a, b) for a, b in zip(q, step, strict=True)])
         out = out.reshape(len(q), self.model.nq)
-        return self.robot.with_mimics(np.clip(out, self.robot.lower, self.robot.upper))
+        return self.robot.with_mimics(np.clip(out, self.lower, self.upper))
 
     def difference(self, start: Array, q: Array) -> Array:
         """Return the steps (n, nv) from configurations to others."""
@@ -112,7 +115,7 @@ class _Problem:
         """Move the floating root so that the trunk lies best on its targets (Kabsch 1976)."""
         if not self.robot.free_flyer:
             return q
-        columns = self.robot.joint_map.columns
+        columns = [POINTS.index(name) for name in self.robot.joint_map]
         trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
         chosen = trunk if len(trunk) > 2 else list(range(len(columns)))
         points = self.kinematics.positions(q)[:, chosen]
@@ -169,12 +172,12 @@ def solve(
         raise refusal("", "joints", f"shape {given.shape}", expected, "give them in the order of JOINTS")
     padded = np.full((len(given), len(POINTS), 3), np.nan)
     padded[:, : given.shape[1]] = given
-    problem = _Problem(robot, padded[:, robot.joint_map.columns])
+    problem = _Problem(robot, padded[:, [POINTS.index(name) for name in robot.joint_map]])
     every = np.arange(len(given))
     if start is None:
         first = problem.laid(np.tile(robot.neutral, (len(given), 1)))
     else:
-        first = robot.with_mimics(np.clip(robot.checked(start, "start"), robot.lower, robot.upper))
+        first = robot.with_mimics(np.clip(robot.checked(start, "start"), problem.lower, problem.upper))
     q, cost = _descend(problem, first, first, every)
     worst = problem.worst(q)
     for seed in range(SEEDS if len(given) else 0):

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -15,15 +15,13 @@ import pinocchio as pin
 from posekit.errors import nearest, refusal, shown
 from posekit.files import DATA
 from posekit.geometry import Array
-from posekit.robots.kinematics import Kinematics, Site
+from posekit.robots.kinematics import Site
 from posekit.robots.urdf import need
 from posekit.skeleton import POINTS, SIDES
 
 SCHEMA: Final = "posekit.joint_map/1"
 #: Maps of the package, in the order in which they are tried.
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
-#: Name of a map that was derived from the model.
-DERIVED: Final = "names of its joints"
 
 #: Words in names of joints, by part.
 _PARTS: Final = {
@@ -40,28 +38,8 @@ _SIDE_WORDS: Final = {
 }
 
 
-class JointMap(NamedTuple):
-    """Places of a model that stand for points of a posture.
-
-    Attributes
-    ----------
-    name : str
-        Name in reports and errors.
-    points : dict
-        Places of each point of `posekit.skeleton.POINTS` that the model has.
-    """
-
-    name: str
-    points: Mapping[str, tuple[Site, ...]]
-
-    def kinematics(self, model: pin.Model) -> Kinematics:
-        """Return the kinematics of the mapped points, in the order of `posekit.skeleton.POINTS`."""
-        return Kinematics(model, [self.points[name] for name in POINTS if name in self.points])
-
-    @property
-    def columns(self) -> tuple[int, ...]:
-        """Indices into `posekit.skeleton.POINTS` of the mapped points."""
-        return tuple(k for k, name in enumerate(POINTS) if name in self.points)
+#: Places of a model that stand for points of `posekit.skeleton.POINTS`, in that order.
+JointMap = Mapping[str, Site]
 
 
 def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
@@ -72,20 +50,13 @@ def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
     InputError
         If there is no such map, it is not as ``posekit.joint_map/1`` requires, or the model lacks one of its frames.
     """
-    frames, points = _frames(model), dict[str, tuple[Site, ...]]()
-    for group in ("points", "optional"):
-        for point, place in _table(str(name)).get(group, {}).items():
-            need(name, point in POINTS, group, shown(point), "a joint's name", nearest(point, POINTS))
-            sites = place["mean"] if isinstance(place, dict) and "mean" in place else [place]
-            absent = [_frame(site) for site in sites if _frame(site) not in frames]
-            if absent and group == "points":
-                near = nearest(str(absent[0]), list(frames)[:1000])
-                raise refusal(name, f"{group}.{point}", shown(absent[0]), "a frame of the model", near)
-            if not absent:
-                read = [_site(site, model, frames, f"{name}: {group}.{point}") for site in sites]
-                total = sum(site.share for site in read)
-                points[point] = tuple(site._replace(share=site.share / total) for site in read)
-    return JointMap(Path(name).stem, points)
+    frames, found = _frames(model), dict[str, Site]()
+    for point, (frame, offset) in _places(str(name)).items():
+        remedy = nearest(str(frame), list(frames)[:1000])
+        need(name, frame in frames, f"points.{point}", shown(frame), "a frame of the model", remedy)
+        at = model.frames[frames[frame]]
+        found[point] = _site(int(at.parentJoint), at.placement.act(np.array(offset, dtype=np.float64)))
+    return {point: found[point] for point in POINTS if point in found}
 
 
 def find_joint_map(model: pin.Model, source: str = "") -> JointMap:
@@ -98,8 +69,7 @@ def find_joint_map(model: pin.Model, source: str = "") -> JointMap:
     """
     frames = _frames(model)
     for name in BUILT_IN:
-        places = _table(name)["points"].values()
-        if all(_frame(place) in frames for place in places):
+        if all(frame in frames for frame, _ in _places(name).values()):
             return load_joint_map(name, model)
     if (derived := _derived(model)) is not None:
         return derived
@@ -132,62 +102,32 @@ def _derived(model: pin.Model) -> JointMap | None:
     }
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
-    points = {name: (Site(joint, (0.0, 0.0, 0.0), 1.0),) for name, joint in joint_of.items()}
+    points = {name: _site(joint, np.zeros(3)) for name, joint in joint_of.items()}
     for name, part in (("neck", "shoulder"), ("pelvis", "hip")):
         right, left = (joint_of[f"{side}_{part}"] for side in SIDES)
-        carrier = _common(model, chains[f"right_{part}"][0], chains[f"left_{part}"][0])
+        carriers = (set(model.supports[chains[f"{side}_{part}"][0]]) for side in SIDES)
+        carrier = max(set.intersection(*carriers))
         middle = (data.oMi[right].translation + data.oMi[left].translation) / 2
-        local = data.oMi[carrier].actInv(middle) if name == "neck" else np.zeros(3)
-        points[name] = (Site(carrier, _triple(local), 1.0),)
-    return JointMap(DERIVED, points)
-
-
-def _common(model: pin.Model, one: int, other: int) -> int:
-    """Return the joint that carries both."""
-    above = {one}
-    while one:
-        one = int(model.parents[one])
-        above.add(one)
-    while other not in above:
-        other = int(model.parents[other])
-    return other
+        points[name] = _site(carrier, data.oMi[carrier].actInv(middle) if name == "neck" else np.zeros(3))
+    return {point: points[point] for point in POINTS if point in points}
 
 
 def _frames(model: pin.Model) -> dict[str, int]:
     """Return the frames by name; a link goes before a joint of the same name."""
-    found: dict[str, int] = {}
-    for index, frame in enumerate(model.frames):
-        if index and (frame.name not in found or frame.type == pin.FrameType.BODY):
-            found[str(frame.name)] = index
-    return found
+    frames = sorted(enumerate(model.frames), key=lambda one: one[1].type == pin.FrameType.BODY)
+    return {str(frame.name): index for index, frame in frames}
 
 
-def _site(place: Any, model: pin.Model, frames: Mapping[str, int], where: str) -> Site:
-    """Read a place of a table: a frame's name, or a frame with an offset and a weight."""
-    entry = place if isinstance(place, dict) else {}
-    values = [*entry.get("offset", (0.0, 0.0, 0.0)), entry.get("weight", 1.0)]
-    ok = len(values) == 4 and all(isinstance(value, int | float) and np.isfinite(value) for value in values)
-    expected = "a frame, three finite offsets in metres and a positive weight"
-    need(where, ok and values[3] > 0, "", shown(values), expected, "correct the joint map")
-    frame = model.frames[frames[_frame(place)]]
-    offset = frame.placement.act(np.array(values[:3], float))
-    return Site(int(frame.parentJoint), _triple(offset), float(values[3]))
-
-
-def _frame(place: Any) -> Any:
-    return place.get("frame") if isinstance(place, dict) else place
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
+def _site(joint: int, offset: Array) -> Site:
+    return Site(joint, (float(offset[0]), float(offset[1]), float(offset[2])))
 
 
 @lru_cache(maxsize=16)
-def _table(name: str) -> dict[str, Any]:
-    built_in = name in BUILT_IN
-    place = DATA / "joint_maps" / f"{name}.toml" if built_in else Path(name)
+def _places(name: str) -> dict[str, tuple[Any, Any]]:
+    """Read a joint map: the frame of each point, and the offset in that frame."""
+    path = DATA / "joint_maps" / f"{name}.toml" if name in BUILT_IN else Path(name)
     try:
-        table = tomllib.loads(place.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError:
         remedy = f"built-in maps are {', '.join(BUILT_IN)}"
         raise refusal(name, "", "no such joint map", "a name or a TOML file", remedy) from None
@@ -195,4 +135,14 @@ def _table(name: str) -> dict[str, Any]:
         raise refusal(name, "", str(error), "TOML", "correct it") from None
     if table.get("schema") != SCHEMA or not isinstance(table.get("points"), dict):
         raise refusal(name, "schema", shown(table.get("schema")), SCHEMA, "write schema and [points]")
-    return table
+    places = {}
+    for point, place in table["points"].items():
+        need(name, point in POINTS, "points", shown(point), "a joint's name", nearest(point, POINTS))
+        entry = place if isinstance(place, dict) else {"frame": place}
+        frame, offset = entry.get("frame"), entry.get("offset", [0.0, 0.0, 0.0])
+        ok = isinstance(offset, list) and len(offset) == 3
+        ok = ok and all(isinstance(value, int | float) and np.isfinite(value) for value in offset)
+        expected = "a frame, or a frame and three finite offsets in metres"
+        need(name, ok and isinstance(frame, str), f"points.{point}", shown(place), expected, "correct it")
+        places[point] = frame, offset
+    return places

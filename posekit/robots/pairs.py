@@ -8,30 +8,61 @@ from collections.abc import Collection
 import numpy as np
 import pinocchio as pin
 
+from posekit.errors import cut, nearest, refusal, shown
 from posekit.geometry import Array
 from posekit.robots.bodies import link_of
 from posekit.robots.capsules import PARTS
-from posekit.robots.urdf import SrdfPairs
+from posekit.robots.urdf import need, parse_xml
 
-#: Pairs of parts that are checked.
-Parts = Collection[frozenset[str]]
+#: Pairs of links or of parts.
+Pairs = Collection[frozenset[str]]
 
 
-def set_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: SrdfPairs | None, parts: Parts) -> None:
+def disabled_pairs(text: str, source: str, links: Collection[str], *, strict: bool = True) -> Pairs:
+    """Read the pairs of links that an SRDF disables.
+
+    Parameters
+    ----------
+    text, source : str
+        The SRDF and its name in errors.
+    links : collection of str
+        The robot's links.
+    strict : bool
+        Refuse unknown links. Published robots share one SRDF among variants; its foreign pairs are passed over.
+
+    Raises
+    ------
+    InputError
+        If the text is no SRDF or names an unknown link.
+    """
+    robot = parse_xml(text, source)
+    need(source, robot.tag == "robot", "", f"the root element <{cut(robot.tag)}>", "<robot>", "name an SRDF")
+    pairs = {
+        frozenset((one.get("link1", ""), one.get("link2", ""))) for one in robot.findall("disable_collisions")
+    }
+    for name in sorted(frozenset[str]().union(*pairs).difference(links)) if strict else ():
+        remedy = nearest(name, sorted(links)) if len(links) < 50 else "name this robot's SRDF"
+        raise refusal(
+            source, "<disable_collisions>", f"the link {shown(name)}", "a link of the robot", remedy
+        )
+    return pairs
+
+
+def set_pairs(model: pin.Model, geometry: pin.GeometryModel, disabled: Pairs, parts: Pairs) -> None:
     """Set the pairs of bodies to check.
 
-    With an SRDF, all pairs of bodies on different joints that it leaves. Without, all pairs but those of neighbours,
-    and those that touch in the neutral configuration. Of capsules that stand for a humanoid's parts, only the pairs in
-    `parts` are checked.
+    With pairs that an SRDF disables, all other pairs of bodies on different joints. Without, all pairs but those of
+    neighbours, and those that touch in the neutral configuration. Of capsules that stand for a humanoid's parts, only
+    the pairs in `parts` are checked.
     """
     geometry.addAllCollisionPairs()
-    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
-    if srdf is not None:
-        links = [link_of(model, body) for body in geometry.geometryObjects]
-        kept = [(a, b) for a, b in pairs if srdf.checked(links[a], links[b])]
+    pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects
+    if disabled:
+        links = [link_of(model, body) for body in bodies]
+        kept = [(a, b) for a, b in pairs if frozenset((links[a], links[b])) not in disabled]
     else:
-        near, joints = _neighbours(model, geometry), [body.parentJoint for body in geometry.geometryObjects]
-        names = [re.sub(r"_\d+$", "", body.name) for body in geometry.geometryObjects]
+        near, joints = _neighbours(model, geometry), [body.parentJoint for body in bodies]
+        names = [re.sub(r"_\d+$", "", body.name) for body in bodies]
         data, geometry_data = model.createData(), geometry.createData()
         pin.computeCollisions(model, data, geometry, geometry_data, neutral_inside(model), False)
         kept = []

@@ -7,6 +7,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 from xml.etree import ElementTree
@@ -16,15 +17,16 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.errors import cut, one_line, refusal, shown
+from posekit.files import read_bytes, text
 from posekit.geometry import Array, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
 from posekit.robots.capsules import capsule_bodies
 from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of, set_joint
 from posekit.robots.find import FIGURE, directory, find
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
-from posekit.robots.kinematics import SUFFIXES, Kinematics, configuration_names, rotation_entries
-from posekit.robots.pairs import neutral_inside, set_pairs
-from posekit.robots.urdf import SrdfPairs, check_srdf, check_urdf, need, read_text
+from posekit.robots.kinematics import Kinematics, entries_of
+from posekit.robots.pairs import Pairs, disabled_pairs, neutral_inside, set_pairs
+from posekit.robots.urdf import check_urdf, need, text_with
 from posekit.skeleton import JOINTS, POINTS
 
 if TYPE_CHECKING:
@@ -101,21 +103,14 @@ class Robot(Record):
     def model(self) -> pin.Model:
         """Pinocchio's model. Mimicking joints have entries of q of their own: see `mimics`."""
         moving = [str(one.get("name")) for one in self.tree.findall("joint") if one.get("type") != "fixed"]
-        text = ElementTree.tostring(self.tree, encoding="unicode")
+        urdf = text_with(self.tree)
         root = next(name for name in ROOT_NAMES if name not in moving)
-        added = [] if self.fixed_base or _floats(self.tree) else [root]
+        added = () if self.fixed_base or _floats(self.tree) else (pin.JointModelFreeFlyer(), root)
         try:
-            if added:
-                model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer(), root)
-            else:
-                model = pin.buildModelFromXML(text)
+            return pin.buildModelFromXML(urdf, *added)
         except (ValueError, RuntimeError) as error:
             got = f"a URDF that Pinocchio cannot read ({cut(one_line(str(error).splitlines()[0]))})"
             raise refusal(self.source, "", got, "a URDF", "correct it") from None
-        got, expected = f"{model.njoints - 1} joints read by Pinocchio", f"{len(moving)} of the text"
-        read = sorted(list(model.names)[1:]) == sorted([*added, *moving])
-        need(self.source, read, "", got, expected, "give the joints other names")
-        return model
 
     @cached_property
     def free_flyer(self) -> bool:
@@ -129,13 +124,18 @@ class Robot(Record):
             return None
         if self.bodies == "meshes":
             geometry = build_bodies(self.model, self.tree, self.package_dirs, self.source, "collision")
-            set_pairs(self.model, geometry, self._srdf, ())
-            return geometry
-        figure = load_robot(FIGURE[0])
-        links = dict(zip(figure.body_names, figure.body_links, strict=True))
-        geometry = capsule_bodies(self, figure)
-        parts = {frozenset(links[name] for name in pair) for pair in figure.collision_pairs}
-        set_pairs(self.model, geometry, self._srdf, parts)
+            parts = set[frozenset[str]]()
+        else:
+            figure = load_robot(FIGURE[0])
+            links = dict(zip(figure.body_names, figure.body_links, strict=True))
+            geometry = capsule_bodies(self, figure)
+            parts = {frozenset(links[name] for name in pair) for pair in figure.collision_pairs}
+        disabled: Pairs = ()
+        if self.srdf is not None:
+            names = [link.get("name", "") for link in self.tree.findall("link")]
+            source = f"{self.source}, SRDF"
+            disabled = disabled_pairs(self.srdf, source, names, strict=not self.shared_srdf)
+        set_pairs(self.model, geometry, disabled, parts)
         return geometry
 
     @cached_property
@@ -161,18 +161,21 @@ class Robot(Record):
     @cached_property
     def configuration_names(self) -> tuple[str, ...]:
         """Name of each entry of q: the joint's; x, y, z, qx, qy, qz, qw of the root; ``.cos``, ``.sin``."""
-        return configuration_names(self.model)
+        names = self.model.names
+        entries = [
+            (joint, suffix, joint == 1 and self.free_flyer) for joint, suffix in entries_of(self.model)
+        ]
+        return tuple(
+            end if root else f"{names[joint]}.{end}" if end else names[joint] for joint, end, root in entries
+        )
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Unit of each entry of q: ``rad``, ``m``, or empty for quaternions, cosines and sines."""
         slides = {one.get("name") for one in self.tree.findall("joint") if one.get("type") == "prismatic"}
-        units = []
-        for joint in range(1, self.model.njoints):
-            own = "m" if self.model.names[joint] in slides else "rad"
-            ends = SUFFIXES.get(self.model.joints[joint].shortname())
-            units += [own] if ends is None else ["m" if end in ("x", "y", "z") else "" for end in ends]
-        return tuple(units)
+        names, units = self.model.names, {"": "rad", "x": "m", "y": "m", "z": "m"}
+        entries = entries_of(self.model)
+        return tuple("m" if names[joint] in slides else units.get(end, "") for joint, end in entries)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
@@ -221,7 +224,7 @@ class Robot(Record):
     @cached_property
     def kinematics(self) -> Kinematics:
         """The kinematics of the mapped points."""
-        return self.joint_map.kinematics(self.model)
+        return Kinematics(self.model, list(self.joint_map.values()))
 
     def checked(self, q: ArrayLike, source: str = "q") -> Array:
         """Check configurations: Pinocchio accepts quaternions of any length.
@@ -248,13 +251,15 @@ class Robot(Record):
         for row, column in np.argwhere(~np.isfinite(q))[:1]:
             place = f"row {row}: {self.configuration_names[column]}"
             check(False, place, shown(float(q[row, column])), "a finite number", "leave the row out")
-        for first, last, joint in rotation_entries(self.model):
-            length = np.linalg.norm(q[:, first:last], axis=1)
+        turning = [(joint, k) for k, (joint, end) in enumerate(entries_of(self.model)) if len(end) > 1]
+        for joint, group in itertools.groupby(turning, key=itemgetter(0)):
+            columns = [k for _, k in group]
+            length = np.linalg.norm(q[:, columns], axis=1)
             for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
-                what = "a quaternion" if last - first == 4 else "a cosine and sine"
+                what = "a quaternion" if len(columns) == 4 else "a cosine and sine"
                 got, remedy = f"{what} of length {length[row]:.4g}", "check the order of q, and normalise it"
-                check(False, f"row {row}: {joint}", got, "length 1", remedy)
-            q[:, first:last] /= length[:, None]
+                check(False, f"row {row}: {self.model.names[joint]}", got, "length 1", remedy)
+            q[:, columns] /= length[:, None]
         return q
 
     def with_mimics(self, q: Array) -> Array:
@@ -308,7 +313,7 @@ class Robot(Record):
             If the robot has no joint map, or q is not as `checked` requires.
         """
         out = np.full((len(q := self.checked(q)), len(POINTS), 3), np.nan)
-        out[:, self.joint_map.columns] = self.kinematics.positions(q)
+        out[:, [POINTS.index(name) for name in self.joint_map]] = self.kinematics.positions(q)
         return out[:, : len(JOINTS)]
 
     def velocities(self, q: Array, time: Array) -> Array:
@@ -382,15 +387,6 @@ class Robot(Record):
 
         return SelfCollision(self.model, self.geometry or pin.GeometryModel())
 
-    @cached_property
-    def _srdf(self) -> SrdfPairs | None:
-        """Pairs of the SRDF; None if there is none, or if it disables no pair and so was not written for collisions."""
-        if self.srdf is None:
-            return None
-        links = [link.get("name", "") for link in self.tree.findall("link")]
-        srdf = check_srdf(self.srdf, f"{self.source}, SRDF", links, strict=not self.shared_srdf)
-        return srdf if srdf.disabled or srdf.alone else None
-
     def _limits(self, limits: Array, none: float) -> Array:
         """Return limits (nq,) with none for joints of several entries."""
         single = [self.model.idx_qs[j] for j in range(1, self.model.njoints) if self.model.nqs[j] == 1]
@@ -449,6 +445,11 @@ def load_robot(
         joint_map_file=str(joint_map),
         shared_srdf=files.built_in and srdf is None,
     )
+
+
+def read_text(path: str | Path) -> str:
+    """Read a URDF or SRDF file."""
+    return text(read_bytes(path), str(path))
 
 
 def _floats(tree: ElementTree.Element) -> bool:

@@ -11,12 +11,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from posekit.errors import refusal
-from posekit.geometry import Array, cross, rotation_between
+from posekit.geometry import Array, align, rotation_between
 from posekit.robots.urdf import SIZES, Element, numbers
-from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS
+from posekit.skeleton import HIPS, JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS, TORSO
 
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
@@ -62,8 +61,8 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     place = {str(frame.name): data.oMf[k] for k, frame in frames if frame.type == pin.FrameType.BODY}
     moved, grown = set[str](), set[str]()
     for name in ("pelvis", *JOINTS):
-        if name in robot.joint_map.points and np.isfinite(wanted[JOINT[name]]).all():
-            site = robot.joint_map.points[name][0]
+        if name in robot.joint_map and np.isfinite(wanted[JOINT[name]]).all():
+            site = robot.joint_map[name]
             link = child_of.get(str(model.names[site.joint]), root)
             end = wanted[JOINT[name]] - place[link].rotation @ np.array(site.offset)
             path = []
@@ -98,16 +97,13 @@ def _stretch(
     for link in path:
         above, before = _parent(joints[link]), _xyz(joints[link])
         R = place[above].rotation
-        after = ratio * R.T @ turn @ R @ before
-        if not stretched and link == path[-1]:
-            after = R.T @ new
-        twins = [other for other, joint in joints.items() if _parent(joint) == above]
-        for other in twins:
-            if other == link or np.allclose(_xyz(joints[other]), before, atol=SAME):
+        after = R.T @ (ratio * turn @ R @ before if stretched or link != path[-1] else new)
+        for other, joint in joints.items():
+            if _parent(joint) == above and np.allclose(_xyz(joint), before, atol=SAME):
                 changed.add(other)
-                if joints[other].find("origin") is None:
-                    ElementTree.SubElement(joints[other], "origin")
-                _set(joints[other].findall("origin")[0], "xyz", after)
+                if joint.find("origin") is None:
+                    ElementTree.SubElement(joint, "origin")
+                _set(joint.findall("origin")[0], "xyz", after)
         if above in joints and above not in grown:
             grown.add(above)
             _grow(links[above], ratio)
@@ -153,7 +149,11 @@ def segment_lengths(joints: Array) -> Array:
 
 
 def _wanted(own: Array, joints: Array, source: str) -> Array:
-    """Return places (14, 3) of the joints at neutral that have the lengths of postures, near the robot's own."""
+    """Return places (14, 3) of the joints at neutral that have the lengths of postures, near the robot's own.
+
+    Torso and hips have the median shape of the postures in which they are whole, laid on the robot's own; limbs keep
+    the robot's directions.
+    """
     lengths, kept = segment_lengths(joints), segment_lengths(own[None])
     ratio = lengths / kept
     lengths = np.where(np.isfinite(lengths), lengths, kept)
@@ -161,46 +161,16 @@ def _wanted(own: Array, joints: Array, source: str) -> Array:
         a, b = SEGMENTS[int(np.argmax(wrong))]
         got = f"{lengths[wrong][0]:g} m from {JOINTS[a]} to {JOINTS[b]}, where the robot has {kept[wrong][0]:g} m"
         raise refusal(source, "lengths", got, "a similar length", "give the joints in metres")
-    of = dict(zip(SEGMENTS, lengths, strict=True))
-    wanted, (neck, right, left, pelvis) = own.copy(), range(4)
-    ratio = of[neck, pelvis] / kept[SEGMENTS.index((neck, pelvis))]
-    wanted[neck] = own[pelvis] + (own[neck] - own[pelvis]) * ratio
-    wanted[[right, left]] += wanted[neck] - own[neck]
-    if _forward(joints) * _forward(own[None]) < 0:  # lengths do not tell a trunk from its mirror image
-        normal = cross(own[neck] - own[pelvis], own[left] - own[right])
-        normal /= np.linalg.norm(normal)
-        for k in (right, left):
-            wanted[k] -= 2 * ((wanted[k] - wanted[neck]) @ normal) * normal
-    _lay_pair(wanted, (right, left), (neck, pelvis), of)
-    _lay_pair(wanted, (JOINT["right_hip"], JOINT["left_hip"]), (pelvis,), of)
-    for start, end in LIMB_SEGMENTS:
-        along = own[end] - own[start]
-        wanted[end] = wanted[start] + along * of[start, end] / np.linalg.norm(along)
+    wanted, pelvis = own.copy(), JOINT["pelvis"]
+    for part in (TORSO, HIPS):
+        columns = [JOINT[name] for name in part]
+        whole = np.isfinite(joints[:, columns]).all(axis=(1, 2))
+        if whole.any() and np.isfinite(own[columns]).all():
+            shapes = joints[whole][:, columns]
+            shape = np.median(align(shapes, own[columns], scale=False).apply(shapes), axis=0)
+            wanted[columns] = shape + (own[pelvis] - shape[columns.index(pelvis)])
+    for (start, end), length in zip(SEGMENTS, lengths, strict=True):
+        if (start, end) in LIMB_SEGMENTS:
+            along = own[end] - own[start]
+            wanted[end] = wanted[start] + along * length / np.linalg.norm(along)
     return wanted
-
-
-def _lay_pair(
-    points: Array, pair: tuple[int, ...], anchors: tuple[int, ...], of: Mapping[tuple[int, int], float]
-) -> None:
-    """Move two points, in place and as little as possible, to given distances from each other and from anchors."""
-    if not np.isfinite(points[[*pair, *anchors]]).all():
-        return
-    middle, half = points[list(pair)].mean(axis=0), (points[pair[1]] - points[pair[0]]) / 2
-    half *= of[pair[0], pair[1]] / (2 * np.linalg.norm(half))
-    points[pair[0]], points[pair[1]] = middle - half, middle + half
-    links = [(a, b, of[a, b]) for a, b in of if {a, b} <= {*pair, *anchors} and {a, b} & {*pair}]
-
-    def misses(places: Array) -> list[float]:
-        moved = points.copy()
-        moved[list(pair)] = places.reshape(2, 3)
-        return [float(np.linalg.norm(moved[a] - moved[b])) - length for a, b, length in links]
-
-    start, exact = points[list(pair)].ravel(), {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    points[list(pair)] = least_squares(misses, start, **exact).x.reshape(2, 3)
-
-
-def _forward(joints: Array) -> float:
-    """Return how far the shoulders lie in front of the line from neck to pelvis; NaN if unseen."""
-    neck, right, left, pelvis = (joints[:, k] for k in range(4))
-    ahead = np.einsum("ni,ni->n", cross(pelvis - neck, left - right), (left + right) / 2 - neck)
-    return float(np.nanmedian(ahead)) if np.isfinite(ahead).any() else float("nan")

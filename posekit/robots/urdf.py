@@ -6,18 +6,19 @@ length, and overflows its stack on long chains. All of these are refused here, w
 
 from __future__ import annotations
 
+import copy
 import math
 import re
+import sys
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
-from itertools import chain
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final
 from xml.etree import ElementTree
 
 import defusedxml
-from defusedxml.ElementTree import DefusedXMLParser
+import defusedxml.ElementTree
 
 from posekit.errors import cut, nearest, one_line, refusal, shown
 
@@ -25,7 +26,8 @@ Element = ElementTree.Element
 
 #: Bytes of a URDF or SRDF; published ones have at most 0.3 MB.
 MAX_BYTES: Final = 10_000_000
-MAX_ELEMENTS, MAX_NESTING = 100_000, 64
+#: Elements inside each other; readers recurse.
+MAX_NESTING: Final = 64
 #: Links of a robot; the largest published ones have about 150.
 MAX_LINKS: Final = 1000
 #: Links from the root to a leaf; Pinocchio's reader overflows its stack at about 5000.
@@ -43,6 +45,8 @@ DEGREES: Final = (15.0, 720.0)
 
 #: Degrees of freedom of each joint type.
 FREEDOM: Final = {"fixed": 0, "revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
+#: Types whose axis has no meaning.
+UNTURNED: Final = ("fixed", "floating")
 #: Shapes, and the attributes of each that must be positive.
 SIZES: Final[dict[str, tuple[str, ...]]] = {
     **{"box": ("size",), "sphere": ("radius",), "mesh": ()},
@@ -66,45 +70,10 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASC
 Need = Callable[[object, str, str, str, str], None]
 
 
-class SrdfPairs(NamedTuple):
-    """Pairs of links in an SRDF: disabled ones, enabled ones, links without default pairs, unknown links."""
-
-    disabled: frozenset[frozenset[str]]
-    enabled: frozenset[frozenset[str]]
-    alone: frozenset[str]
-    unknown: tuple[str, ...]
-
-    def checked(self, link: str, other: str) -> bool:
-        """Return whether a pair of links is left to be checked."""
-        pair = frozenset((link, other))
-        return pair in self.enabled or not (pair in self.disabled or self.alone & pair)
-
-
 def need(source: str | Path, ok: object, place: str, got: str, expected: str, remedy: str) -> None:
     """Raise a refusal unless a condition is true."""
     if not ok:
         raise refusal(source, place, got, expected, remedy)
-
-
-def read_text(path: str | Path) -> str:
-    """Read a URDF or SRDF file: a regular file in UTF-8 of at most 10 MB.
-
-    Raises
-    ------
-    InputError
-        If it is missing, not a regular file, empty, larger, or not text.
-    """
-    path = Path(path)
-    try:
-        got = "no regular file" if path.exists() else "no such file"
-        need(path, path.is_file(), "", got, "a URDF file", "check the name")
-        size = path.stat().st_size
-        need(path, 0 < size <= MAX_BYTES, "", f"{size:,} bytes", f"1 to {MAX_BYTES:,} bytes", "name a URDF")
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise refusal(path, f"byte {error.start}", "no UTF-8", "text in UTF-8", "save it as UTF-8") from None
-    except (OSError, ValueError) as error:
-        raise refusal(path, "", cut(str(error)), "a readable file", "check its permissions") from None
 
 
 def parse_xml(text: str, source: str | Path) -> Element:
@@ -115,35 +84,20 @@ def parse_xml(text: str, source: str | Path) -> Element:
     InputError
         If it is malformed (line and column are given), declares a DOCTYPE or an entity, or exceeds a bound.
     """
-    parser = DefusedXMLParser(target=_BoundedBuilder(source), forbid_dtd=True)
+    check = partial(need, source)
+    check(len(text) <= MAX_BYTES, "", f"{len(text):,} bytes", f"at most {MAX_BYTES:,}", "simplify the file")
     try:
-        parser.feed(text)
-        root: Element = parser.close()
+        root: Element = defusedxml.ElementTree.fromstring(text, forbid_dtd=True)
     except defusedxml.DefusedXmlException:
         raise refusal(source, "", "a DOCTYPE or entities", "XML without them", "remove them") from None
     except (ElementTree.ParseError, ValueError) as error:
         got = f"no well-formed XML ({cut(one_line(str(error)))})"
         raise refusal(source, "", got, "XML in UTF-8", "correct the file there") from None
+    level, depth = [root], 0
+    while level:
+        level, depth = [child for parent in level for child in parent], depth + 1
+    check(depth <= MAX_NESTING, "", f"{depth} nested elements", f"at most {MAX_NESTING}", "simplify the file")
     return root
-
-
-class _BoundedBuilder(ElementTree.TreeBuilder):
-    """Build the tree; stop if it is too deep or too large."""
-
-    def __init__(self, source: str | Path) -> None:
-        super().__init__()
-        self._need, self._depth, self._count = partial(need, source), 0, 0
-
-    def start(self, tag: str, attrs: Mapping[Any, Any]) -> Element:
-        self._depth, self._count = self._depth + 1, self._count + 1
-        ok = self._depth <= MAX_NESTING and self._count <= MAX_ELEMENTS
-        got = f"element {self._count:,} at depth {self._depth}"
-        self._need(ok, "", got, f"at most {MAX_ELEMENTS:,} elements, {MAX_NESTING} deep", "simplify the file")
-        return super().start(tag, dict(attrs))
-
-    def end(self, tag: str) -> Element:
-        self._depth -= 1
-        return super().end(tag)
 
 
 def check_urdf(text: str, source: str) -> Element:
@@ -175,65 +129,39 @@ def check_urdf(text: str, source: str) -> Element:
         for child in list(part):
             if part.tag in _KEPT and child.tag not in _KEPT[part.tag]:
                 part.remove(child)
-    links = robot.findall("link")
+    links, joints = robot.findall("link"), robot.findall("joint")
     check(0 < len(links) <= MAX_LINKS, "", f"{len(links):,} links", f"1 to {MAX_LINKS}", "simplify the robot")
+    count = len(robot.findall("link/collision"))
+    check(count <= MAX_BODIES, "", f"{count:,} bodies", f"at most {MAX_BODIES}", "simplify it")
     _check_tree(robot, check)
-    for part in chain(links, robot.findall("joint")):
+    for part in (*joints, *links):
         _check_numbers(part, f"{part.tag} {part.get('name')!r}", check)
-    _check_joints({joint.get("name", ""): joint for joint in robot.findall("joint")}, check)
-    for kind in ("collision", "visual"):
-        count = len(robot.findall(f"link/{kind}"))
-        check(count <= MAX_BODIES, "", f"{count:,} {kind} bodies", f"at most {MAX_BODIES}", "simplify it")
+    _check_joints({joint.get("name", ""): joint for joint in joints}, check)
     materials = {material.get("name") for material in robot.findall("material")}
     for link in links:
-        _check_link(link, materials, f"link {link.get('name')!r}", check)
+        _check_link(link, f"link {link.get('name')!r}", check)
+        for visual in link.findall("visual"):
+            for material in visual.findall("material"):
+                if not material.get("name") or not (len(material) or material.get("name") in materials):
+                    visual.remove(material)  # the reader would refuse the whole robot
     robot.set("name", robot.get("name") or "robot")
     robot.set("version", "1.1")  # readers of URDF 1.0 drop capsules
     return robot
 
 
-def check_srdf(text: str, source: str, links: Collection[str], *, strict: bool = True) -> SrdfPairs:
-    """Parse an SRDF and check that it names links of the robot.
-
-    Parameters
-    ----------
-    text, source : str
-        The SRDF and its name in errors.
-    links : collection of str
-        The robot's links.
-    strict : bool
-        Refuse unknown links. Published robots share one SRDF among variants; its foreign pairs are passed over.
-
-    Raises
-    ------
-    InputError
-        If the text is no SRDF or names an unknown link.
-    """
-    robot, known, check = parse_xml(text, source), set(links), partial(need, source)
-    check(robot.tag == "robot", "", f"the root element <{cut(robot.tag)}>", "<robot>", "name an SRDF")
-    found: dict[str, frozenset[frozenset[str]]] = {}
-    unknown: dict[str, None] = {}
-    for tag in ("disable_collisions", "enable_collisions", "disable_default_collisions"):
-        ends = ("link",) if tag == "disable_default_collisions" else ("link1", "link2")
-        named = [frozenset(element.get(end, "") for end in ends) for element in robot.findall(tag)]
-        for name in sorted(frozenset[str]().union(*named) - known):
-            unknown[name] = None
-            remedy = nearest(name, sorted(known)) if len(known) < 50 else "name this robot's SRDF"
-            check(not strict, f"<{tag}>", f"the link {shown(name)}", "a link of the robot", remedy)
-        found[tag] = frozenset(names for names in named if names <= known)
-    disabled, enabled, alone = found.values()
-    return SrdfPairs(disabled, enabled, frozenset(chain.from_iterable(alone)), tuple(unknown))
+def text_with(robot: Element, *kinds: str) -> str:
+    """Write a checked URDF with bodies of the given kinds (collision, visual) alone."""
+    robot = copy.deepcopy(robot)
+    for link in robot.findall("link"):
+        for body in (*link.findall("collision"), *link.findall("visual")):
+            if body.tag not in kinds:
+                link.remove(body)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def numbers(element: Element, attribute: str, default: str = "") -> list[float]:
     """Return the numbers of a checked attribute."""
     return [float(word) for word in element.get(attribute, default).split()]
-
-
-def shapes(robot: Element, kind: str) -> Iterator[tuple[str, Element]]:
-    """List the bodies of a kind: the link's name and the element of the shape."""
-    for link in robot.findall("link"):
-        yield from ((link.get("name", ""), shape) for shape in link.findall(f"{kind}/geometry/*"))
 
 
 def _check_tree(robot: Element, check: Need) -> None:
@@ -266,19 +194,20 @@ def _check_tree(robot: Element, check: Need) -> None:
 
 
 def _check_numbers(part: Element, place: str, check: Need) -> None:
-    for element in part.iter():
+    """Refuse what is no number in a joint or a link; visual bodies are only drawn."""
+    for element in (one for child in part if child.tag != "visual" for one in child.iter()):
         check("quat_xyzw" not in element.attrib, place, "a rotation as quat_xyzw", "rpy", "write it as rpy")
         for attribute, text in element.items():
             if attribute in _COUNTS and element.tag in _NUMERIC:
                 count, words = _COUNTS[attribute], text.split()
                 field = f"{place}: <{element.tag} {attribute}=…>"
                 good = len(words) == count and all(map(_NUMBER.fullmatch, words))
-                good = good and all(math.isfinite(float(word)) for word in words)
                 expected = "a finite number" if count == 1 else f"{count} finite numbers"
                 remedy = "expand the xacro first" if "${" in text else "correct it"
                 check(good, field, shown(text), expected, remedy)
-                small = attribute not in _BOUNDED or max(abs(float(word)) for word in words) <= MAX_NUMBER
-                check(small, field, shown(text), f"at most {MAX_NUMBER:,.0f}", "write metres and radians")
+                most = MAX_NUMBER if attribute in _BOUNDED else sys.float_info.max
+                small = all(abs(float(word)) <= most for word in words)
+                check(small, field, shown(text), f"at most {most:,.4g}", "write metres and radians")
                 element.set(attribute, " ".join(words))
 
 
@@ -294,10 +223,7 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
             large[name] = largest
         for axis in joint.findall("axis"):
             length = math.hypot(*numbers(axis, "xyz", "1 0 0"))
-            good = (length > 1e-6 and (kind != "prismatic" or abs(length - 1) < 1e-3)) or FREEDOM[kind] in (
-                0,
-                6,
-            )
+            good = abs(length - 1) < 1e-3 if kind == "prismatic" else length > 1e-6 or kind in UNTURNED
             check(good, place, f"an axis of length {length:g}", "length 1", "correct it")
         target, followed = name, set[str]()
         while (mimic := joints[target].find("mimic")) is not None:
@@ -331,18 +257,16 @@ def _check_limit(joint: Element, kind: str, place: str, check: Need) -> float:
     return max(abs(lower), abs(upper))
 
 
-def _check_link(link: Element, materials: set[str | None], place: str, check: Need) -> None:
+def _check_link(link: Element, place: str, check: Need) -> None:
     check(len(link.findall("inertial")) < 2, place, "two <inertial>", "one", "remove the other")
     for inertial in link.findall("inertial"):
-        parts = [*inertial.findall("mass"), *inertial.findall("inertia")]
-        held = {name for element in parts for name in element.keys()}
+        held = {name: value for part in inertial for name, value in part.items()}
         expected = f"<mass value=…> and <inertia> with {', '.join(MOMENTS)}"
-        check(held.issuperset(("value", *MOMENTS)), place, "parts of <inertial>", expected, "complete it")
-        mass = next(float(element.get("value", "0")) for element in inertial.findall("mass"))
-        check(mass >= 0, place, f"a mass of {mass:g} kg", "at least 0", "correct it")
+        check(held.keys() >= {"value", *MOMENTS}, place, "parts of <inertial>", expected, "complete it")
+        check(float(held["value"]) >= 0, place, f"a mass of {held['value']} kg", "at least 0", "correct it")
     capsules = {capsule.get("name") for capsule in link.findall("collision_checking/capsule")}
-    for body in (*link.findall("collision"), *link.findall("visual")):
-        where, found = f"{place}: <{body.tag}>", body.findall("geometry/*")
+    for body in link.findall("collision"):
+        where, found = f"{place}: <collision>", body.findall("geometry/*")
         got = f"{', '.join(cut(one.tag) for one in found[:4]) or 'no shape'}"
         ok = len(found) == 1 == len(body.findall("geometry")) and found[0].tag in SIZES
         check(ok, where, got, f"one of {', '.join(SIZES)}", "give each shape a body of its own")
@@ -355,10 +279,7 @@ def _check_link(link: Element, materials: set[str | None], place: str, check: Ne
         if shape.tag == "mesh":
             good = shape.get("filename") and 0.0 not in numbers(shape, "scale", "1 1 1")
             check(good, where, "a mesh without file or of scale 0", '<mesh filename="…"/>', "correct it")
-        if body.tag == "collision" and shape.tag == "cylinder" and body.get("name") in capsules:
+        if shape.tag == "cylinder" and body.get("name") in capsules:
             shape.tag = "capsule"  # <collision_checking> is the spelling of URDF 1.0; radius and length stay
-        for material in body.findall("material"):
-            if not material.get("name") or not (len(material) or material.get("name") in materials):
-                body.remove(material)  # the reader would refuse the whole robot
     for element in link.findall("collision_checking"):
         link.remove(element)

@@ -106,7 +106,7 @@ def _judged(motion: Motion, urdf: str) -> Report:
 def _is_humanoid(robot: Robot) -> bool:
     """Tell whether a robot has a joint map."""
     try:
-        return bool(len(robot.joint_map.columns))
+        return bool(len(robot.joint_map))
     except InputError:
         return False
 
