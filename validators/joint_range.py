@@ -27,12 +27,12 @@ from posekit.solver.limits import (
     MIDDLES,
     PELVIS_SIGNS,
     STARTS,
-    hips_frame,
+    hips_axes,
     limb_angles,
     limb_directions,
     pelvis_angles,
+    torso_axes,
 )
-from posekit.solver.limits import torso_frame as torso_rows
 from posekit.tree.steps import LIMB, PELVIS, Step, step
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
@@ -167,7 +167,7 @@ def _limb(limits: Limits, body: Body, limb: int, straight: float) -> Judgement:
     if engine.compiled and not in_time:
         found = engine.compiled.stated(limits.numbers, limb, joints, tolerance, straight)
         return Judgement(places, *found[..., keep])
-    parent = torso_rows(joints) if limb < 2 else hips_frame(joints, bool(limits.numbers["between_hips"]))
+    parent = torso_axes(joints) if limb < 2 else hips_axes(joints, bool(limits.numbers["between_hips"]))
     upper_segment, lower_segment = limb_directions(joints, limb)
     rotations = limb_angles(parent, upper_segment, lower_segment)
     least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
@@ -253,8 +253,8 @@ def _places(limits: Limits, limb: int) -> tuple[list[str], list[int]]:
 
 def _pelvis(limits: Limits, body: Body) -> Judgement:
     joints, numbers = body.joints, limits.numbers
-    hips = hips_frame(joints, bool(numbers["between_hips"]))
-    value = np.degrees(pelvis_angles(torso_rows(joints), hips) * PELVIS_SIGNS)
+    hips = hips_axes(joints, bool(numbers["between_hips"]))
+    value = np.degrees(pelvis_angles(torso_axes(joints), hips) * PELVIS_SIGNS)
     lower, upper = np.degrees(numbers["pelvis"]).T
     reads = ((JOINT["neck"], JOINT["pelvis"]), (JOINT["pelvis"], JOINT["right_hip"]))
     return Judgement(DOFS[3:6], value, lower, upper, body.angle_tolerance(*reads))

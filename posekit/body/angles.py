@@ -218,12 +218,12 @@ def ball_angles(R: Array, limits: Limits) -> Array:
 
     Both Euler branches are tried; the one that violates the limits less is returned.
     """
-    branches = _direction_branches(-R[:, :, 2])
+    branches = direction_branches(-R[:, :, 2])
     candidates = []
     for k in range(2):
         alpha, beta = branches[k, :, 0], branches[k, :, 1]
         # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
-        rest = _into_ball(R[:, :, 0], alpha, beta)
+        rest = into_ball(R[:, :, 0], alpha, beta)
         candidates.append(np.stack([alpha, beta, np.arctan2(rest[:, 1], rest[:, 0])], axis=-1))
     return _least_violating(np.stack(candidates) * limits.sign, limits)
 
@@ -252,11 +252,11 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     if not both.all():
         angles[~both, :2] = _upper_angles(upper[~both], limits.part(0, 2).take(~both))
         upper, lower, limits = upper[both], lower[both], limits.take(both)
-    branches = _direction_branches(upper)
+    branches = direction_branches(upper)
     candidates = []
     for k in range(2):
         alpha, beta = branches[k, :, 0], branches[k, :, 1]
-        local = _into_ball(lower, alpha, beta)
+        local = into_ball(lower, alpha, beta)
         candidates += [_hinge_branch(local, alpha, beta, side, limits) for side in (1.0, -1.0)]
     found = _least_violating(np.stack(candidates), limits)
     free = _along_abduction_axis(upper) | _parallel(upper, lower)
@@ -269,7 +269,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
 
 def _upper_angles(upper: Array, limits: Limits) -> Array:
     """Find flexion and abduction (N, 2) of directions (N, 3), the lower segment being unknown."""
-    angles = _least_violating(_direction_branches(upper) * limits.sign, limits)
+    angles = _least_violating(direction_branches(upper) * limits.sign, limits)
     angles[:, 0] = np.where(_along_abduction_axis(upper), limits.clip(0, angles[:, 0]), angles[:, 0])
     return angles
 
@@ -307,19 +307,19 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
     :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
     their limits, then also with one of the two at a limit, or with alpha at zero.
     """
-    branches = _direction_branches(upper)
+    branches = direction_branches(upper)
     pinned, straight = _along_abduction_axis(upper), _parallel(upper, lower)
     sign, low, high = limits.sign.T, limits.lower.T, limits.upper.T
     candidates = [angles]
     for k in range(2):
         beta = branches[k, :, 1]
-        at_zero = _into_ball(lower, np.zeros(len(beta)), beta)
+        at_zero = into_ball(lower, np.zeros(len(beta)), beta)
         for side in (1.0, -1.0):
             gamma = np.arctan2(-side * at_zero[:, 1], -side * at_zero[:, 0])
             turned = [sign[0] * limits.clip(0, 0.0), sign[0] * low[0], sign[0] * high[0]]
             turned += [np.sign(np.sin(beta)) * (sign[2] * bound - gamma) for bound in (low[2], high[2])]
             for alpha in (branches[k, :, 0], *(np.where(pinned, alpha, np.nan) for alpha in turned)):
-                branch = _hinge_branch(_into_ball(lower, alpha, beta), alpha, beta, side, limits)
+                branch = _hinge_branch(into_ball(lower, alpha, beta), alpha, beta, side, limits)
                 branch[:, 2] = np.where(straight, limits.clip(2, branch[:, 2]), branch[:, 2])
                 candidates.append(branch)
     return _least_violating(np.stack(candidates), limits)
@@ -335,15 +335,15 @@ def _along_abduction_axis(upper: Array) -> Flags:
     return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
-def _direction_branches(upper: Array) -> Array:
+def direction_branches(upper: Array) -> Array:
     """Return both (alpha, beta) of directions (N, 3), (2, N, 2)."""
-    alpha = np.arctan2(-upper[:, 0], -upper[:, 2])
+    alpha = np.arctan2(-upper[:, 0], 0.0 - upper[:, 2])  # 0 along the abduction axis
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
     return np.stack([first, other_branch(first)])
 
 
-def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
+def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
     """Turn directions into the frame reached after alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     x, y, z = lower[:, 0], lower[:, 1], lower[:, 2]

@@ -50,13 +50,14 @@ def descend(
     parts: int,
     *,
     most: int = 40,
-    precision: float = 1e-2,
     hopeless: Array | None = None,
-) -> tuple[Array, Array, Ints]:
+    damping: Array | None = None,
+) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts; see `posekit.solver.reference.descend`."""
     limit = np.full(len(which), np.inf) if hopeless is None else hopeless
-    x, chi2, steps = run("descend", problem, which, start, parts, most, precision, limit)
-    return x, chi2, steps
+    damped = np.full(len(which), reference.FIRST_DAMPING) if damping is None else damping
+    x, chi2, damped = run("descend", problem, which, start, parts, most, limit, damped)
+    return x, chi2, damped
 
 
 def distinct(group: Ints, points: Array, within: float) -> Flags:

@@ -18,8 +18,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.angles import direction_branches, into_ball
+from posekit.body.frames import hips_frame, torso_frame
 from posekit.errors import refusal
-from posekit.geometry import Array, Flags, Ints, cross, dot, perpendicular, unit
+from posekit.geometry import Array, Flags, Ints, unit
 from posekit.skeleton import DOFS, LIMB_JOINTS
 
 #: Ball joints of the four limbs.
@@ -145,55 +147,13 @@ class Limits:
             _couple(n, ranges, spreads, zeros)  # type: ignore[arg-type]
         return Limits(numbers=n)
 
-    def findings(
-        self, joints: Array, tolerance: float = 0.0
-    ) -> tuple[tuple[str, ...], Array, Array, Array, Array]:
-        """Read postures: the judged angles with their bounds, each limb in the writing that is least outside.
-
-        Parameters
-        ----------
-        joints : array (N, 14, 3)
-            Joint positions, metres; NaN where a joint is not known.
-        tolerance : float
-            Degrees by which directions may be off; it widens the sinus of the hips, and decides between writings.
-
-        Returns
-        -------
-        names : tuple of str (K,)
-            Angles, ``right_hip.flexion``.
-        value, lower, upper : array (N, K)
-            Degrees; NaN where a joint is not known.
-        bend : array (N, K)
-            Sine of the hinge's bend for rotations, by which their tolerance is divided; 1 for other angles.
-        """
-        torso, hips = torso_frame(joints), hips_frame(joints, bool(self.numbers["between_hips"]))
-        slack = np.radians(tolerance)
-        ball = pelvis_angles(torso, hips) * PELVIS_SIGNS
-        names = ["pelvis.flexion", "pelvis.bending", "pelvis.rotation"]
-        bounds = np.broadcast_to(self.numbers["pelvis"], (*ball.shape, 2))
-        value, lower, upper = [ball], [bounds[..., 0]], [bounds[..., 1]]
-        bend = [np.ones_like(ball)]
-        for limb, name in enumerate(LIMBS):
-            angles = limb_angles(torso if limb < 2 else hips, *limb_directions(joints, limb))
-            v, lo, hi, sine = self.read(limb, angles, slack)
-            away = np.maximum(lo - v, v - hi)
-            away[..., 2] -= slack / np.maximum(sine[:, None], 1e-3)
-            away[..., [0, 1, 3]] -= slack
-            worst = np.fmax.reduce(away, axis=2)
-            best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)[:, None, None]
-            side = name.split("_")[0]
-            places = [f"{side}_{angle}" for angle in KINDS[limb // 2]]
-            keep = [0, 1, 2, 3]
-            if limb < 2 and self.numbers["by_elevation"]:
-                keep, places[0] = [0, 2, 3], f"{side}_shoulder.elevation"
-            for one, out in ((v, value), (lo, lower), (hi, upper)):
-                out.append(np.take_along_axis(one, best, axis=1)[:, 0, keep])
-            one_bend = np.ones((len(v), 4))
-            one_bend[:, 2] = sine
-            bend.append(one_bend[:, keep])
-            names += [places[k] for k in keep]
-        value, lower, upper = (np.degrees(np.concatenate(each, axis=1)) for each in (value, lower, upper))
-        return tuple(names), value, lower, upper, np.concatenate(bend, axis=1)
+    @property
+    def names(self) -> list[str]:
+        """Names of the angles that are judged (19,): three of the pelvis and four a limb, ``right_hip.flexion``."""
+        first = "shoulder.elevation" if self.numbers["by_elevation"] else KINDS[0][0]
+        angles = [(first, *KINDS[0][1:]), KINDS[1]]
+        limbs = [f"{name.split('_')[0]}_{angle}" for k, name in enumerate(LIMBS) for angle in angles[k // 2]]
+        return [*DOFS[3:6], *limbs]
 
     def read(
         self, limb: int, rotations: Array, tolerance: float = 0.0, writing: Ints | None = None
@@ -391,19 +351,15 @@ def arm_readings(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]
     return elevation, plane, twist - (1 - np.cos(elevation)) * from_side
 
 
-def torso_frame(joints: Array) -> Array:
-    """Return forward, left and up of torsos (N, 14, 3) as rows (N, 3, 3): down is neck to pelvis."""
-    down = unit(joints[:, 3] - joints[:, 0])
-    left = unit(perpendicular(joints[:, 2] - joints[:, 1], down))
-    return np.stack([cross(down, left), left, -down], axis=1)
+def torso_axes(joints: Array) -> Array:
+    """Return forward, left and up of torsos (N, 14, 3) as rows (N, 3, 3)."""
+    return np.swapaxes(torso_frame(*np.moveaxis(joints[:, :4], 1, 0)), 1, 2)
 
 
-def hips_frame(joints: Array, between_hips: bool) -> Array:
-    """Return forward, left and up of hips as rows (N, 3, 3): left is the hips' line."""
-    left = unit(joints[:, 5] - joints[:, 4])
-    a, b = (0, 3) if between_hips else (3, 4)
-    down = unit(perpendicular(joints[:, b] - joints[:, a], left))
-    return np.stack([cross(down, left), left, -down], axis=1)
+def hips_axes(joints: Array, between_hips: bool) -> Array:
+    """Return forward, left and up of hips as rows (N, 3, 3); see `posekit.body.frames.hips_frame`."""
+    points = (joints[:, k] for k in ((3, 4, 5, 0) if between_hips else (3, 4, 5)))
+    return np.swapaxes(hips_frame(*points), 1, 2)
 
 
 def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:
@@ -414,24 +370,15 @@ def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:
 
 def limb_angles(parent: Array, upper: Array, lower: Array) -> Array:
     """Return alpha, beta, gamma, epsilon (N, 4) of limbs on their parents; cos beta and epsilon are not negative."""
-    x, y, z = np.einsum("nki,ni->kn", parent, upper)
-    h = np.sqrt(x * x + z * z)
-    safe = np.where(h > 0, h, 1.0)
-    sine, cosine = -x / safe, np.where(h > 0, -z / safe, 1.0)
-    a = sine[:, None] * parent[:, 2] - cosine[:, None] * parent[:, 0]
-    b = (sine * y)[:, None] * parent[:, 0] + h[:, None] * parent[:, 1] + (cosine * y)[:, None] * parent[:, 2]
-    p, q = np.einsum("ni,ni->n", a, lower), -np.einsum("ni,ni->n", b, lower)
-    bend = np.sqrt(p * p + q * q)
-    along = np.einsum("ni,ni->n", upper, lower)
-    return np.stack([np.arctan2(*pair) for pair in ((sine, cosine), (y, h), (q, p), (bend, along))], axis=1)
+    upper, lower = (np.einsum("nki,ni->nk", parent, one) for one in (upper, lower))
+    alpha, beta = direction_branches(upper)[0].T
+    x, y, z = into_ball(lower, alpha, beta).T
+    return np.stack([alpha, beta, np.arctan2(-y, -x), np.arctan2(np.sqrt(x * x + y * y), -z)], axis=1)
 
 
 def pelvis_angles(torso: Array, hips: Array) -> Array:
     """Return the three angles (N, 3) of the hips' frame in the torso's, rotations in the closed form's order."""
-    x, y, z = -np.einsum("nki,ni->kn", torso, hips[:, 2])
-    h = np.sqrt(x * x + z * z)
-    safe = np.where(h > 0, h, 1.0)
-    sine, cosine = -x / safe, np.where(h > 0, -z / safe, 1.0)
-    axis = cosine[:, None] * torso[:, 0] - sine[:, None] * torso[:, 2]
-    turn = np.arctan2(dot(cross(hips[:, 2], axis), hips[:, 0]), dot(axis, hips[:, 0]))
-    return np.stack([np.arctan2(sine, cosine), np.arctan2(y, h), turn], axis=1)
+    forward, _, up = np.einsum("nki,nmi->mnk", torso, hips)
+    alpha, beta = direction_branches(-up)[0].T
+    x, y, _ = into_ball(forward, alpha, beta).T
+    return np.stack([alpha, beta, np.arctan2(y, x)], axis=1)

@@ -12,6 +12,7 @@ from posekit.geometry import Array, Flags, Ints, dot
 from posekit.skeleton import SEGMENTS
 from posekit.solver.engine import run
 from posekit.solver.problem import RESIDUAL_NAMES, Problem
+from posekit.solver.reference import limit_rows
 
 #: Modes none of whose joints, relative to the neck, are farther apart are one.
 MERGE_DISTANCE_METRES: Final = 0.01
@@ -111,10 +112,9 @@ class Modes:
         table = np.concatenate([np.sqrt(dot(image, image)), np.abs(length), single], axis=1)
         out = dict(zip(RESIDUAL_NAMES, table.T, strict=True))
         if self.problem.limits is not None:
-            names, value, lower, upper, bend = self.problem.limits.findings(joints)
-            beyond = np.maximum(np.maximum(lower - value, value - upper), 0.0) * bend
-            off = np.radians(beyond) / self.problem.limit_deviation
-            out |= {f"limit {name}": off[:, k] for k, name in enumerate(names)}
+            beyond, _ = limit_rows(self.problem.limits, joints, 31)
+            off = np.abs(beyond) / self.problem.limit_deviation
+            out |= {f"limit {name}": off[:, k] for k, name in enumerate(self.problem.limits.names)}
         return out
 
 

@@ -38,6 +38,23 @@ LEAST_COSINE: Final = 0.05
 #: Metres by which joints are moved to differentiate residuals of the caller's own.
 PULL_STEP: Final = 1e-6
 
+#: Damping of a first step and the least one, added to every diagonal element, one over square metres.
+#:
+#: All directions are damped alike: a share of the diagonal, which image and lengths make stiff, would also hold the few
+#: directions that these leave open.
+FIRST_DAMPING: Final = 30.0
+LEAST_DAMPING: Final = 1.0
+
+#: Damping up to which a small gain means that a start has arrived, and above which no step is tried.
+ARRIVED_DAMPING: Final = 3e3
+MOST_DAMPING: Final = 1e6
+
+#: Decrease of chi2 below which a start has arrived.
+PRECISION: Final = 1e-2
+
+#: Limits in their order: three of the pelvis and four a limb, then the turn of four limbs about straight joints.
+ROWS: Final = 19
+
 #: Residuals (N, K), standard deviations, of postures (N, 14, 3): zero where nothing pulls.
 Pull = Callable[[Array], Array]
 
@@ -52,23 +69,33 @@ def free_joints(parts: int) -> Flags:
 
 
 class Normal:
-    """Normal equations of N postures: chi2 (N,), matrices (N, 43, 43) and gradients (N, 43)."""
+    """Normal equations of N postures.
+
+    chi2 (N,), matrices (N, 43, 43) and gradients (N, 43), and limits beyond their ends: residuals (N, 19), zero within,
+    with derivatives (N, 19, 43).
+    """
 
     def __init__(self, count: int) -> None:
         self.chi2 = np.zeros(count)
         self.matrix, self.gradient = np.zeros((count, WIDTH, WIDTH)), np.zeros((count, WIDTH))
+        self.beyond, self.slopes = np.zeros((count, ROWS)), np.zeros((count, ROWS, WIDTH))
 
-    def add(self, r: Array, d: Array, columns: slice) -> None:
+    def add(self, r: Array, d: Array, columns: slice = slice(None)) -> None:
         """Add residuals (N, K) with derivatives (N, K, C) along some unknowns."""
         self.chi2 += dot(r, r)
         self.gradient[:, columns] += np.einsum("nkc,nk->nc", d, r)
-        self.matrix[:, columns, columns] += np.einsum("nkc,nkd->ncd", d, d)
+        self.matrix[:, columns, columns] += d.transpose(0, 2, 1) @ d
+
+    def put(self, rows: Ints, other: Normal, of: Flags | Ints | slice = slice(None)) -> None:
+        """Replace some postures by some of another's."""
+        for name, own in vars(self).items():
+            own[rows] = getattr(other, name)[of]
 
 
 def evaluate(
     problems: Records, limits: Limits | None, x: Array, parts: int, pull: Pull | None = None
-) -> tuple[Array, Array, Array]:
-    """Return chi2 (N,), and the matrices (N, 43, 43) and gradients (N, 43) of the normal equations."""
+) -> Normal:
+    """Return the normal equations at x (N, 43); chi2 is infinite where it is not defined."""
     joints, free, out = x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts), Normal(len(x))
     for j in np.flatnonzero(free).tolist():
         _image_terms(out, problems, joints[:, j], j)
@@ -81,18 +108,16 @@ def evaluate(
     # A size that is not varied keeps a unit on the diagonal.
     out.matrix[:, SIZE, SIZE] += problems["size_weight"] == 0
     if limits is not None:
-        for row, terms, slopes in _limit_rows(limits, joints, parts):
-            weight = problems["limit_weight"][row, None]
-            r, d = terms * weight, slopes * weight[..., None]
-            out.chi2[row] += dot(r, r)
-            out.gradient[row] += np.einsum("mkc,mk->mc", d, r)
-            out.matrix[row] += d.transpose(0, 2, 1) @ d
+        r, d = (one * problems["limit_weight"][0] for one in limit_rows(limits, joints, parts))
+        out.beyond, out.slopes = r[:, :ROWS], d[:, :ROWS]
+        out.add(r, d)
     if pull is not None:
         r = pull(joints)
         moved = np.repeat(x[:, None, :SIZE], SIZE, axis=1) + PULL_STEP * np.eye(SIZE)
         slopes = (pull(moved.reshape(-1, 14, 3)).reshape(len(x), SIZE, -1) - r[:, None]) / PULL_STEP
         out.add(r, np.where(r[:, None] != 0, slopes, 0.0).transpose(0, 2, 1), slice(0, SIZE))
-    return np.where(np.isnan(out.chi2), np.inf, out.chi2), out.matrix, out.gradient
+    out.chi2[np.isnan(out.chi2)] = np.inf
+    return out
 
 
 def _image_terms(out: Normal, problems: Records, joint: Array, j: int) -> None:
@@ -164,55 +189,68 @@ def _put_turn(out: Array, joints: Array, torso: bool, between: bool, w: Array) -
         out[:, a] -= pull
 
 
-def _limit_rows(limits: Limits, joints: Array, parts: int) -> list[tuple[Ints, Array, Array]]:
-    """Return violated limits: rows (M,), radians beyond (M, K), and derivatives (M, K, 43)."""
+def limit_rows(limits: Limits, joints: Array, parts: int) -> tuple[Array, Array]:
+    """Return limits beyond their ends: radians (N, 23), zero within, and derivatives (N, 23, 43); see `ROWS`."""
     between = bool(limits.numbers["between_hips"])
-    torso, hips = lim.torso_frame(joints), lim.hips_frame(joints, between)
-    out = []
+    torso, hips = lim.torso_axes(joints), lim.hips_axes(joints, between)
+    r, d = np.zeros((len(joints), ROWS + 4)), np.zeros((len(joints), ROWS + 4, WIDTH))
     if parts & 1:
         angles = lim.pelvis_angles(torso, hips) * lim.PELVIS_SIGNS
         low, high = limits.numbers["pelvis"].T
         angles -= 2 * np.pi * np.round((angles - (low + high) / 2) / (2 * np.pi))
-        r = angles - np.clip(angles, low, high)
-        row = np.flatnonzero((r != 0).any(axis=1))
-        d = np.zeros((len(row), 3, 14, 3))
+        r[:, :3] = angles - np.clip(angles, low, high)
+        row = np.flatnonzero((r[:, :3] != 0).any(axis=1))
         if len(row):
-            R, up = torso[row], hips[row, 2]
-            x, y, z = -np.einsum("nki,ni->kn", R, up)
-            h = np.sqrt(x * x + z * z)
-            safe = np.where(h > 0, h, 1.0)
-            axis = np.where(h > 0, -z / safe, 1.0)[:, None] * R[:, 0] + (x / safe)[:, None] * R[:, 2]
-            square = np.maximum(h, LEAST_COSINE)[:, None] ** 2
-            along = ((R[:, 1] + y[:, None] * up) / square, axis, (up + y[:, None] * R[:, 1]) / square)
-            for k in range(3):
-                w = np.where(r[row, k, None] != 0, lim.PELVIS_SIGNS[k] * along[k], 0.0)
-                _put_turn(d[:, k], joints[row], False, between, w)
-                _put_turn(d[:, k], joints[row], True, between, -w)
-        out.append((row, r[row], _padded(d)))
+            d[row, :3, :SIZE] = _pelvis_slopes(
+                joints[row], torso[row], hips[row, 2], r[row, :3] != 0, between
+            )
     for limb in range(4):
         if not parts >> (limb + 1) & 1:
             continue
-        frame = torso if limb < 2 else hips
+        frame, own = torso if limb < 2 else hips, slice(3 + 4 * limb, 7 + 4 * limb)
         angles = lim.limb_angles(frame, *lim.limb_directions(joints, limb))
-        r, writing = limits.residual(limb, angles)
-        row = np.flatnonzero((r != 0).any(axis=1))
-        d = np.zeros((len(row), 4, 14, 3))
+        r[:, own], writing = limits.residual(limb, angles)
+        row = np.flatnonzero((r[:, own] != 0).any(axis=1))
         if len(row):
             slopes = np.empty((len(row), 4, 4))
             for k in range(4):
                 moved = angles[row].copy()
                 moved[:, k] += ANGLE_STEP
-                slopes[:, :, k] = (limits.residual(limb, moved, writing[row])[0] - r[row]) / ANGLE_STEP
-            slopes[r[row] == 0] = 0.0
-            _put_limb(d, joints[row], frame[row], limb, angles[row], slopes, bool(parts & 1), between)
-        out.append((row, r[row], _padded(d)))
-    return [one for one in out if len(one[0])]
+                slopes[:, :, k] = (limits.residual(limb, moved, writing[row])[0] - r[row, own]) / ANGLE_STEP
+            slopes[r[row, own] == 0] = 0.0
+            bent = np.maximum(r[row, own][:, 3] * slopes[:, 3, 3], 0.0)
+            found = _limb_slopes(
+                joints[row], frame[row], limb, angles[row], slopes, bent, bool(parts & 1), between
+            )
+            d[row, own, :SIZE], d[row, ROWS + limb, :SIZE] = found[:, :4], found[:, 4]
+    return r, d
 
 
-def _put_limb(
-    d: Array, joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, trunk: bool, mid: bool
-) -> None:
-    """Turn slopes (M, 4, 4) along a limb's four angles into derivatives d (M, 4, 14, 3) along joints."""
+def _pelvis_slopes(joints: Array, torso: Array, up: Array, beyond: Flags, between: bool) -> Array:
+    """Return derivatives (M, 3, 42) of those of the pelvis's angles that are beyond their ends (M, 3)."""
+    d = np.zeros((len(joints), 3, 14, 3))
+    x, y, z = -np.einsum("nki,ni->kn", torso, up)
+    h = np.sqrt(x * x + z * z)
+    safe = np.where(h > 0, h, 1.0)
+    axis = np.where(h > 0, -z / safe, 1.0)[:, None] * torso[:, 0] + (x / safe)[:, None] * torso[:, 2]
+    square = np.maximum(h, LEAST_COSINE)[:, None] ** 2
+    along = ((torso[:, 1] + y[:, None] * up) / square, axis, (up + y[:, None] * torso[:, 1]) / square)
+    for k in range(3):
+        w = np.where(beyond[:, k, None], lim.PELVIS_SIGNS[k] * along[k], 0.0)
+        _put_turn(d[:, k], joints, False, between, w)
+        _put_turn(d[:, k], joints, True, between, -w)
+    return d.reshape(-1, 3, SIZE)
+
+
+def _limb_slopes(
+    joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array, trunk: bool, mid: bool
+) -> Array:
+    """Turn slopes (M, 4, 4) along a limb's four angles into derivatives (M, 5, 42) along joints.
+
+    The last one is the limb's turn about a joint that is almost straight and `bent` beyond its end: how far it is bent
+    grows on all sides, as the length of a segment that turns.
+    """
+    d = np.zeros((len(joints), 5, 14, 3))
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
     upper, lower = joints[:, middle] - joints[:, start], joints[:, end] - joints[:, middle]
     u, _ = lim.limb_directions(joints, limb)
@@ -236,12 +274,13 @@ def _put_limb(
             d[:, k, start] -= du
             w = on_b[:, None] * a - on_a[:, None] * b + on_e[:, None] * f - on_c[:, None] * e
             _put_turn(d[:, k], joints, limb < 2, mid, w)
-
-
-def _padded(d: Array) -> Array:
-    """Append the size's zero column: (M, K, 14, 3) to (M, K, 43)."""
-    flat = d.reshape(*d.shape[:2], SIZE)
-    return np.concatenate([flat, np.zeros((*d.shape[:2], 1))], axis=2)
+    turn = np.sqrt(np.maximum(bent * ce, 0.0) / np.maximum(se, LEAST_SINE))[:, None] * f
+    du, dl = (turn / np.sqrt(dot(one, one))[:, None] for one in (upper, lower))
+    d[:, 4, middle] -= du + dl
+    d[:, 4, end] += dl
+    if trunk:
+        d[:, 4, start] += du
+    return d.reshape(-1, 5, SIZE)
 
 
 def descend(
@@ -251,11 +290,14 @@ def descend(
     start: Array,
     parts: int,
     most: int,
-    precision: float,
     hopeless: Array,
+    damping: Array,
     pull: Pull | None = None,
-) -> tuple[Array, Array, Ints]:
+) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts by Levenberg-Marquardt.
+
+    A refused step has met limits that are not violated where it started. They hold for the next step, too; otherwise
+    it would run into them again.
 
     Parameters
     ----------
@@ -271,52 +313,59 @@ def descend(
         What is free.
     most : int
         Largest number of steps.
-    precision : float
-        Decrease of chi2 below which a start has arrived.
     hopeless : array (N,)
         A start whose chi2 is above this is given up if its step promises less than half of it.
+    damping : array (N,)
+        Of the first step: `FIRST_DAMPING`, or where an earlier descent ended; infinite where none is wanted.
     pull : callable, optional
         Further residuals of whole bodies.
 
     Returns
     -------
-    x, chi2, steps : array (N, 43), (N,), int array (N,)
+    x, chi2, damping : array (N, 43), (N,), (N,)
+        Damping is infinite where a start has arrived or is given up.
     """
     free = free_joints(parts)
     column = np.flatnonzero(np.append(np.repeat(free, 3), bool(parts & 1)))
-    diagonal = np.arange(len(column))
-    x, damping = np.array(start, dtype=np.float64), np.full(len(start), 1e-4)
-    steps, live = np.zeros(len(start), dtype=np.int64), np.arange(len(start))
-    chi2, H, g = evaluate(problems[which], limits, x, parts, pull)
+    x, damping = np.array(start, dtype=np.float64), np.array(damping, dtype=np.float64)
+    refused = np.zeros(len(x), dtype=np.bool_)
+    here = evaluate(problems[which], limits, x, parts, pull)
+    # The model of the next step: what is here, and limits that a refused step has met.
+    matrix, gradient = here.matrix.copy(), here.gradient.copy()
+    live = np.flatnonzero(np.isfinite(here.chi2 + damping))
     for _ in range(most):
-        live = live[np.isfinite(chi2[live])]
-        if not len(live):
-            break
-        matrix = H[live][:, column[:, None], column]
-        slope = g[live][:, column]
-        added = np.asarray(np.einsum("nii->ni", matrix) * damping[live, None] + FLOOR)
-        matrix[:, diagonal, diagonal] += added
-        step = np.asarray(-np.linalg.solve(matrix, slope[..., None])[..., 0], dtype=np.float64)
-        gain = -dot(step, slope) + dot(added, step * step)
-        stop = (
-            ((gain <= precision) & (damping[live] <= 0.1))
-            | (damping[live] > 1e6)
-            | ((chi2[live] > hopeless[live]) & (gain < 0.5 * chi2[live]))
+        slope, chi2 = gradient[live][:, column], here.chi2[live]
+        damped = matrix[live][:, column[:, None], column] + (damping[live, None, None] + FLOOR) * np.eye(
+            len(column)
         )
-        live, step, gain = live[~stop], step[~stop], gain[~stop]
+        step = np.asarray(-np.linalg.solve(damped, slope[..., None])[..., 0], dtype=np.float64)
+        gain = dot(step, (damping[live, None] + FLOOR) * step - slope)
+        arrived = (gain <= PRECISION) & (damping[live] <= ARRIVED_DAMPING)
+        stop = arrived | (damping[live] > MOST_DAMPING) | ((chi2 > hopeless[live]) & (gain < 0.5 * chi2))
+        damping[live[stop]] = np.inf
+        live, step, gain, chi2 = live[~stop], step[~stop], gain[~stop], chi2[~stop]
         if not len(live):
             break
-        steps[live] += 1
-        there = x[live].copy()
-        there[:, column] += step
-        value, matrix, slope = evaluate(problems[which[live]], limits, there, parts, pull)
-        better = value <= chi2[live]
-        ratio = np.where(better, (chi2[live] - np.where(better, value, 0.0)) / gain, 0.0)
-        factor = np.where(ratio > 0.75, 0.1, np.where(ratio < 0.25, 4.0, 1.0))
-        damping[live] = np.where(better, np.maximum(damping[live] * factor, 1e-12), damping[live] * 8)
-        good = live[better]
-        x[good], chi2[good], H[good], g[good] = there[better], value[better], matrix[better], slope[better]
-    return x, chi2, steps
+        moved = np.zeros((len(live), WIDTH))
+        moved[:, column] = step
+        there = evaluate(problems[which[live]], limits, x[live] + moved, parts, pull)
+        better = there.chi2 <= chi2
+        good, bad = live[better], live[~better]
+        ratio = (chi2 - there.chi2)[better] / gain[better]
+        factor = np.where(ratio > 0.75, 0.2, np.where(ratio < 0.25, 4.0, 1.0))
+        damping[good] = np.maximum(damping[good] * factor, LEAST_DAMPING)
+        x[good] += moved[better]
+        here.put(good, there, better)
+        r, d = there.beyond[~better], there.slopes[~better]
+        met = (r != 0) & (here.beyond[bad] == 0) & np.isfinite(there.chi2[~better])[:, None]
+        before = r - np.einsum("nkc,nc->nk", d, moved[~better])
+        before, d = np.where(before * r > 0, 0.0, before), np.where(met[..., None], d, 0.0)
+        matrix[live], gradient[live] = here.matrix[live], here.gradient[live]
+        matrix[bad] += d.transpose(0, 2, 1) @ d
+        gradient[bad] += np.einsum("nkc,nk->nc", d, before)
+        damping[bad] *= np.where(refused[bad] | ~met.any(axis=1), 16.0, 1.0)
+        refused[live] = ~better
+    return x, here.chi2, damping
 
 
 def information(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
@@ -325,7 +374,7 @@ def information(problems: Records, limits: Limits | None, which: Ints, x: Array,
     `known` (3,) are the information on any place and on a hidden joint about its mode, one over square metres, and the
     factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
     """
-    _, H, _ = evaluate(problems[which], limits, x, 31)
+    H = evaluate(problems[which], limits, x, 31).matrix
     p, joints, index = problems[which], x[:, :SIZE].reshape(-1, 14, 3), np.arange(SIZE)
     seen = (p["image"] != 0).any(axis=(2, 3))
     H[:, index, index] += np.repeat(np.where(seen, known[0], known[1]), 3, axis=1)

@@ -27,7 +27,7 @@ SAME_TRUNK_METRES: Final = 0.03
 #: Limbs on one trunk neither of whose joints is farther apart are one, by the number of hidden joints among the two.
 #:
 #: Every position of a hidden joint within its limits fits: what is kept are representatives.
-SAME_LIMB_METRES: Final = np.array([0.02, 0.3, 0.45])
+SAME_LIMB_METRES: Final = np.array([0.02, 0.25, 0.45])
 
 #: Whole bodies none of whose joints, relative to the neck, are farther apart after `FIRST_STEPS` are one.
 APPROACHING_METRES: Final = 0.003
@@ -112,8 +112,9 @@ def _solved(whole: Problem, frames: Ints, passing: Array, pull: Pull | None) -> 
     if pull is not None:
         near = chi2 <= passing[frame]
         frame, hopeless = frame[near], HOPELESS * passing[frame[near]]
+        damping = np.full(len(frame), reference.FIRST_DAMPING)
         x, chi2, _ = reference.descend(
-            problem.records, problem.limits, frame, x[near], WHOLE, PULL_STEPS, 1e-2, hopeless, pull
+            problem.records, problem.limits, frame, x[near], WHOLE, PULL_STEPS, hopeless, damping, pull
         )
     order = np.lexsort((chi2, frame))
     order = order[chi2[order] <= passing[frame[order]]]
@@ -126,14 +127,16 @@ def _trunks(problem: Problem, rays: Rays, passing: Array) -> tuple[Ints, Array, 
     frame, trunk = trunk_starts(problem, rays)
     x = np.zeros((len(frame), 43))
     x[:, :18] = trunk.reshape(-1, 18)
+    damping = None
     for steps, level in ((FIRST_STEPS, np.inf), (40, 1.0)):
-        x, chi2, _ = descend(problem, frame, x, 1, most=steps, hopeless=HOPELESS_TRUNK * passing[frame])
+        hopeless = HOPELESS_TRUNK * passing[frame]
+        x, chi2, damping = descend(problem, frame, x, 1, most=steps, hopeless=hopeless, damping=damping)
         order = np.lexsort((chi2, frame))
         order = order[np.isfinite(chi2[order]) & (chi2[order] <= level * passing[frame[order]])]
-        frame, x, chi2 = frame[order], x[order], chi2[order]
+        frame, x, chi2, damping = frame[order], x[order], chi2[order], damping[order]
         points = x[:, :18].reshape(-1, 6, 3)
         keep = distinct(frame, points - points[:, :1], SAME_TRUNK_METRES)
-        frame, x, chi2 = frame[keep], x[keep], chi2[keep]
+        frame, x, chi2, damping = frame[keep], x[keep], chi2[keep], damping[keep]
     return frame, x, chi2
 
 
@@ -154,19 +157,13 @@ def _bodies(
     row, body, _ = _combined(problem, rays, frame, x, chi2, most=None)
     frame = frame[row]
     hopeless = HOPELESS * passing[frame]
-    x, chi2, steps = descend(problem, frame, body, WHOLE, most=FIRST_STEPS, hopeless=hopeless)
+    x, chi2, damping = descend(problem, frame, body, WHOLE, most=FIRST_STEPS, hopeless=hopeless)
     # Bodies that approach each other go on as one.
     order = np.lexsort((chi2, frame))
     points = x[order, :42].reshape(-1, 14, 3)
     keep = np.sort(order[distinct(frame[order], points - points[:, :1], APPROACHING_METRES)])
-    frame, x, chi2, hopeless, open_ = (
-        frame[keep],
-        x[keep],
-        chi2[keep],
-        hopeless[keep],
-        steps[keep] == FIRST_STEPS,
-    )
-    x[open_], chi2[open_], _ = descend(problem, frame[open_], x[open_], WHOLE, hopeless=hopeless[open_])
+    frame, hopeless = frame[keep], hopeless[keep]
+    x, chi2, _ = descend(problem, frame, x[keep], WHOLE, hopeless=hopeless, damping=damping[keep])
     return frame, x, chi2
 
 

@@ -19,13 +19,15 @@ namespace py = pybind11;
 
 namespace {
 
-constexpr int D = 17, TRUNK = 6, T = 19, N = 43, SIZE = 18;
+constexpr int D = 17, TRUNK = 6, T = 19, N = 43, SIZE = 42;
 constexpr int A[D] = {0, 0, 0, 3, 3, 1, 2, 6, 7, 4, 5, 10, 11, 1, 1, 2, 4};
 constexpr int B[D] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 2, 3, 3, 5};
 constexpr int LIMB_OF[J] = {-1, -1, -1, -1, -1, -1, 0, 1, 0, 1, 2, 3, 2, 3};
-constexpr int ROW_OF[J] = {0, 3, 6, 9, 12, 15, 0, 0, 3, 3, 0, 0, 3, 3};
+inline double env(const char* n, double d) { const char* v = getenv(n); return v ? atof(v) : d; }
 constexpr double ANGLE_STEP = 1e-4, LEAST_SINE = 0.02;
 constexpr double FLOOR = 1e-6;  // added to every diagonal element, in 1/m^2: an unseen joint has none of its own
+// As in reference.py.
+constexpr double PRECISION = 1e-2, LEAST_DAMPING = 1, ARRIVED_DAMPING = 3e3, MOST_DAMPING = 1e6;
 constexpr std::ptrdiff_t ROWS_AT_ONCE = 16, ROWS_A_THREAD = 500;
 
 // As the dtype PROBLEM of problem.py; all fields are doubles.
@@ -34,8 +36,10 @@ struct Problem {
   double size_weight, limit_weight, perspective, robust;
 };
 
+// Normal equations, and the violated limits among their rows: three of the pelvis, and four a limb.
+constexpr int ROWS = 19;
 struct Normal {
-  double H[T][T], g[T], L[4][6][6], C[4][6][T], l[4][6];
+  double H[N][N], g[N], r[ROWS], d[ROWS][N];
 };
 
 // Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
@@ -53,39 +57,37 @@ double limb_residual(const Limits& L, int limb, const double g[4], const Reading
   return total;
 }
 
-// The least violated writing; residuals are in `out`.
+// The least violated writing, the usual one first (elbows bend the other way); residuals are in `out`.
 int least_writing(const Limits& L, int limb, const double g[4], const Reading& reading, double out[4], double& best) {
   const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
   int which = 0;
   best = INFINITY;
-  for (int way = 0; way < ways && best > 0; ++way) {
+  for (int k = 0; k < ways && best > 0; ++k) {
+    const int way = k ^ (limb < 2);
     double r[4], total = limb_residual(L, limb, g, reading, way, r);
     if (total < best) best = total, which = way, std::memcpy(out, r, sizeof r);
   }
   return which;
 }
 
-// Adds one residual with its derivative along the trunk (18) and one limb (6).
-void add_row(Normal& n, int m, const double t[18], const double* d, double r, bool trunk) {
-  if (trunk)
-    for (int i = 0; i < 18; ++i)
-      if (t[i] != 0) {
-        n.g[i] += t[i] * r;
-        for (int k = 0; k < 18; ++k) n.H[i][k] += t[i] * t[k];
-      }
-  if (!d) return;
-  for (int i = 0; i < 6; ++i) {
-    n.l[m][i] += d[i] * r;
-    for (int k = 0; k < 6; ++k) n.L[m][i][k] += d[i] * d[k];
-    if (trunk)
-      for (int k = 0; k < 18; ++k) n.C[m][i][k] += d[i] * t[k];
-  }
+// Adds one residual with its derivative along the unknowns.
+void add_row(Normal& n, const double d[N], double r) {
+  for (int i = 0; i < N; ++i)
+    if (d[i] != 0) {
+      n.g[i] += d[i] * r;
+      for (int k = 0; k < N; ++k) n.H[i][k] += d[i] * d[k];
+    }
 }
-void put(double t[18], int joint, Vec v, double sign) {
+void add_limit(Normal& n, int row, const double d[N], double r) {
+  n.r[row] = r;
+  std::memcpy(n.d[row], d, sizeof n.d[row]);
+  add_row(n, d, r);
+}
+void put(double t[N], int joint, Vec v, double sign) {
   t[3 * joint] += sign * v.x, t[3 * joint + 1] += sign * v.y, t[3 * joint + 2] += sign * v.z;
 }
 // Derivative of a part's turn, weighted with w, along the trunk.
-void put_turn(double t[18], const Frame& R, bool between, Vec w) {
+void put_turn(double t[N], const Frame& R, bool between, Vec w) {
   Vec first, other;
   R.pull(w, first, other);
   if (R.by_down) put(t, 3, first, 1), put(t, 0, first, -1), put(t, 2, other, 1), put(t, 1, other, -1);
@@ -110,11 +112,11 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
       double r = scale * (v - std::min(std::max(v, lo), hi));
       chi2 += r * r;
       if (n && r != 0) {
-        double t[18] = {};
+        double t[N] = {};
         Vec w = (scale * PELVIS_SIGN[k]) * along[k];
         put_turn(t, hips, between, w);
         put_turn(t, torso, between, -1.0 * w);
-        add_row(*n, 0, t, nullptr, r, true);
+        add_limit(*n, k, t, r);
       }
     }
   }
@@ -145,9 +147,19 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
       double on_b = slope[k][1] + on_c * ce * cg + on_e * sg;
       Vec du = (scale / s.upper) * (on_a * s.a + on_b * s.b), dl = (scale / s.lower) * (on_c * f + on_e * e);
       Vec w = scale * (on_b * s.a - on_a * s.b + on_e * f - on_c * e);
-      double t[18] = {}, d[6] = {du.x - dl.x, du.y - dl.y, du.z - dl.z, dl.x, dl.y, dl.z};
+      double t[N] = {};
+      put(t, MID[m], du - dl, 1), put(t, END[m], dl, 1);
       if (trunk) put(t, START[m], du, -1), put_turn(t, R, between, w);
-      add_row(*n, m, t, d, scale * r[k], trunk);
+      add_limit(*n, 3 + 4 * m + k, t, scale * r[k]);
+    }
+    // A limb that bends too far about an almost straight joint turns about it (as `bend` of a length).
+    const double bent = std::max(r[3] * slope[3][3] * ce, 0.0) * ie;
+    if (bent > 0) {
+      double t[N] = {};
+      const Vec turn = (scale * std::sqrt(bent)) * f, du = (1 / s.upper) * turn, dl = (1 / s.lower) * turn;
+      put(t, MID[m], du + dl, -1), put(t, END[m], dl, 1);
+      if (trunk) put(t, START[m], du, 1);
+      add_row(*n, t, 0);
     }
   }
   return chi2;
@@ -159,11 +171,7 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
   const double size = at[42];
   const bool trunk = parts & 1, sized = trunk && p.size_weight > 0;
   auto free_ = [&](int j) { return j < TRUNK ? trunk : bool(parts >> (LIMB_OF[j] + 1) & 1); };
-  auto block = [&](int j, int i, int k) -> double& {
-    return j < TRUNK ? n->H[3 * j + i][3 * j + k] : n->L[LIMB_OF[j]][ROW_OF[j] + i][ROW_OF[j] + k];
-  };
-  auto slope = [&](int j, int i) -> double& { return j < TRUNK ? n->g[3 * j + i] : n->l[LIMB_OF[j]][ROW_OF[j] + i]; };
-  if (n) std::memset(n, 0, sizeof *n);
+  if (n) std::memset(n, 0, offsetof(Normal, d));
   double chi2 = 0;
   for (int j = 0; j < J; ++j) {
     const double(*w)[2] = p.image[j];
@@ -183,8 +191,8 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
     chi2 += e;
     if (n)
       for (int i = 0; i < 3; ++i) {
-        slope(j, i) += g * (d[0][i] * r[0] + d[1][i] * r[1]);
-        for (int k = 0; k < 3; ++k) block(j, i, k) += g * (d[0][i] * d[0][k] + d[1][i] * d[1][k]);
+        n->g[3 * j + i] += g * (d[0][i] * r[0] + d[1][i] * r[1]);
+        for (int k = 0; k < 3; ++k) n->H[3 * j + i][3 * j + k] += g * (d[0][i] * d[0][k] + d[1][i] * d[1][k]);
       }
   }
   if (trunk) {
@@ -205,44 +213,37 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
     }
   }
   for (int s = 0; s < D; ++s) {
-    int a = A[s], b = B[s], m = LIMB_OF[b];
-    bool fa = free_(a);
+    const int a = A[s], b = B[s];
     if (!free_(b)) continue;
-    double e[3], q = 0, w = p.length_weight[s];
+    double e[3], h[3][3], q = 0, w = p.length_weight[s];
     for (int i = 0; i < 3; ++i) e[i] = x[b][i] - x[a][i], q += e[i] * e[i];
     double r = w * (0.5 * std::log(q) - p.log_length[s] - size);
     chi2 += r * r;
     if (!n) continue;
     double t = w / q, bend = std::max(w * r, 0.0) / q;  // curvature of a segment that turns, where it is positive
-    for (int i = 0; i < 3; ++i) {
-      slope(b, i) += t * e[i] * r;
-      if (fa) slope(a, i) -= t * e[i] * r;
-      for (int k = 0; k < 3; ++k) {
-        double h = t * t * e[i] * e[k] + bend * ((i == k) - e[i] * e[k] / q);
-        block(b, i, k) += h;
-        if (!fa) continue;
-        block(a, i, k) += h;
-        if (m < 0) n->H[3 * a + i][3 * b + k] -= h, n->H[3 * b + i][3 * a + k] -= h;
-        else if (a < TRUNK) n->C[m][i][3 * a + k] -= h;
-        else n->L[m][i][3 + k] -= h, n->L[m][3 + i][k] -= h;
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) h[i][k] = t * t * e[i] * e[k] + bend * ((i == k) - e[i] * e[k] / q);
+    const double along = sized ? w : 0;
+    for (int one : {b, a}) {
+      const double sign = one == b ? 1 : -1;
+      if (!free_(one)) continue;
+      for (int i = 0; i < 3; ++i) {
+        n->g[3 * one + i] += sign * t * e[i] * r;
+        n->H[3 * one + i][SIZE] -= sign * along * t * e[i], n->H[SIZE][3 * one + i] -= sign * along * t * e[i];
+        for (int other : {b, a})
+          if (free_(other))
+            for (int k = 0; k < 3; ++k) n->H[3 * one + i][3 * other + k] += (one == other ? 1 : -1) * h[i][k];
       }
-      if (!sized) continue;
-      double c = w * t * e[i];
-      if (m < 0) n->H[3 * b + i][SIZE] -= c, n->H[SIZE][3 * b + i] -= c;
-      else n->C[m][ROW_OF[b] + i][SIZE] -= c;
-      if (a < TRUNK) n->H[3 * a + i][SIZE] += c, n->H[SIZE][3 * a + i] += c;
-      else n->C[m][ROW_OF[a] + i][SIZE] += c;
     }
-    if (sized) n->H[SIZE][SIZE] += w * w, n->g[SIZE] -= w * r;
+    n->H[SIZE][SIZE] += along * along, n->g[SIZE] -= along * r;
   }
   return limits && p.limit_weight > 0 ? chi2 + limit_terms(p, *limits, x, parts, n) : chi2;
 }
 
 // M = U'U: the upper triangle becomes U, row by row, so that the inner loops run along rows.
 template <int K>
-bool cholesky(double M[K][K]) {
+void cholesky(double M[K][K]) {
   for (int k = 0; k < K; ++k) {
-    if (!(M[k][k] > 0)) return false;
     const double f = 1 / std::sqrt(M[k][k]);
     for (int j = k; j < K; ++j) M[k][j] *= f;
     for (int i = k + 1; i < K; ++i) {
@@ -250,98 +251,128 @@ bool cholesky(double M[K][K]) {
       for (int j = i; j < K; ++j) M[i][j] -= c * M[k][j];
     }
   }
-  return true;
 }
 
-// Eliminates limbs: n.L and n.H become Cholesky factors, n.C and n.l are divided by the limbs' factors.
-bool eliminate(Normal& n, double damping, unsigned parts, double add_l[4][6], double add_t[T]) {
-  for (int i = 0; i < T; ++i) add_t[i] = n.H[i][i] * damping + FLOOR;
-  for (int m = 0; m < 4; ++m) {
-    if (!(parts >> (m + 1) & 1)) continue;
-    for (int i = 0; i < 6; ++i) add_l[m][i] = n.L[m][i][i] * damping + FLOOR, n.L[m][i][i] += add_l[m][i];
-    if (!cholesky<6>(n.L[m])) return false;
-    int used[T], count = 0;  // a limb within its limits knows three coordinates of the trunk, and the size
-    for (int c = 0; c < T; ++c)
-      for (int i = 0; i < 6; ++i)
-        if (n.C[m][i][c] != 0) {
-          used[count++] = c;
-          break;
-        }
-    for (int i = 0; i < 6; ++i) {
-      const double f = 1 / n.L[m][i][i];
-      for (int k = 0; k < i; ++k) {
-        n.l[m][i] -= n.L[m][k][i] * n.l[m][k];
-        for (int c = 0; c < count; ++c) n.C[m][i][used[c]] -= n.L[m][k][i] * n.C[m][k][used[c]];
-      }
-      n.l[m][i] *= f;
-      for (int c = 0; c < count; ++c) n.C[m][i][used[c]] *= f;
-    }
-    if (!(parts & 1)) continue;
-    for (int c = 0; c < count; ++c)
-      for (int k = 0; k < 6; ++k) {
-        const double at = n.C[m][k][used[c]];
-        n.g[used[c]] -= at * n.l[m][k];
-        for (int d = c; d < count; ++d) n.H[used[c]][used[d]] -= at * n.C[m][k][used[d]];
-      }
-  }
-  if (!(parts & 1)) return true;
-  for (int i = 0; i < T; ++i) n.H[i][i] += add_t[i];
-  return cholesky<T>(n.H);
-}
+// Unknowns of the trunk and of each limb.
+constexpr int TRUNK_AT[T] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, SIZE};
+inline int limb_at(int m, int i) { return 3 * (i < 3 ? MID[m] : END[m]) + i % 3; }
 
-// One damped step; returns the decrease of chi2 that the linear model promises, negative if there is none.
-double step(const Normal& start, double damping, unsigned parts, double dx[N]) {
-  Normal n = start;
-  double add_l[4][6], add_t[T], t[T] = {}, gain = 0;
-  if (!eliminate(n, damping, parts, add_l, add_t)) return -1;
-  if (parts & 1) {
+// Cholesky factors of the damped matrix: the limbs', what couples them to the trunk divided by these, and the trunk's
+// with the limbs eliminated.
+struct Factor {
+  double L[4][6][6], C[4][6][T], S[T][T];
+  unsigned parts;
+
+  Factor(const Normal& n, double damping, unsigned which) : parts(which) {
     for (int i = 0; i < T; ++i) {
-      t[i] = n.g[i] / n.H[i][i], gain += t[i] * t[i];
-      for (int k = i + 1; k < T; ++k) n.g[k] -= n.H[i][k] * t[i];
+      for (int k = 0; k < T; ++k) S[i][k] = n.H[TRUNK_AT[i]][TRUNK_AT[k]];
+      S[i][i] += damping + FLOOR;
     }
-    for (int i = T - 1; i >= 0; --i) {
-      for (int k = i + 1; k < T; ++k) t[i] -= n.H[i][k] * t[k];
-      t[i] /= n.H[i][i];
+    for (int m = 0; m < 4; ++m) {
+      if (!(parts >> (m + 1) & 1)) continue;
+      for (int i = 0; i < 6; ++i) {
+        const double* row = n.H[limb_at(m, i)];
+        for (int k = 0; k < 6; ++k) L[m][i][k] = row[limb_at(m, k)];
+        for (int c = 0; c < T; ++c) C[m][i][c] = row[TRUNK_AT[c]];
+        L[m][i][i] += damping + FLOOR;
+      }
+      cholesky<6>(L[m]);
+      if (!(parts & 1)) continue;
+      int used[T], count = 0;  // a limb within its limits knows three coordinates of the trunk, and the size
+      for (int c = 0; c < T; ++c)
+        for (int i = 0; i < 6; ++i)
+          if (C[m][i][c] != 0) {
+            used[count++] = c;
+            break;
+          }
+      for (int i = 0; i < 6; ++i) {
+        const double f = 1 / L[m][i][i];
+        for (int k = 0; k < i; ++k)
+          for (int c = 0; c < count; ++c) C[m][i][used[c]] -= L[m][k][i] * C[m][k][used[c]];
+        for (int c = 0; c < count; ++c) C[m][i][used[c]] *= f;
+      }
+      for (int c = 0; c < count; ++c)
+        for (int k = 0; k < 6; ++k)
+          for (int d = c; d < count; ++d) S[used[c]][used[d]] -= C[m][k][used[c]] * C[m][k][used[d]];
     }
-    for (int i = 0; i < T; ++i) gain += add_t[i] * t[i] * t[i], dx[i < 18 ? i : 42] = -t[i];
+    if (parts & 1) cholesky<T>(S);
   }
-  for (int m = 0; m < 4; ++m) {
-    if (!(parts >> (m + 1) & 1)) continue;
-    double d[6];
-    for (int i = 0; i < 6; ++i) {
-      gain += n.l[m][i] * n.l[m][i], d[i] = n.l[m][i];
-      if (parts & 1)
-        for (int c = 0; c < T; ++c) d[i] -= n.C[m][i][c] * t[c];
-    }
-    for (int i = 5; i >= 0; --i) {
-      for (int k = i + 1; k < 6; ++k) d[i] -= n.L[m][i][k] * d[k];
-      d[i] /= n.L[m][i][i];
-    }
-    for (int i = 0; i < 6; ++i) gain += add_l[m][i] * d[i] * d[i], dx[3 * (i < 3 ? MID[m] : END[m]) + i % 3] = -d[i];
-  }
-  return gain;
-}
 
-double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double precision,
-               double hopeless, int& steps) {
-  Normal two[2], *here = two, *there = two + 1;
-  double damping = 1e-4, chi2 = evaluate(p, L, x, parts, here), dx[N] = {}, y[N];
-  for (; steps < most && std::isfinite(chi2); ++steps) {
-    double gain = step(*here, damping, parts, dx);
-    if (gain < 0) {
-      damping = std::max(damping * 8, 1e-4);
-      continue;
+  // The step x (N) for a gradient g.
+  void solve(const double g[N], double x[N]) const {
+    double t[T], l[4][6];
+    for (int i = 0; i < T; ++i) t[i] = -g[TRUNK_AT[i]];
+    for (int m = 0; m < 4; ++m) {
+      if (!(parts >> (m + 1) & 1)) continue;
+      for (int i = 0; i < 6; ++i) {
+        l[m][i] = -g[limb_at(m, i)];
+        for (int k = 0; k < i; ++k) l[m][i] -= L[m][k][i] * l[m][k];
+        l[m][i] /= L[m][i][i];
+        if (parts & 1)
+          for (int c = 0; c < T; ++c) t[c] -= C[m][i][c] * l[m][i];
+      }
     }
-    if ((gain <= precision && damping <= 0.1) || damping > 1e6 || (chi2 > hopeless && gain < 0.5 * chi2)) break;
+    if (parts & 1) {
+      for (int i = 0; i < T; ++i) {
+        t[i] /= S[i][i];
+        for (int k = i + 1; k < T; ++k) t[k] -= S[i][k] * t[i];
+      }
+      for (int i = T - 1; i >= 0; --i) {
+        for (int k = i + 1; k < T; ++k) t[i] -= S[i][k] * t[k];
+        x[TRUNK_AT[i]] = t[i] /= S[i][i];
+      }
+    }
+    for (int m = 0; m < 4; ++m) {
+      if (!(parts >> (m + 1) & 1)) continue;
+      for (int i = 5; i >= 0; --i) {
+        if (parts & 1)
+          for (int c = 0; c < T; ++c) l[m][i] -= C[m][i][c] * t[c];
+        for (int k = i + 1; k < 6; ++k) l[m][i] -= L[m][i][k] * l[m][k];
+        x[limb_at(m, i)] = l[m][i] /= L[m][i][i];
+      }
+    }
+  }
+};
+
+// Levenberg-Marquardt; returns chi2. A refused step has met limits that are not violated where it started: they hold
+// for the next one, too. `damping` is infinite in the end where x has arrived or is given up.
+double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double hopeless,
+               double& damping) {
+  Normal three[3], *here = three, *there = three + 1, *ahead = three + 2;
+  double chi2 = evaluate(p, L, x, parts, std::isfinite(damping) ? here : nullptr), dx[N] = {}, y[N];
+  bool refused = false;
+  for (int steps = 0; steps < most && std::isfinite(chi2 + damping); ++steps) {
+    const Normal& model = refused ? *ahead : *here;
+    const Factor factor(model, damping, parts);
+    factor.solve(model.g, dx);
+    double gain = 0;
+    for (int i = 0; i < N; ++i) gain += dx[i] * ((damping + FLOOR) * dx[i] - model.g[i]);
+    if ((gain <= PRECISION && damping <= ARRIVED_DAMPING) || damping > MOST_DAMPING ||
+        (chi2 > hopeless && gain < 0.5 * chi2)) {
+      damping = INFINITY;
+      break;
+    }
     for (int i = 0; i < N; ++i) y[i] = x[i] + dx[i];
-    double value = evaluate(p, L, y, parts, there);
+    const double value = evaluate(p, L, y, parts, there);
     if (value <= chi2) {
-      double ratio = (chi2 - value) / gain;
-      damping = std::max(ratio > 0.75 ? damping * 0.1 : ratio < 0.25 ? damping * 4 : damping, 1e-12);
+      const double ratio = (chi2 - value) / gain;
+      damping = std::max(damping * (ratio > 0.75 ? 0.2 : ratio < 0.25 ? 4 : 1), LEAST_DAMPING);
       std::memcpy(x, y, sizeof y);
       std::swap(here, there);
-      chi2 = value;
-    } else damping *= 8;
+      chi2 = value, refused = false;
+      continue;
+    }
+    *ahead = *here;
+    bool met = false;
+    for (int k = 0; k < ROWS && std::isfinite(value); ++k)
+      if (there->r[k] != 0 && here->r[k] == 0) {
+        double r = there->r[k];
+        for (int i = 0; i < N; ++i) r -= there->d[k][i] * dx[i];
+        add_row(*ahead, there->d[k], r * there->r[k] > 0 ? 0 : r);
+        met = true;
+      }
+    if (refused || !met) damping *= 16;
+    refused = true;
   }
   return chi2;
 }
@@ -350,13 +381,8 @@ double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int
 // a right angle to their rays (see modes.py).
 void inform(Normal& n, const Problem& p, const double* at, const double known[3]) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
-  for (int j = 0; j < J; ++j) {
-    double own = p.image[j][0][0] == 0 && p.image[j][1][1] == 0 ? known[1] : known[0];
-    for (int i = 0; i < 3; ++i) {
-      int at_limb = ROW_OF[j] + i;
-      (j < TRUNK ? n.H[3 * j + i][3 * j + i] : n.L[LIMB_OF[j]][at_limb][at_limb]) += own;
-    }
-  }
+  for (int j = 0; j < J; ++j)
+    for (int i = 3 * j; i < 3 * j + 3; ++i) n.H[i][i] += known[p.image[j][0][0] == 0 && p.image[j][1][1] == 0];
   for (int m = 0; m < 4; ++m)
     for (int lower = 0; lower < 2; ++lower) {
       int a = lower ? MID[m] : START[m], b = lower ? END[m] : MID[m];
@@ -371,25 +397,9 @@ void inform(Normal& n, const Problem& p, const double* at, const double known[3]
       for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k) {
           double h = info * t[i] * t[k];
-          n.L[m][3 * lower + i][3 * lower + k] += h;
-          if (lower) n.L[m][i][k] += h, n.L[m][i][3 + k] -= h, n.L[m][3 + i][k] -= h;
-          else n.H[3 * a + i][3 * a + k] += h, n.C[m][i][3 * a + k] -= h;
+          n.H[3 * b + i][3 * b + k] += h, n.H[3 * a + i][3 * a + k] += h;
+          n.H[3 * a + i][3 * b + k] -= h, n.H[3 * b + i][3 * a + k] -= h;
         }
-    }
-}
-
-// The matrix of the normal equations, dense, in the order of the unknowns.
-void spread(const Normal& n, double H[N][N]) {
-  int trunk[T];
-  for (int i = 0; i < T; ++i) trunk[i] = i < 18 ? i : 42;
-  std::memset(H, 0, sizeof(double) * N * N);
-  for (int i = 0; i < T; ++i)
-    for (int j = 0; j < T; ++j) H[trunk[i]][trunk[j]] = n.H[i][j];
-  for (int m = 0; m < 4; ++m)
-    for (int i = 0; i < 6; ++i) {
-      int row = 3 * (i < 3 ? MID[m] : END[m]) + i % 3;
-      for (int j = 0; j < 6; ++j) H[row][3 * (j < 3 ? MID[m] : END[m]) + j % 3] = n.L[m][i][j];
-      for (int c = 0; c < T; ++c) H[row][trunk[c]] = H[trunk[c]][row] = n.C[m][i][c];
     }
 }
 
@@ -408,27 +418,23 @@ const Limits* limits_of(const py::object& limits) {
 }
 
 py::tuple descend_all(py::array problems, py::object limits, Longs which, Doubles start, unsigned parts, int most,
-                      double precision, Doubles hopeless) {
+                      Doubles hopeless, Doubles damped) {
   const Problem* p = problems_of(problems);
   const Limits* L = limits_of(limits);
   const py::ssize_t count = which.size();
-  py::array_t<double> x({count, (py::ssize_t)N}), chi2(count);
-  py::array_t<std::int64_t> steps(count);
+  py::array_t<double> x({count, (py::ssize_t)N}), chi2(count), damping(count);
   std::memcpy(x.mutable_data(), start.data(), sizeof(double) * N * count);
-  double *at = x.mutable_data(), *value = chi2.mutable_data();
+  std::memcpy(damping.mutable_data(), damped.data(), sizeof(double) * count);
+  double *at = x.mutable_data(), *value = chi2.mutable_data(), *damp = damping.mutable_data();
   const std::int64_t* row = which.data();
-  std::int64_t* taken = steps.mutable_data();
   const double* limit = hopeless.data();
   {
     py::gil_scoped_release released;
     std::atomic<py::ssize_t> next{0};
     auto work = [&] {
       for (py::ssize_t first; (first = next.fetch_add(ROWS_AT_ONCE)) < count;)
-        for (py::ssize_t k = first; k < std::min(first + ROWS_AT_ONCE, count); ++k) {
-          int done = 0;
-          value[k] = descend(p[row[k]], L, at + k * N, parts, most, precision, limit[k], done);
-          taken[k] = done;
-        }
+        for (py::ssize_t k = first; k < std::min(first + ROWS_AT_ONCE, count); ++k)
+          value[k] = descend(p[row[k]], L, at + k * N, parts, most, limit[k], damp[k]);
     };
     std::vector<std::thread> others;
     const py::ssize_t wanted = std::min<py::ssize_t>(std::thread::hardware_concurrency(), count / ROWS_A_THREAD);
@@ -436,7 +442,7 @@ py::tuple descend_all(py::array problems, py::object limits, Longs which, Double
     work();
     for (auto& one : others) one.join();
   }
-  return py::make_tuple(x, chi2, steps);
+  return py::make_tuple(x, chi2, damping);
 }
 
 // Hands the information on the unknowns of each body to `take`.
@@ -458,7 +464,7 @@ void informed(const py::array& problems, const py::object& limits, const Longs& 
 py::array_t<double> information(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
   py::array_t<double> found({which.size(), (py::ssize_t)N, (py::ssize_t)N});
   informed(problems, limits, which, at, known, [&](py::ssize_t k, const Normal& n) {
-    spread(n, reinterpret_cast<double(*)[N]>(found.mutable_data() + k * N * N));
+    std::memcpy(found.mutable_data() + k * N * N, n.H, sizeof n.H);
   });
   return found;
 }
@@ -467,10 +473,11 @@ py::array_t<double> information(py::array problems, py::object limits, Longs whi
 py::array_t<double> log_determinants(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
   py::array_t<double> found(which.size());
   informed(problems, limits, which, at, known, [&](py::ssize_t k, Normal& n) {
-    double add_l[4][6], add_t[T], total = eliminate(n, 0, 31, add_l, add_t) ? 0 : NAN;
-    for (int c = 0; c < T; ++c) total += 2 * std::log(n.H[c][c]);
+    const Factor factor(n, 0, 31);
+    double total = 0;
+    for (int c = 0; c < T; ++c) total += 2 * std::log(factor.S[c][c]);
     for (int m = 0; m < 4; ++m)
-      for (int c = 0; c < 6; ++c) total += 2 * std::log(n.L[m][c][c]);
+      for (int c = 0; c < 6; ++c) total += 2 * std::log(factor.L[m][c][c]);
     found.mutable_data()[k] = total;
   });
   return found;
@@ -506,7 +513,7 @@ py::array_t<bool> separate(py::array problems, py::object limits, Longs which, D
         matrices[i].resize(N * N);
         evaluate(p[which.data()[k]], L, x, 31, &n);
         inform(n, p[which.data()[k]], x, known.data());
-        spread(n, reinterpret_cast<double(*)[N]>(matrices[i].data()));
+        std::memcpy(matrices[i].data(), n.H, sizeof n.H);
       }
       double total = 0;
       for (int j = 0; j < N; ++j) {
