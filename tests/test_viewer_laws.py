@@ -146,7 +146,8 @@ def test_bodies_of_a_page_are_those_of_the_figure(folder: Path, motion: posekit.
 
 
 CHAIN = """<robot name="chain"><link name="base"/><link name="right_arm"/><link name="right_hand"/>
-<link name="left_arm"/><joint name="a" type="revolute"><parent link="base"/><child link="right_arm"/><origin xyz="0 -0.2 0.4"/>
+<link name="left_arm"/>
+<joint name="a" type="revolute"><parent link="base"/><child link="right_arm"/><origin xyz="0 -0.2 0.4"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
 <joint name="b" type="fixed"><parent link="right_arm"/><child link="right_hand"/><origin xyz="0 0 0.3"/></joint>
 <joint name="c" type="revolute"><parent link="base"/><child link="left_arm"/><origin xyz="0 0.01 0"/>
