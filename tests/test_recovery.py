@@ -302,9 +302,7 @@ def test_sure_is_the_probability_of_the_samples():
 
     def answered(covariance, relative=False):
         frame, none = np.zeros(1, dtype=int), np.zeros(1)
-        found = answers_of(
-            truth, frame, np.ones(1), covariance, LENGTHS, relative=np.array([relative]), unlisted=none
-        )
+        found = answers_of(truth, frame, np.ones(1), covariance, LENGTHS, np.array([relative]), none)
         return {name: values[0] for name, values in found.items()}
 
     from scipy.stats import chi, chi2, norm, t

@@ -38,6 +38,10 @@ class Record:
             value.flags.writeable = False
         object.__setattr__(self, name, value)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a pickle; those that are computed when they are read are computed."""
+        return {name: getattr(self, name) for name in vars(self)}
+
 
 def read_only(values: ArrayLike) -> Array:
     """Return a read-only copy in double precision."""

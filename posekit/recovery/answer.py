@@ -19,9 +19,6 @@ REPRESENTED: Final = 0.95
 #: Samples of each mode: `sure` is then known to 0.06 where one mode holds everything, better where several do.
 N_SAMPLES: Final = 64
 
-#: Probability of a mode below which its spread is not sampled.
-NEGLIGIBLE: Final = 1e-4
-
 #: Postures of a frame that are compared each with each; of more, the likeliest stand for the rest.
 MAX_COMPARED: Final = 600
 
@@ -57,8 +54,8 @@ ROUNDING: Final = 1e-8
 #: 95 % quantile of the standard normal distribution.
 NORMAL_95: Final = 1.6449
 
-#: Distance from the lengths at which laying a posture onto them ends, metres.
-SAME_METRES: Final = 1e-7
+#: Half the difference of squared lengths at which laying a posture onto them ends, and that at which it has failed.
+LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 
 
 def answers_of(
@@ -67,7 +64,6 @@ def answers_of(
     probability: Array,
     covariance: Array | None,
     lengths: Array,
-    *,
     relative: Flags,
     unlisted: Array,
 ) -> dict[str, Any]:
@@ -108,9 +104,8 @@ def answers_of(
     rows, held = representatives(shape, frame, weight, hold)
     if covariance is None:
         # Between exact postures there is none: the answer is the one that stands for the most probability.
-        survivor, sure = np.array([one[0] for one in rows]), np.array([one[0] for one in held])
+        survivor = np.array([one[0] for one in rows])
         laid = shape[starts + survivor]
-        sides = _sides(shape[:, None])
     else:
         a, b = np.array(TREE_SEGMENTS).T
         sizes = np.log(np.linalg.norm(shape[:, a] - shape[:, b], axis=2) / lengths[: len(a)])
@@ -118,20 +113,23 @@ def answers_of(
         laid = lay(np.add.reduceat(weight[:, None, None] * shape, starts), np.exp(size)[:, None] * lengths)
         away = np.nan_to_num(np.linalg.norm(shape - laid[frame], axis=2)).mean(axis=1)
         survivor = np.lexsort((away, frame))[starts] - starts
-        inside, sides = np.empty(len(shape)), np.empty((len(shape), 2, len(PARENTS) - 1))
-        for at in range(0, len(shape), SAMPLED_AT_ONCE):
-            own = slice(at, at + SAMPLED_AT_ONCE)
-            draws = _draws(shape[own], covariance[own], weight[own], relative[frame[own]])
-            away = np.linalg.norm(draws - laid[frame[own], None], axis=3)
-            inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not beyond
-            sides[own] = _sides(draws)
-        sure = np.add.reduceat(weight * inside, starts)
+    inside, sides = np.empty(len(shape)), np.empty((len(shape), 2, len(PARENTS) - 1))
+    step = len(shape) if covariance is None else SAMPLED_AT_ONCE
+    for own in (slice(at, at + step) for at in range(0, len(shape), step)):
+        draws = shape[own, None]
+        if covariance is not None:
+            draws = draws + _drawn(covariance[own], relative[frame[own]])
+        away = np.linalg.norm(draws - laid[frame[own], None], axis=3)
+        inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not beyond
+        gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
+        sides[own] = np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2)
     near, far = np.add.reduceat(weight[:, None, None] * sides, starts).transpose(1, 0, 2)
     each = np.stack([1.0 - near - far, near, far])
     known = np.isfinite(laid[:, 1:, 2] - laid[:, PARENTS[1:], 2])
     return {
         "joints": laid + np.add.reduceat(weight[:, None, None] * base, starts),
-        "sure": sure * listed,
+        "sure": np.add.reduceat(weight * inside, starts) * listed,
+        "sure_of": np.where(relative, "relative to the neck", "position"),
         "survivor": survivor,
         "representatives": rows,
         "represented": [one * share for one, share in zip(held, listed, strict=True)],
@@ -154,7 +152,7 @@ def lay(joints: Array, lengths: Array) -> Array:
     for _ in range(30):
         apart = np.where(use[..., None], x[:, b] - x[:, a], 0.0)
         gap = np.where(use, 0.5 * ((apart**2).sum(axis=2) - lengths**2), 0.0)
-        left = np.abs(gap).max(axis=1) >= SAME_METRES * 0.1
+        left = np.abs(gap).max(axis=1) >= LAID_SQUARE_METRES
         if not left.any():
             break
         J[:, rows, b], J[:, rows, a] = apart, -apart
@@ -164,10 +162,7 @@ def lay(joints: Array, lengths: Array) -> Array:
         step = np.einsum("fsk,fs->fk", flat, np.linalg.solve(normal, gap[..., None])[..., 0]).reshape(x.shape)
         share = left * np.minimum(1.0, 0.1 / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-12))
         x = x - step * share[:, None, None]
-    off = np.where(use, np.abs(np.linalg.norm(x[:, b] - x[:, a], axis=2) - lengths), 0.0).max(
-        axis=1, initial=0.0
-    )
-    for k in np.flatnonzero(off > 1e-4).tolist():
+    for k in np.flatnonzero(np.abs(gap).max(axis=1) > UNLAID_SQUARE_METRES).tolist():
         x[k] = np.nan_to_num(joints[k])
         for index, (start, end) in enumerate(TREE_SEGMENTS):
             direction = unit(np.nan_to_num(joints[k, end] - joints[k, start]) + 1e-12)
@@ -257,19 +252,10 @@ def joint_radius(covariance: Array) -> Array:
     return np.where(known, np.sqrt(mean * root**3), 0.0)
 
 
-def _draws(shape: Array, covariance: Array, weight: Array, relative: Flags) -> Array:
-    """Draw postures (N, S, 14, 3) of each mode, relative to the neck where this is asked."""
-    found = np.repeat(shape[:, None], N_SAMPLES, axis=1)
-    rows = np.flatnonzero(weight > NEGLIGIBLE)
-    some = (covariance[rows] + covariance[rows].transpose(0, 2, 1)) / 2
-    floor = ROUNDING * (1.0 + np.einsum("nii->n", some))
-    root = np.linalg.cholesky(some + floor[:, None, None] * np.eye(some.shape[1]))
-    off = (DRAWS @ root.transpose(0, 2, 1)).reshape(len(rows), N_SAMPLES, shape.shape[1], 3)
-    found[rows] += off - np.where(relative[rows, None, None, None], off[:, :, :1], 0.0)
-    return found
-
-
-def _sides(draws: Array) -> Array:
-    """Return the shares of draws (N, S, 14, 3) in which a segment's outer end is nearer, and farther (N, 2, 13)."""
-    gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
-    return np.asarray(np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2))
+def _drawn(covariance: Array, relative: Flags) -> Array:
+    """Draw the errors of modes (N, S, 14, 3), relative to the neck where this is asked."""
+    floor = ROUNDING * (1.0 + np.einsum("nii->n", covariance))
+    symmetric = (covariance + covariance.transpose(0, 2, 1)) / 2
+    root = np.linalg.cholesky(symmetric + floor[:, None, None] * np.eye(covariance.shape[1]))
+    off = (DRAWS @ root.transpose(0, 2, 1)).reshape(len(root), N_SAMPLES, -1, 3)
+    return np.asarray(off - np.where(relative[:, None, None, None], off[:, :, :1], 0.0))

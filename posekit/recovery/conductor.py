@@ -180,7 +180,7 @@ class _Conductor:
             "frame": frame[own],
             "joints": joints,
             "head": sight.head[row],
-            "branch": np.array(trees.branches, dtype=np.str_)[own],
+            "branch": trees.branches[own],
             "scale": sight.scale[row],
         }
         terms = log_terms(

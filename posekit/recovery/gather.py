@@ -57,9 +57,8 @@ class Gathering:
             reason=[reason or "no posture fits" for reason in sight.reasons],
             root=sight.roots,
         )
-        answers = Answer(joints=np.full((len(view), len(JOINTS), 3), np.nan))
         self.frames: dict[str, Any] = {name: list(values) for name, values in frames.columns().items()}
-        self.answers: dict[str, Any] = {name: list(values) for name, values in answers.columns().items()}
+        self.answers: list[tuple[Ints, Callable[[], dict[str, Any]]]] = []
         self.survivors = [Survivors(frame=np.empty(0, np.intp), joints=np.empty((0, len(JOINTS), 3)))]
 
     def close(self, *frames: int, **about: Any) -> None:
@@ -112,12 +111,9 @@ class Gathering:
         rows, probability = rows[order], probability[order]
         frame = every[rows]
         first = np.searchsorted(frame, frame)
-        if covariance is not None:
-            before = np.cumsum(probability) - probability
-            held = before - before[first] < self.settings.coverage - 1e-12
-            held[first] = True
-        else:
-            held = np.ones(len(rows), dtype=np.bool_)
+        before = np.cumsum(probability) - probability
+        held = (before - before[first] < self.settings.coverage - 1e-12) | (covariance is None)
+        held[first] = True
         unlisted = np.bincount(frame[~held], minlength=len(self.view))
         improbable = np.bincount(frame[~held], probability[~held], len(self.view)).astype(np.float64)
         found = np.array(sorted(set(frame.tolist())), dtype=np.intp)
@@ -129,14 +125,13 @@ class Gathering:
         if len(found):
             rows, probability = rows[held], probability[held]
             table = {name: values[rows] for name, values in columns.items()} | {"probability": probability}
-            self._answer(found, table, None if covariance is None else covariance(rows), improbable[found])
+            self._keep(found, table, None if covariance is None else covariance(rows), improbable[found])
 
-    def _answer(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
-        """Keep the survivors of some frames (K,) and answer these frames."""
+    def _keep(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
+        """Keep the survivors of some frames (K,), by frame; frames under noise are answered at once."""
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
-        deep = self.sight.camera.perspective & ((covariance is None) | self.given[found])
         if covariance is not None:
             block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
             if not self.sight.camera.perspective:
@@ -155,14 +150,24 @@ class Gathering:
         if self.settings.group is not None:
             each = np.split(joints, starts[1:])
             table["group"] = np.concatenate([group_of(one, self.settings.group) for one in each])
-        answers = answers_of(
-            joints, frame, probability, covariance, self.lengths, relative=~deep, unlisted=unlisted
-        )
-        answers["sure_of"] = np.where(deep, "position", "relative to the neck")
-        for name, values in answers.items():
-            for row, k in enumerate(found.tolist()):
-                self.answers[name][k] = values[row]
         self.survivors.append(Survivors(**table))
+        relative = ~(self.sight.camera.perspective & ((covariance is None) | self.given[found]))
+        answers: Callable[[], dict[str, Any]] = partial(
+            answers_of, joints, frame, probability, covariance, self.lengths, relative, unlisted
+        )
+        # Covariances are not kept.
+        self.answers.append((found, answers if covariance is None else partial(dict, answers())))
+
+    def answer(self, starts: Ints) -> Answer:
+        """Return the answers; `starts` (F,) are the first survivors of the frames."""
+        nothing = Answer(joints=np.full((len(starts), len(JOINTS), 3), np.nan))
+        columns: dict[str, Any] = {name: list(values) for name, values in nothing.columns().items()}
+        for found, answers in self.answers:
+            for name, values in answers().items():
+                for row, k in enumerate(found.tolist()):
+                    of_rows = name in ("survivor", "representatives")
+                    columns[name][k] = values[row] + starts[k] if of_rows else values[row]
+        return Answer(**columns)
 
     def recovery(
         self,
@@ -179,24 +184,20 @@ class Gathering:
         settings, tolerances : mapping
             What decided the result, as JSON values.
         """
-        view, answers, parts = self.view, self.answers, [one.columns() for one in self.survivors]
+        view, parts = self.view, [one.columns() for one in self.survivors]
         table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         order = np.argsort(table["frame"], kind="stable")
         table = {name: values[order] for name, values in table.items()}
         starts = np.searchsorted(table["frame"], np.arange(len(view)))
-        for k, start in enumerate(starts.tolist()):
-            answers["representatives"][k] = answers["representatives"][k] + start
-            answers["survivor"][k] += start if answers["survivor"][k] >= 0 else 0
         points = with_head(table["joints"], table["head"])
-        noisy = np.array([one == "noisy" for one in self.frames["judged"]])[table["frame"]]
         return Recovery(
             survivors=Survivors(
                 q=partial(self.person.inverse_kinematics, points),
-                margins=partial(margins, points, noisy),
+                margins=partial(margins, points, table["chi2"] > 0),
                 **table,
             ),
             frames=Frames(pictures=view.pictures, **self.frames),
-            answer=Answer(**answers),
+            answer=partial(self.answer, starts),
             settings=settings,
             tolerances=tolerances,
             lengths=dict(self.person.lengths),

@@ -59,10 +59,6 @@ class Table(Record):
         """Return the columns that are given at once, by name."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.metadata}  # type: ignore[arg-type]
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a pickle: functions of `Derived` fields are called."""
-        return {name: getattr(self, name) for name in vars(self)}
-
 
 class Derived:
     """A field that may be given as a function without arguments: it is called when the field is first read."""
@@ -306,7 +302,7 @@ class Recovery(Record):
 
     survivors: Survivors
     frames: Frames
-    answer: Answer
+    answer: Derived = Derived()
     path: Paths | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     tolerances: Mapping[str, Any] = field(default_factory=dict)
@@ -353,7 +349,7 @@ class Recovery(Record):
         return np.searchsorted(self.survivors.frame, np.arange(len(self) + 1))
 
     def _facts(self) -> list[str]:
-        found, empty = len(self.survivors), int((np.asarray(self.answer.survivor) < 0).sum())
+        found, empty = len(self.survivors), int((np.diff(self._starts) == 0).sum())
         names = [f"{len(self)} {'frame' if len(self) == 1 else 'frames'}"]
         names.append(f"{found} {'posture' if found == 1 else 'postures'}")
         return names + ([f"none in {empty}"] if empty else [])

@@ -116,19 +116,21 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
     InputError
         If a setting has no meaning for such a view, or no frame can be as the view states.
     """
-    orthographic = isinstance(view.camera, ScaledOrthographicCamera)
-    stated = (settings.deviation, view.deviation, settings.length_deviation, view.length_deviation)
-    may_be_exact = not (view.derived or settings.refine or any(stated))
-    pixels = settings.deviation or view.deviation or (KEY_POINT_PIXELS if view.derived else UNSTATED_PIXELS)
-    reasons = _unseen(view)
-    if orthographic:
+    if isinstance(view.camera, ScaledOrthographicCamera):
         if settings.root != "auto":
             raise refusal("", "root", settings.root, "no root: the view has no depth", "leave it out")
-        return _photograph(view, person, settings, lengths, pixels, may_be_exact, reasons)
+        return _photograph(view, person, settings, lengths)
     for name, asked in (("scale", settings.scale), ("proportions", settings.proportions)):
         if asked not in (None, "auto", "figure", "people"):
             raise refusal("", name, str(asked), "an uncalibrated view", "leave it out")
-    return _calibrated(view, person, settings, lengths, pixels, may_be_exact, reasons)
+    return _calibrated(view, person, settings, lengths)
+
+
+def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
+    """Return the standard deviation of image points, pixels, and whether they and the lengths may be exact."""
+    usual = KEY_POINT_PIXELS if view.derived else UNSTATED_PIXELS
+    stated = (settings.deviation, view.deviation, settings.length_deviation, view.length_deviation)
+    return stated[0] or stated[1] or usual, not (view.derived or settings.refine or any(stated))
 
 
 def _unseen(view: View) -> list[str]:
@@ -147,17 +149,10 @@ def _unseen(view: View) -> list[str]:
     return [str(reason) for reason in np.select(list(reasons.values()), list(reasons), "")]
 
 
-def _calibrated(
-    view: View,
-    person: Figure,
-    settings: RecoverSettings,
-    lengths: LengthUncertainty,
-    pixels: float,
-    may_be_exact: bool,
-    reasons: list[str],
-) -> Sight:
+def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
     """Gather what a calibrated camera sees: the root as given, or from six head points."""
-    count, model = len(view), view.camera
+    count, model, reasons = len(view), view.camera, _unseen(view)
+    pixels, may_be_exact = _noise_of(view, settings)
     assert not isinstance(model, ScaledOrthographicCamera)
     camera, pose = _head_pose(view, model, person, settings)
     root, head = view.root.copy(), np.full((count, len(HEAD_POINTS), 3), np.nan)
@@ -258,17 +253,10 @@ def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
     return record
 
 
-def _photograph(
-    view: View,
-    person: Figure,
-    settings: RecoverSettings,
-    lengths: LengthUncertainty,
-    pixels: float,
-    may_be_exact: bool,
-    reasons: list[str],
-) -> Sight:
+def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
     """Gather what an uncalibrated picture shows: at one scale a frame, or at several that close the rigid parts."""
-    model = view.camera
+    model, reasons = view.camera, _unseen(view)
+    pixels, may_be_exact = _noise_of(view, settings)
     assert isinstance(model, ScaledOrthographicCamera)
     from posekit.recovery.objects import parse_scale
 

@@ -107,9 +107,10 @@ class Trees:
         return len(self.code)
 
     @cached_property
-    def branches(self) -> list[str]:
+    def branches(self) -> NDArray[np.str_]:
         """Each survivor's 13 branches as 0 (near) and 1 (far)."""
-        return [f"{code:0{DEPTH}b}" for code in self.code.tolist()]
+        digits = np.uint32(ord("0")) + (self.code[:, None] >> np.arange(DEPTH)[::-1] & 1)
+        return digits.astype(np.uint32).view(f"U{DEPTH}")[:, 0]
 
     @cached_property
     def rejected(self) -> list[dict[str, int]]:
