@@ -1,0 +1,146 @@
+"""Symmetries of recovery: what is seen in a mirror, turned, larger, or alone is recovered so."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+import posekit
+from posekit.cameras import PinholeCamera
+from posekit.robots import load_robot
+from posekit.skeleton import JOINTS, other_side
+from posekit.synthesis import random_views
+from tests.test_cli import folder, run
+
+__all__ = ["folder", "run"]  # fixtures
+EXCHANGED = [JOINTS.index(other_side(name)) for name in JOINTS]
+CAMERA = PinholeCamera(K=np.array([[900, 0, 320], [0, 900, 240], [0, 0, 1.0]]), size=(640, 480))
+
+
+@pytest.fixture(scope="module")
+def view() -> posekit.View:
+    """Three random legal postures, 2 px off, in front of a camera without a pose."""
+    seen = random_views(3, np.random.default_rng(11), distance=(4.0, 5.0))
+    truth = seen.truth
+    image = CAMERA.project(truth) + np.random.default_rng(12).normal(0, 2.0, (3, 14, 2))
+    return posekit.View(
+        camera=CAMERA,
+        image=image,
+        time=np.arange(3) / 10,
+        root=truth[:, 0],
+        truth=truth,
+        deviation=2.0,
+        lengths=dict(posekit.load_figure().lengths),
+    )
+
+
+@pytest.fixture(scope="module")
+def found(view: posekit.View) -> posekit.Recovery:
+    return posekit.recover(view, length_deviation=0.02)
+
+
+def alike(one: posekit.Recovery, other: posekit.Recovery, moved: Any) -> None:
+    """Assert that likely survivors of both are the same after a motion, with the same chi2 and regions.
+
+    Probabilities are sampled, and the samples do not move with the person.
+    """
+    for k in range(len(one)):
+        mine, others = (found.survivors.frame == k for found in (one, other))
+        joints = moved(one[k].joints)
+        apart = np.linalg.norm(joints[:, None] - other[k].joints[None], axis=-1).max(axis=-1)
+        likely, nearest = one[k].probability > 0.03, apart.argmin(axis=1)
+        assert likely.any() and (apart.min(axis=1)[likely] < 1e-4).all()
+        for column in ("radius", "chi2"):
+            first = getattr(one.survivors, column)[mine][likely]
+            second = getattr(other.survivors, column)[others][nearest[likely]]
+            if column == "radius":  # sides may be exchanged
+                first, second = np.sort(first, axis=1), np.sort(second, axis=1)
+            np.testing.assert_allclose(second, first, rtol=1e-2)
+
+
+def test_a_mirrored_picture_shows_the_mirrored_person(view: posekit.View, found: posekit.Recovery) -> None:
+    def mirrored(joints: np.ndarray) -> np.ndarray:
+        return np.asarray(joints[..., EXCHANGED, :] * [-1.0, 1.0, 1.0])
+
+    seen = replace(
+        view,
+        image=(view.image * [-1, 1] + [640, 0])[:, EXCHANGED],
+        truth=mirrored(view.truth),
+        root=view.root * [-1, 1, 1],
+    )
+    alike(found, posekit.recover(seen, length_deviation=0.02), mirrored)
+
+
+def test_a_picture_on_its_side_shows_the_same_person(view: posekit.View, found: posekit.Recovery) -> None:
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    camera = PinholeCamera(K=np.array([[900, 0, 240], [0, 900, 320], [0, 0, 1.0]]), size=(480, 640))
+    image = (view.image - [320, 240]) @ turn[:2, :2].T + [240, 320]
+    seen = replace(view, camera=camera, image=image, truth=view.truth @ turn.T, root=view.root @ turn.T)
+    alike(found, posekit.recover(seen, length_deviation=0.02), lambda joints: joints @ turn.T)
+
+
+def test_a_frame_alone_has_the_answer_that_it_has_among_others(
+    view: posekit.View, found: posekit.Recovery
+) -> None:
+    for k in range(len(view)):
+        alone, start = posekit.recover(view.take([k]), length_deviation=0.02), found.rows(k).start
+        assert alone.answer.survivor[0] == found.answer.survivor[k] - start
+        np.testing.assert_array_equal(
+            alone.answer.representatives[0], found.answer.representatives[k] - start
+        )
+        np.testing.assert_allclose(alone.answer.represented[0], found.answer.represented[k])
+        np.testing.assert_allclose(alone.answer.nearer_sure[0], found.answer.nearer_sure[k])
+        assert alone.frames.reason[0] == found.frames.reason[k]
+        assert alone.frames.unlisted_probability[0] == pytest.approx(found.frames.unlisted_probability[k])
+
+
+def test_the_answer_is_near_its_survivor_and_its_signs_are_its_depths(found: posekit.Recovery) -> None:
+    for k in range(len(found)):
+        row, rows = int(found.answer.survivor[k]), found.rows(k)
+        assert rows.start <= row < rows.stop
+        away = np.linalg.norm(found.survivors.joints[rows] - found.answer.joints[k], axis=-1).mean(axis=1)
+        assert away.argmin() + rows.start == row
+        representatives = found.answer.representatives[k]
+        assert (rows.start <= representatives).all() and (representatives < rows.stop).all()
+        assert (np.diff(found.answer.represented[k]) <= 1e-9).all()
+
+
+# Objects
+
+
+def test_a_written_object_projects_onto_its_image_and_has_its_configurations(
+    run: Any, tmp_path: Path
+) -> None:
+    view, target = tmp_path / "panda.json", tmp_path / "found.json"
+    run("synth", "object", "panda", "-o", str(view), "--seed", "4")
+    seen = json.loads(view.read_text(encoding="utf-8"))
+    code, out, err = run("recover", str(view), "-o", str(target), "--linkage", "panda", "--scale", "500")
+    assert code == 0, err
+    document = json.loads(target.read_text(encoding="utf-8"))
+    (frame,) = document["frames"]
+    assert f"{len(frame['postures'])} postures of panda in 1 frame" in out
+    robot = load_robot("panda", bodies="none")
+    data, places = robot.model.createData(), document["points"]
+    image = np.array([seen["frames"][0]["image"][name] for name in places])
+    starts, ends = ([places.index(name.split("-")[k]) for name in document["segments"]] for k in range(2))
+    for one in frame["postures"]:
+        points = np.array(one["points"])
+        assert np.linalg.norm(points[starts] - points[ends], axis=1) == pytest.approx(
+            document["lengths"], abs=1e-6
+        )
+        flat = image / one["scale"]
+        np.testing.assert_allclose(np.diff(points[:, :2], axis=0), np.diff(flat, axis=0), atol=1e-9)
+        pin.framesForwardKinematics(robot.model, data, np.array(one["q"]))
+        placed = np.array([data.oMf[robot.model.getFrameId(name)].translation for name in places])
+        R, _ = Rotation.align_vectors(placed - placed.mean(axis=0), points - points.mean(axis=0))
+        off = R.apply(points - points.mean(axis=0)) - (placed - placed.mean(axis=0))
+        assert one["fk_distance"] == pytest.approx(np.linalg.norm(off, axis=1).max(), abs=1e-6)
+        assert one["certified"] is (one["fk_distance"] < 1e-3)
+    assert f"{sum(one['certified'] for one in frame['postures'])} have a configuration" in out
