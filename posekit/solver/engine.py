@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from posekit.geometry import Array, Flags, Ints
+from posekit.geometry import Array, Ints
 from posekit.solver import reference
 from posekit.solver.problem import Problem
 
@@ -58,9 +58,3 @@ def descend(
     damped = np.full(len(which), reference.FIRST_DAMPING) if damping is None else damping
     x, chi2, damped = run("descend", problem, which, start, parts, most, limit, damped)
     return x, chi2, damped
-
-
-def distinct(group: Ints, points: Array, within: float) -> Flags:
-    """Return which rows are new among better ones of their group; see `posekit.solver.reference.distinct`."""
-    found: Flags = (reference if compiled is None else compiled).distinct(group, points, within)
-    return found

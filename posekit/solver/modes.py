@@ -91,8 +91,7 @@ class Modes:
 
     def covariance(self, rows: Ints | slice = slice(None)) -> Array:
         """Return the covariance of all joint positions of some modes (K, 42, 42), square metres."""
-        information = run("information", self.problem, self.frame[rows], self.x[rows], KNOWN)
-        return np.asarray(np.linalg.inv(information)[:, :42, :42])
+        return np.asarray(run("covariance", self.problem, self.frame[rows], self.x[rows], KNOWN))
 
     def residuals(self, rows: Ints | slice = slice(None)) -> Mapping[str, Array]:
         """Return the size of every residual of some modes (K,), standard deviations, by what it is of.
@@ -118,7 +117,27 @@ class Modes:
         return out
 
 
+def distinct(
+    problem: Problem,
+    group: Ints,
+    frame: Ints,
+    x: Array,
+    parts: int,
+    within: float | Array,
+    *,
+    sure: bool = False,
+) -> Flags:
+    """Return which bodies (N, 43), the best first in each group, differ from all that are kept before them.
+
+    Bodies are one if none of the joints of `parts`, relative to the neck, is farther apart than `within`, a number or
+    (N,), metres. With `sure`, they are also one if the difference is no more than their uncertainty (`MERGE_CHI2`).
+    """
+    near = np.broadcast_to(np.asarray(within, dtype=np.float64), group.shape)
+    reach = MERGE_REACH_METRES if sure else 0.0
+    return np.asarray(run("distinct", problem, group, frame, x, parts, near, reach, MERGE_CHI2, KNOWN))
+
+
 def merged(modes: Modes) -> Modes:
     """Return the best of every set of modes that are one; they are sorted by frame and chi2."""
-    levels = MERGE_DISTANCE_METRES, MERGE_REACH_METRES, MERGE_CHI2
-    return modes.take(run("separate", modes.problem, modes.frame, modes.x, KNOWN, *levels))
+    frame, x = modes.frame, modes.x
+    return modes.take(distinct(modes.problem, frame, frame, x, 31, MERGE_DISTANCE_METRES, sure=True))

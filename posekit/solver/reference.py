@@ -368,18 +368,22 @@ def descend(
     return x, here.chi2, damping
 
 
-def information(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
+def information(
+    problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array, parts: int = 31
+) -> Array:
     """Return the information (N, 43, 43) on the unknowns: the matrix, and what is `known` besides the residuals.
 
     `known` (3,) are the information on any place and on a hidden joint about its mode, one over square metres, and the
     factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
     """
-    H = evaluate(problems[which], limits, x, 31).matrix
+    H = evaluate(problems[which], limits, x, parts).matrix
     p, joints, index = problems[which], x[:, :SIZE].reshape(-1, 14, 3), np.arange(SIZE)
     seen = (p["image"] != 0).any(axis=(2, 3))
     H[:, index, index] += np.repeat(np.where(seen, known[0], known[1]), 3, axis=1)
+    limbs = [k for k in range(4) if parts >> (k + 1) & 1]
+    segments = [pair for k in limbs for pair in pairwise((lim.STARTS[k], lim.MIDDLES[k], lim.ENDS[k]))]
     perspective = p["perspective"] > 0
-    for start, end in (*zip(lim.STARTS, lim.MIDDLES, strict=True), *zip(lim.MIDDLES, lim.ENDS, strict=True)):
+    for start, end in segments:
         line = joints[:, end] - joints[:, start]
         square = dot(line, line)
         ray = np.where(perspective[:, None], joints[:, end], [0.0, 0.0, 1.0])
@@ -395,57 +399,51 @@ def information(problems: Records, limits: Limits | None, which: Ints, x: Array,
     return H
 
 
+def covariance(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
+    """Return the covariances of the joints (N, 42, 42)."""
+    H = information(problems, limits, which, x, known) + FLOOR * np.eye(WIDTH)
+    return np.asarray(np.linalg.inv(H)[:, :SIZE, :SIZE])
+
+
 def log_determinants(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
     """Return the logarithms of the determinants of the information (N,)."""
     H = information(problems, limits, which, x, known) + FLOOR * np.eye(WIDTH)
     return np.asarray(np.linalg.slogdet(H)[1])
 
 
-def separate(
+def distinct(
     problems: Records,
     limits: Limits | None,
+    group: Ints,
     which: Ints,
     x: Array,
-    known: Array,
-    within: float,
+    parts: int,
+    within: Array,
     reach: float,
     level: float,
+    known: Array,
 ) -> Flags:
-    """Return which bodies (N,), by frame and the best first, differ from all that are kept before them.
+    """Return which bodies (N,), the best first in each group, differ from all that are kept before them.
 
-    Bodies are one if no joint, relative to the neck, is farther than `within` apart; or none farther than `reach`, and
-    :math:`d^T H d` of their difference is below `level`.
+    Bodies are one if none of the joints of `parts`, relative to the neck, is farther than `within` (N,) apart; or none
+    farther than `reach`, and :math:`d^T H d` of their difference is below `level`.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
     joints = x[:, :SIZE].reshape(-1, 14, 3)
-    joints = joints - joints[:, :1]
-    edges = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
-    every = information(problems, limits, which, x, known)
+    joints = (joints - joints[:, :1])[:, free_joints(parts)]
+    edges = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
+    every = information(problems, limits, which, x, known, parts) if reach else np.empty(0)
     for a, b in pairwise(edges.tolist()):
         kept: list[int] = []
         for k in range(a, b):
             apart = joints[kept] - joints[k]
             far = np.sqrt(dot(apart, apart).max(axis=1)) if kept else np.empty(0)
             near = np.array(kept, dtype=np.intp)[far < reach]
-            same = bool((far < within).any())
+            same = bool((far < within[k]).any())
             if not same and near.size:
                 d = x[k] - x[near]
                 same = bool((np.einsum("ni,nij,nj->n", d, every[near], d) < level).any())
             if not same:
-                kept.append(k)
-        keep[kept] = True
-    return keep
-
-
-def distinct(group: Ints, points: Array, within: float) -> Flags:
-    """Return which rows (N,), best first in each group, have a joint farther than `within` from all kept before."""
-    keep = np.zeros(len(group), dtype=np.bool_)
-    edges = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
-    for a, b in pairwise(edges.tolist()):
-        kept: list[int] = []
-        for k in range(a, b):
-            apart = points[kept] - points[k]
-            if not kept or (np.einsum("npi,npi->np", apart, apart).max(axis=1) >= within**2).all():
                 kept.append(k)
         keep[kept] = True
     return keep

@@ -8,9 +8,9 @@ import numpy as np
 
 from posekit.geometry import Array, Ints
 from posekit.solver import reference
-from posekit.solver.engine import descend, distinct
+from posekit.solver.engine import descend
 from posekit.solver.limits import ENDS, MIDDLES
-from posekit.solver.modes import Modes, merged
+from posekit.solver.modes import Modes, distinct, merged
 from posekit.solver.problem import ROBUST_DEVIATIONS, Problem
 from posekit.solver.reference import Pull
 from posekit.solver.starts import Rays, limb_starts, trunk_starts
@@ -134,8 +134,7 @@ def _trunks(problem: Problem, rays: Rays, passing: Array) -> tuple[Ints, Array, 
         order = np.lexsort((chi2, frame))
         order = order[np.isfinite(chi2[order]) & (chi2[order] <= level * passing[frame[order]])]
         frame, x, chi2, damping = frame[order], x[order], chi2[order], damping[order]
-        points = x[:, :18].reshape(-1, 6, 3)
-        keep = distinct(frame, points - points[:, :1], SAME_TRUNK_METRES)
+        keep = distinct(problem, frame, frame, x, 1, SAME_TRUNK_METRES)
         frame, x, chi2, damping = frame[keep], x[keep], chi2[keep], damping[keep]
     return frame, x, chi2
 
@@ -160,8 +159,8 @@ def _bodies(
     x, chi2, damping = descend(problem, frame, body, WHOLE, most=FIRST_STEPS, hopeless=hopeless)
     # Bodies that approach each other go on as one.
     order = np.lexsort((chi2, frame))
-    points = x[order, :42].reshape(-1, 14, 3)
-    keep = np.sort(order[distinct(frame[order], points - points[:, :1], APPROACHING_METRES)])
+    own = frame[order]
+    keep = np.sort(order[distinct(problem, own, own, x[order], WHOLE, APPROACHING_METRES)])
     frame, hopeless = frame[keep], hopeless[keep]
     x, chi2, _ = descend(problem, frame, x[keep], WHOLE, hopeless=hopeless, damping=damping[keep])
     return frame, x, chi2
@@ -184,12 +183,12 @@ def _combined(
         alone, value, _ = descend(problem, frame[on], alone, 2 << limb, most=LIMB_STEPS)
         order = np.lexsort((value, on))
         order = order[value[order] < LOOSE_LIMB]
-        on, ends, value = on[order], alone[order][:, column], value[order]
+        on, alone, value = on[order], alone[order], value[order]
         hidden = (~problem.seen_joints[frame[on]][:, [MIDDLES[limb], ENDS[limb]]]).sum(axis=1)
-        keep = distinct(on, ends.reshape(-1, 2, 3) / SAME_LIMB_METRES[hidden][:, None, None], 1.0)
+        keep = distinct(problem, on, frame[on], alone, 2 << limb, SAME_LIMB_METRES[hidden], sure=True)
         if most is not None:
             keep &= np.arange(len(on)) - np.searchsorted(on, on) < most
-        on, ends, value = on[keep], ends[keep], value[keep]
+        on, ends, value = on[keep], alone[keep][:, column], value[keep]
         # Every body so far with every position of this limb on its trunk.
         first = np.searchsorted(on, np.arange(len(frame) + 1))
         count = np.diff(first)[row]

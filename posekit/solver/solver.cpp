@@ -165,17 +165,18 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
   return chi2;
 }
 
+bool freed(int joint, unsigned parts) { return parts >> (LIMB_OF[joint] + 1) & 1; }
+
 // Sum of squares at x; with `n` the normal equations.
 double evaluate(const Problem& p, const Limits* limits, const double* at, unsigned parts, Normal* n) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
   const double size = at[42];
   const bool trunk = parts & 1, sized = trunk && p.size_weight > 0;
-  auto free_ = [&](int j) { return j < TRUNK ? trunk : bool(parts >> (LIMB_OF[j] + 1) & 1); };
   if (n) std::memset(n, 0, offsetof(Normal, d));
   double chi2 = 0;
   for (int j = 0; j < J; ++j) {
     const double(*w)[2] = p.image[j];
-    if (!free_(j) || (w[0][0] == 0 && w[1][1] == 0)) continue;
+    if (!freed(j, parts) || (w[0][0] == 0 && w[1][1] == 0)) continue;
     double iz = 1, u = x[j][0], v = x[j][1];
     if (p.perspective > 0) {
       if (!(x[j][2] > 0)) return INFINITY;
@@ -214,7 +215,7 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
   }
   for (int s = 0; s < D; ++s) {
     const int a = A[s], b = B[s];
-    if (!free_(b)) continue;
+    if (!freed(b, parts)) continue;
     double e[3], h[3][3], q = 0, w = p.length_weight[s];
     for (int i = 0; i < 3; ++i) e[i] = x[b][i] - x[a][i], q += e[i] * e[i];
     double r = w * (0.5 * std::log(q) - p.log_length[s] - size);
@@ -226,12 +227,12 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
     const double along = sized ? w : 0;
     for (int one : {b, a}) {
       const double sign = one == b ? 1 : -1;
-      if (!free_(one)) continue;
+      if (!freed(one, parts)) continue;
       for (int i = 0; i < 3; ++i) {
         n->g[3 * one + i] += sign * t * e[i] * r;
         n->H[3 * one + i][SIZE] -= sign * along * t * e[i], n->H[SIZE][3 * one + i] -= sign * along * t * e[i];
         for (int other : {b, a})
-          if (free_(other))
+          if (freed(other, parts))
             for (int k = 0; k < 3; ++k) n->H[3 * one + i][3 * other + k] += (one == other ? 1 : -1) * h[i][k];
       }
     }
@@ -379,12 +380,12 @@ double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int
 
 // Adds what is known besides the residuals: places at all, hidden joints about their modes, and turns of segments near
 // a right angle to their rays (see modes.py).
-void inform(Normal& n, const Problem& p, const double* at, const double known[3]) {
+void inform(Normal& n, const Problem& p, const double* at, unsigned parts, const double known[3]) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
   for (int j = 0; j < J; ++j)
     for (int i = 3 * j; i < 3 * j + 3; ++i) n.H[i][i] += known[p.image[j][0][0] == 0 && p.image[j][1][1] == 0];
   for (int m = 0; m < 4; ++m)
-    for (int lower = 0; lower < 2; ++lower) {
+    for (int lower = 0; lower < 2 && parts >> (m + 1) & 1; ++lower) {
       int a = lower ? MID[m] : START[m], b = lower ? END[m] : MID[m];
       Vec line = vec(x[b]) - vec(x[a]), ray = p.perspective > 0 ? vec(x[b]) : Vec{0, 0, 1};
       double square = dot(line, line), weight = 0;
@@ -455,16 +456,22 @@ void informed(const py::array& problems, const py::object& limits, const Longs& 
   for (py::ssize_t k = 0; k < which.size(); ++k) {
     const double* x = at.data() + k * N;
     evaluate(p[which.data()[k]], L, x, 31, &n);
-    inform(n, p[which.data()[k]], x, known.data());
+    inform(n, p[which.data()[k]], x, 31, known.data());
     take(k, n);
   }
 }
 
-// As dense matrices (M, 43, 43).
-py::array_t<double> information(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
-  py::array_t<double> found({which.size(), (py::ssize_t)N, (py::ssize_t)N});
+// Covariances of the joints (M, 42, 42).
+py::array_t<double> covariance(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
+  py::array_t<double> found({which.size(), (py::ssize_t)SIZE, (py::ssize_t)SIZE});
   informed(problems, limits, which, at, known, [&](py::ssize_t k, const Normal& n) {
-    std::memcpy(found.mutable_data() + k * N * N, n.H, sizeof n.H);
+    const Factor factor(n, 0, 31);
+    for (int i = 0; i < SIZE; ++i) {
+      double unit[N] = {}, column[N];
+      unit[i] = -1;
+      factor.solve(unit, column);
+      std::memcpy(found.mutable_data(k, i), column, sizeof(double) * SIZE);
+    }
   });
   return found;
 }
@@ -483,9 +490,9 @@ py::array_t<double> log_determinants(py::array problems, py::object limits, Long
   return found;
 }
 
-// For bodies by frame, the best first, whether each differs from all that are kept before: see modes.py.
-py::array_t<bool> separate(py::array problems, py::object limits, Longs which, Doubles at, Doubles known, double within,
-                           double reach, double level) {
+// For bodies in order of preference within each group, whether each differs from all that are kept before: see modes.py.
+py::array_t<bool> distinct(py::array problems, py::object limits, Longs group, Longs which, Doubles at, unsigned parts,
+                           Doubles within, double reach, double level, Doubles known) {
   const Problem* p = problems_of(problems);
   const Limits* L = limits_of(limits);
   const py::ssize_t count = which.size();
@@ -494,61 +501,32 @@ py::array_t<bool> separate(py::array problems, py::object limits, Longs which, D
   std::vector<py::ssize_t> kept;
   Normal n;
   for (py::ssize_t k = 0; k < count; ++k) {
-    const double* a = at.data() + k * N;
-    if (k && which.data()[k] != which.data()[k - 1]) kept.clear(), matrices.clear();
+    const double *a = at.data() + k * N, near = within.data()[k], most = std::max(near, reach);
+    if (k && group.data()[k] != group.data()[k - 1]) kept.clear(), matrices.clear();
     bool same = false;
     for (size_t i = 0; i < kept.size() && !same; ++i) {
       const double* b = at.data() + kept[i] * N;
       double d[N], far = 0;
       for (int j = 0; j < N; ++j) d[j] = a[j] - b[j];
-      for (int j = 3; j < 42 && far < reach * reach; j += 3) {
-        Vec apart = vec(d + j) - vec(d);
-        far = std::max(far, dot(apart, apart));
-      }
-      if (far >= reach * reach) continue;
-      same = far < within * within;
-      if (same) continue;
+      for (int j = 0; j < J && far < most * most; ++j)
+        if (freed(j, parts)) {
+          const Vec apart = vec(d + 3 * j) - vec(d);
+          far = std::max(far, dot(apart, apart));
+        }
+      same = far < near * near;
+      if (same || far >= reach * reach) continue;
       if (matrices[i].empty()) {
-        const double* x = at.data() + kept[i] * N;
-        matrices[i].resize(N * N);
-        evaluate(p[which.data()[k]], L, x, 31, &n);
-        inform(n, p[which.data()[k]], x, known.data());
-        std::memcpy(matrices[i].data(), n.H, sizeof n.H);
+        evaluate(p[which.data()[k]], L, b, parts, &n);
+        inform(n, p[which.data()[k]], b, parts, known.data());
+        matrices[i].assign(n.H[0], n.H[0] + N * N);
       }
       double total = 0;
-      for (int j = 0; j < N; ++j) {
-        double s = 0;
-        for (int c = 0; c < N; ++c) s += matrices[i][j * N + c] * d[c];
-        total += s * d[j];
-      }
+      for (int j = 0; j < N; ++j)
+        for (int c = 0; c < N; ++c) total += matrices[i][j * N + c] * d[c] * d[j];
       same = total < level;
     }
     keep.mutable_data()[k] = !same;
     if (!same) kept.push_back(k), matrices.emplace_back();
-  }
-  return keep;
-}
-
-// For rows in order of preference within each group, whether each is farther than `within` from all that are kept.
-py::array_t<bool> distinct(Longs group, Doubles points, double within) {
-  const py::ssize_t count = group.size(), width = count ? points.size() / count : 0;
-  py::array_t<bool> keep(count);
-  std::vector<py::ssize_t> kept;
-  const std::int64_t* g = group.data();
-  for (py::ssize_t k = 0; k < count; ++k) {
-    if (k && g[k] != g[k - 1]) kept.clear();
-    const double* a = points.data() + k * width;
-    bool near = false;
-    for (size_t i = 0; i < kept.size() && !near; ++i) {
-      const double* b = points.data() + kept[i] * width;
-      near = true;
-      for (py::ssize_t j = 0; j < width && near; j += 3) {
-        Vec apart = vec(a + j) - vec(b + j);
-        near = dot(apart, apart) < within * within;
-      }
-    }
-    keep.mutable_data()[k] = !near;
-    if (!near) kept.push_back(k);
   }
   return keep;
 }
@@ -571,9 +549,8 @@ py::array_t<double> stated_all(py::object limits, int limb, Doubles bodies, doub
 
 PYBIND11_MODULE(_compiled, m) {
   m.def("descend", &descend_all);
-  m.def("information", &information);
+  m.def("covariance", &covariance);
   m.def("log_determinants", &log_determinants);
-  m.def("separate", &separate);
   m.def("distinct", &distinct);
   m.def("stated", &stated_all);
 }
