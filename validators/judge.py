@@ -22,9 +22,8 @@ from posekit.validators.body import Body
 from posekit.validators.check import Check, Judgement, NotAskedError, find_check, judged, message_of
 from posekit.validators.collision import Collision
 from posekit.validators.joint_range import JointRange
-from posekit.validators.motion.hints import hints
 from posekit.validators.motion.profile import MOTION_CHECKS, load_profile
-from posekit.validators.motion.rate import rate_doubts
+from posekit.validators.motion.remarks import hints, rate_doubts
 from posekit.validators.motion.standing import balance
 from posekit.validators.report import NUMBERS, Report, joined
 from posekit.validators.rigid_parts import RigidParts

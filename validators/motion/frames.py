@@ -1,19 +1,41 @@
-"""Checks of frames as such: missing, repeated, shuffled, exchanged sides, jumps, trembling, drifting lengths."""
+"""Checks of frames as such: missing, repeated, shuffled, exchanged sides, jumps, trembling, drifting lengths.
+
+A jump also exceeds bounds of speed, acceleration and jerk; so do exchanged labels and shuffled frames. So defects are
+found in an order (`explained`), each named once: times, then repeated frames, then the order of the motion itself, then
+right and left, then jumps. Each step sees what those before it left. The checks of motion see the rest: joints with
+right and left corrected, in slots of even time, NaN where another check has named the frame.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.skeleton import JOINTS, LIMB_SEGMENTS, segment_name
-from posekit.validators.body import Body
+from posekit.geometry import Array, dot, runs
+from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, segment_name
+from posekit.validators.body import Body, once
 from posekit.validators.check import Judgement, NotAskedError, check
-from posekit.validators.motion.explained import explained
-from posekit.validators.motion.sides import SIDE_PAIRS
-from posekit.validators.motion.timeline import known_median, median_of_five, norm
-from posekit.validators.motion.trembling import trembling_frames
+from posekit.validators.motion.jumps import LEAST_JUMP, jumps_of
+from posekit.validators.motion.sides import (
+    LEFT_JOINTS,
+    RIGHT_JOINTS,
+    SIDE_PAIRS,
+    exchanged_pairs,
+    put_right,
+)
+from posekit.validators.motion.timeline import (
+    Timeline,
+    groups,
+    known_median,
+    median_of_five,
+    norm,
+    timeline_of,
+)
+from posekit.validators.motion.trembling import trembling_frames, trembling_of, usual_trembling
 
 #: Part of a step by which a time stamp is early that belongs to the frame before: a quarter of one is its own slot.
 TWICE_FRAMES: Final = 0.75
@@ -35,6 +57,44 @@ LEAST_OTHER: Final = 0.2
 
 #: Trembling of a joint from which lengths tremble too, metres: `jitter` names that.
 SHAKEN_METRES: Final = 0.0025
+
+
+#: Distance below which two positions are one, metres: one number written with 32 and with 64 bits.
+SAME_METRES: Final = 1e-6
+
+#: Step of the fastest joint in a frame from which a body moves, metres: coarse rounding alone makes no duplicate.
+MOVED_METRES: Final = 1e-3
+
+#: Frames before and after a run of duplicates in which the body must move.
+MOVING_FRAMES: Final = 3
+
+
+#: Joints that have no side.
+MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
+
+#: Frames that are ordered at once; longer stretches are ordered in parts.
+LONGEST_STRETCH: Final = 600
+
+#: Length of the way through a stretch in the right order, at most, as a share of the way in the given order.
+SHORTER_SHARE: Final = 0.6
+
+#: Least number of frames out of place in a stretch.
+LEAST_FRAMES: Final = 3
+
+#: Least motion of a joint between frames that shows their order, metres.
+LEAST_METRES: Final = 0.005
+
+#: Least number of moving joints: one or two that turn back tremble.
+LEAST_JOINTS: Final = 3
+
+#: Frames per second from which motion shows the order: at fewer, people turn back between two frames.
+ORDERED_RATE: Final = 20.0
+
+#: Frames between two turns back of one stretch, at most.
+TURNS_APART: Final = 6
+
+#: Frames before and after a stretch that are ordered with it, so that its ends find their places.
+AROUND_FRAMES: Final = 4
 
 
 def needs_rate(body: Body, least: float) -> None:
@@ -198,3 +258,198 @@ def _smooth(lengths: Array) -> Array:
     known = np.isfinite(lengths)
     last = np.maximum.accumulate(np.where(known, np.arange(len(lengths))[:, None], 0), axis=0)
     return np.where(known, median_of_five(np.take_along_axis(lengths, last, axis=0)), np.nan)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Explained:
+    """What was found in T frames, and the motion that is left in S slots of even time.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        Slot of each frame.
+    repeats : int array (T,)
+        Length of the run of duplicates that each frame is in; 0 for others.
+    displaced : int array (T,)
+        Frames by which each is out of its place, by the motion.
+    exchanged : bool array (T, 6)
+        Pairs whose right and left are exchanged.
+    jumps : array (S, 15)
+        Jumps of the joints and of the body, metres; see `posekit.validators.motion.jumps.jumps_of`.
+    joints : array (S, 14, 3)
+        The motion that is left.
+    noise : float
+        Noise of the body, metres.
+    """
+
+    timeline: Timeline
+    repeats: NDArray[np.intp]
+    displaced: NDArray[np.intp]
+    exchanged: NDArray[np.bool_]
+    jumps: Array
+    joints: Array
+    noise: float
+
+    @cached_property
+    def trembling(self) -> Array:
+        """Standard deviation of trembling in slots (S, 14), metres."""
+        return trembling_of(self.joints, self.noise)
+
+
+@once
+def explained(body: Body) -> Explained:
+    """Find the defects of a body's frames."""
+    timeline = timeline_of(body)
+    # Frames without a place in time come last, and are not judged.
+    order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")
+    back = np.argsort(order)
+    joints = body.joints[order]
+    repeats = duplicates(joints)
+    joints = np.where((repeats > 0)[:, None, None], np.nan, joints) if repeats.any() else joints
+    known = repeats == 0
+    places = np.zeros(len(joints), dtype=np.intp)
+    if not body.rate < ORDERED_RATE:
+        places[known] = displaced(joints[known])
+    rearranged = stretches_of(places)
+    if places.any():
+        joints = np.where(rearranged[:, None, None], np.nan, joints)
+    kept = known & ~rearranged
+    exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
+    noise = max(body.noise, usual_trembling(joints[kept]))
+    follows = np.diff(timeline.slots[order][kept]) == 1
+    # Joint ranges judge which way a knee of one posture bends; the sides of a robot follow from its names.
+    if len(joints) > 1 and body.q is None:
+        exchanged[kept] = exchanged_pairs(
+            joints[kept], body.feet[order][kept], body.head[order][kept], follows, noise
+        )
+    for edge, beside in ((0, 1), (-1, -2)):
+        # One frame at an end that is another posture faces elsewhere: that is a jump, no exchange of labels.
+        if len(joints) > 2 and exchanged[edge].all() and not exchanged[beside].any():
+            exchanged[edge] = False
+    joints = timeline.spread(put_right(joints, exchanged)[back])
+    jumps = jumps_of(joints, body.dt)
+    jumped = (jumps[:, :-1] > LEAST_JUMP) | (jumps[:, -1:] > LEAST_JUMP)
+    return Explained(
+        timeline=timeline,
+        repeats=repeats[back],
+        displaced=places[back],
+        exchanged=exchanged[back],
+        jumps=jumps,
+        joints=np.where(jumped[..., None], np.nan, joints) if jumped.any() else joints,
+        noise=body.noise,
+    )
+
+
+def duplicates(joints: Array) -> NDArray[np.intp]:
+    """Return the length of the run of duplicates that each frame is in (T,): 0 where it is no copy of the one before.
+
+    A run counts where the body moves by more than a millimetre a frame shortly before and shortly after it, at an end
+    of the clip on one side. Otherwise rounding is enough to make two frames one.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres, frame after frame; a joint that is unknown in both frames is the same.
+    """
+    count = len(joints)
+    lengths = np.zeros(count, dtype=np.intp)
+    if count < 2:
+        return lengths
+    steps = norm(np.diff(joints, axis=0))
+    unknown = np.isnan(joints[..., 0])
+    alike = (unknown[1:] == unknown[:-1]).all(axis=1) & ~unknown[1:].all(axis=1)
+    fastest = np.nan_to_num(np.fmax.reduce(steps, axis=1))
+    same = alike & (fastest < SAME_METRES)
+    for first, last in runs(same):
+        before, after = fastest[max(first - MOVING_FRAMES, 0) : first], fastest[last : last + MOVING_FRAMES]
+        moving = [part.max() > MOVED_METRES for part in (before, after) if len(part)]
+        if moving and all(moving):
+            lengths[first + 1 : last + 1] = last - first
+    return lengths
+
+
+def displaced(joints: Array) -> NDArray[np.intp]:
+    """Return the frames by which each frame is out of its place (T,); 0 where the motion is even.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres, frame after frame.
+
+    Notes
+    -----
+    Frames in a wrong order make most joints turn back from step to step. A stretch of such frames is put into the
+    order that goes from its first neighbour to its last by a short way (each frame is inserted where it costs least:
+    Rosenkrantz et al. 1977, SIAM J. Comput. 6:563); where that way is less than six tenths of the given one, the frames
+    were out of order. Noise makes joints turn back, too, but no order of noisy frames is much shorter than another.
+    """
+    count = len(joints)
+    places = np.zeros(count, dtype=np.intp)
+    joints = _without_sides(joints)
+    if count < LEAST_FRAMES + 2:
+        return places
+    steps = np.diff(joints, axis=0)
+    moving = (norm(steps[1:]) > LEAST_METRES) & (norm(steps[:-1]) > LEAST_METRES)
+    backward = (dot(steps[1:], steps[:-1]) < 0) & moving
+    turning = np.zeros(count, dtype=np.bool_)
+    turning[1:-1] = (2 * backward.sum(axis=1) > moving.sum(axis=1)) & (moving.sum(axis=1) >= LEAST_JOINTS)
+    for first, last in _stretches(turning):
+        rows = np.arange(max(first - AROUND_FRAMES, 0), min(last + AROUND_FRAMES + 1, count))
+        rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
+        if len(rows) >= LEAST_FRAMES + 2:
+            order = _shortest(joints[rows].reshape(len(rows), -1))
+            found = np.zeros(count, dtype=np.intp)
+            found[rows[order]] = rows - rows[order]
+            # Frames around it that go on evenly are in their places, though there may be a shorter way through them.
+            near = slice(max(first - 2, 0), last + 3)
+            places[near] = found[near]
+    return places
+
+
+def _without_sides(joints: Array) -> Array:
+    """Return a posture without sides (T, 20, 3), metres, so that flickering labels are no wrong order.
+
+    Neck, pelvis and the middles of pairs; and the vector d between a pair as its outer product with itself over its
+    length, which is that of -d.
+    """
+    right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
+    across = (right - left) / 2.0
+    lengths = np.maximum(norm(across), 1e-9)[..., None]
+    squares, products = across**2 / lengths, across * np.roll(across, 1, axis=-1) / lengths
+    return np.concatenate([joints[:, MIDDLE_JOINTS], (right + left) / 2.0, squares, products], axis=1)
+
+
+def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return the frames (T,) of every stretch that holds frames out of place."""
+    inside = np.zeros(len(places), dtype=np.bool_)
+    for part in groups(np.flatnonzero(places), TURNS_APART):
+        inside[part[0] : part[-1] + 1] = True
+    return inside
+
+
+def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first and last of the stretches in which frames turn back, three of them or more."""
+    found = []
+    for part in groups(np.flatnonzero(turning), TURNS_APART):
+        for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
+            last = min(first + LONGEST_STRETCH - 1, int(part[-1]))
+            if np.count_nonzero((part >= first) & (part <= last)) >= LEAST_FRAMES - 1:
+                found.append((first, last))
+    return found
+
+
+def _shortest(points: Array) -> NDArray[np.intp]:
+    """Return an order (N,) of points (N, K) with a short way from first to last; the given one where none is."""
+    squares = (points**2).sum(axis=1)
+    ways = np.sqrt(np.maximum(squares[:, None] + squares - 2 * points @ points.T, 0.0))
+    given = np.arange(len(points))
+    order = np.array([0, len(points) - 1])
+    for point in given[1:-1]:
+        costs = ways[order[:-1], point] + ways[point, order[1:]] - ways[order[:-1], order[1:]]
+        order = np.insert(order, int(costs.argmin()) + 1, point)
+    out_of_place = np.count_nonzero(order != given) >= LEAST_FRAMES
+    return order if out_of_place and _length(order, ways) < SHORTER_SHARE * _length(given, ways) else given
+
+
+def _length(order: NDArray[np.intp], ways: Array) -> float:
+    return float(ways[order[:-1], order[1:]].sum())

@@ -11,7 +11,7 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
-from posekit.validators.motion.explained import explained
+from posekit.validators.motion.frames import explained
 from posekit.validators.motion.timeline import centred, filtered, norm, timeline_of
 
 #: Least time over which differences are taken, seconds: more frames per second add noise.
