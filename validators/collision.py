@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.body import Figure, load_figure
 from posekit.body.capsules import CAPSULE_AXES
 from posekit.geometry import dot, unit
 from posekit.robots.collision import segment_distance
@@ -57,7 +58,7 @@ class Collision:
     def parts(self) -> list[Collision]:
         """Return a check for the pairs of links that end at the same joint; the head's pairs have their own."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
-        for pair in _built_in_pairs():
+        for pair in _pairs(load_figure()):
             read = [point for link in pair for ends in CAPSULE_AXES[link] for point in ends]
             last = max(point for point in read if point < len(JOINTS))
             groups.setdefault(("head" in pair, last), []).append(pair)
@@ -81,7 +82,10 @@ class Collision:
     def judge(self, body: Body) -> Judgement:
         """Measure the distances of all pairs."""
         capsules = body.figure.capsules
-        pairs = self._indices(body)
+        at = {capsule.link: k for k, capsule in enumerate(capsules)}
+        head = np.isfinite(body.head).any()
+        links = self.pairs or [pair for pair in _pairs(body.figure) if head or "head" not in pair]
+        pairs = [(at[a], at[b]) for a, b in links]
         used = sorted({k for pair in pairs for k in pair})
         place = {k: column for column, k in enumerate(used)}
         # Row 19 is the middle of the head's points.
@@ -105,33 +109,17 @@ class Collision:
             axes = half[one[near], start + row], half[other[near], start + row]
             distance[near, start + row] = segment_distance(gap[near, row], *axes) - radii[near]
         return Judgement(
-            [f"{capsules[a].link}-{capsules[b].link}" for a, b in pairs],
+            ["-".join(pair) for pair in links],
             distance.T,
             lower=body.contact_margin,
             tolerance=CONTACT_METRES,
             scale=NEAR_METRES,
         )
 
-    def _indices(self, body: Body) -> list[tuple[int, int]]:
-        figure = body.figure
-        if not self.pairs:
-            head = np.isfinite(body.head).any()
-            links = [capsule.link for capsule in figure.capsules]
-            return [
-                pair
-                for pair in figure.capsule_pairs
-                if head or "head" not in (links[pair[0]], links[pair[1]])
-            ]
-        at = {capsule.link: k for k, capsule in enumerate(figure.capsules)}
-        return [(at[a], at[b]) for a, b in self.pairs]
 
-
-@lru_cache(maxsize=1)
-def _built_in_pairs() -> tuple[tuple[str, str], ...]:
-    """Return the pairs of links of the built-in figure, which every scaled figure shares."""
-    from posekit.body import load_figure
-
-    figure = load_figure()
+@lru_cache(maxsize=8)
+def _pairs(figure: Figure) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of links that a figure's SRDF leaves to be checked."""
     return tuple((figure.capsules[a].link, figure.capsules[b].link) for a, b in figure.capsule_pairs)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Final
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.files import DATA
 from posekit.geometry import Array, Record, runs
 
 if TYPE_CHECKING:
@@ -20,22 +22,6 @@ if TYPE_CHECKING:
 
 #: Checks whose findings make other checks reject the same frames; they are named first.
 CAUSES: Final = ("timing", "frozen", "repeated", "swap", "orientation", "rate")
-
-#: Checks that reject what another defect breaks: near one, their findings follow from it.
-EFFECTS: Final = {
-    "speed": 1,
-    "acceleration": 1,
-    "jerk": 1,
-    "jitter": 1,
-    "joint-velocity": 1,
-    "rigid-parts": 2,
-}
-
-#: Checks whose findings `posekit.repair` can remove.
-MENDABLE: Final = frozenset(
-    "swap teleport frozen repeated jitter joint-range collision floating penetration rigid-parts drift "
-    "speed acceleration jerk sliding support".split()
-)
 
 #: Frames by which an effect may lie off its cause: trembling is measured over so many.
 NEAR_FRAMES: Final = 15
@@ -46,6 +32,9 @@ MERGED_SECONDS, MERGED_FRAMES = 0.1, 3
 #: Excess that counts as slight, in a check's unit: the flesh of a body, the spread of people's ranges, and the sway of
 #: measured feet. Of another unit a tenth of the bound.
 SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
+
+#: Next step of the user where none is known that fits better.
+USUAL_REMEDY: Final = "leave such frames out with --keep-spans, or use --repair"
 
 #: Columns of the findings that are numbers.
 NUMBERS: Final = ("value", "lower", "upper", "margin")
@@ -309,7 +298,8 @@ class Report(Record):
         spans = _in_order(list(self._spans(start, stop)))
         rejecting = [span for span in spans if span.verdict == "invalid"]
         bad = bool(invalid or undecided or start == stop)
-        mendable = rejecting and not undecided and all(span.check in MENDABLE for span in rejecting)
+        repaired = all("repaired" in _known_checks().get(span.check, ()) for span in rejecting)
+        mendable = rejecting and not undecided and repaired
         good = max(runs(self.ok[start:stop]), key=lambda run: run[1] - run[0], default=None)
         return ClipDecision(
             file=self.files[clip],
@@ -368,34 +358,40 @@ class Report(Record):
     @cached_property
     def decision(self) -> str:
         """The decision in one line: ``keep 183 of 200 clips; 12 dropped by collision, 4 by teleport``."""
-        counts = Counter(clip.decision for clip in self.clips)
+        counts = Counter((clip.decision, clip.reason) for clip in self.clips)
         total = len(self.clips) + len(self.refused)
-        parts = [f"keep {counts['keep']} of {plural(total, 'clip')}"]
-        dropped = Counter(clip.reason for clip in self.clips if clip.decision == "drop")
-        mended = Counter(clip.reason for clip in self.clips if clip.decision == "repair?")
-        reasons = [f"{count} dropped by {reason}" for reason, count in dropped.most_common()]
-        reasons += [f"{count} repairable ({reason})" for reason, count in mended.most_common()]
-        if self.refused:
-            reasons.append(f"{len(self.refused)} unreadable")
-        return "; ".join([*parts, ", ".join(reasons)] if reasons else parts)
+        kept = sum(clip.decision == "keep" for clip in self.clips)
+        reasons = [
+            words.format(count, reason)
+            for decision, words in (("drop", "{} dropped by {}"), ("repair?", "{} repairable ({})"))
+            for (decided, reason), count in counts.most_common()
+            if decided == decision
+        ]
+        reasons += [f"{len(self.refused)} unreadable"] * bool(self.refused)
+        return "; ".join([f"keep {kept} of {plural(total, 'clip')}", *filter(None, [", ".join(reasons)])])
 
     def by_check(self) -> dict[str, dict[str, Any]]:
-        """Count for each check the frames and clips that it rejects, its most frequent place and its worst finding."""
+        """Count for each check the frames and clips that it rejects, with its most frequent place and worst finding."""
         found, counts = self.findings, {}
         for k, name in enumerate(self.checks):
             mine = np.flatnonzero(found["check"] == k)
-            rows = np.unique(found["row"][mine])
-            often = Counter(found["place"][mine].tolist()).most_common(1)
-            worst = int(mine[np.argmin(found["margin"][mine])]) if len(mine) else -1
+            rows, place, worst, frame = np.unique(found["row"][mine]), "", "", -1
+            if len(mine):
+                least = int(mine[np.argmin(found["margin"][mine])])
+                often, its = (
+                    int(Counter(found["place"][mine].tolist()).most_common(1)[0][0]),
+                    found["place"][least],
+                )
+                place, frame = self.places[often], int(self.frame[found["row"][least]])
+                worst = quantity(float(found["value"][least]), self.units[k])
+                worst = worst if its == often else f"{self.places[its]} {worst}"
             counts[name] = {
                 "frames": len(rows),
                 "clips": len(np.unique(self.clip[rows])),
                 "undecided": int((self.silent[:, k] & self.undecided).sum()),
-                "place": self.places[often[0][0]] if often else "",
-                "worst": self.places[found["place"][worst]] if len(mine) else "",
-                "value": float(found["value"][worst]) if len(mine) else np.nan,
-                "unit": self.units[k],
-                "frame": int(self.frame[found["row"][worst]]) if len(mine) else -1,
+                "place": place,
+                "worst": worst,
+                "frame": frame,
             }
         return counts
 
@@ -417,7 +413,7 @@ class Report(Record):
                 str(one["clips"]),
                 str(one["undecided"] or ""),
                 one["place"],
-                _worst(one) if one["frames"] else "",
+                f"{one['worst']} in frame {one['frame']}" if one["frames"] else "",
             )
             for name, one in counts.items()
             if one["frames"] or one["undecided"]
@@ -433,7 +429,7 @@ class Report(Record):
             lines.append(f"joints are missing in {plural(missing, 'frame')}: undecided")
         often = max(counts, key=lambda name: counts[name]["frames"], default="")
         if often and counts[often]["frames"]:
-            step = REMEDIES.get(often, "leave such frames out with --keep-spans, or use --repair")
+            step = _known_checks().get(often, {}).get("remedy", USUAL_REMEDY)
             lines.append(f"{often}: {step}")
         bad = sorted((one for one in self.clips if one.decision != "keep"), key=lambda one: -one.severity)
         for clip in bad[:most]:
@@ -444,12 +440,6 @@ class Report(Record):
         lines += list(self.notes[:most])
         lines += [f"unreadable: {one}" for one in self.refused[:most]]
         return "\n".join(lines)
-
-
-def _worst(one: Mapping[str, Any]) -> str:
-    """Return the worst finding of a check, with its place where that is not the most frequent one."""
-    place = "" if one["worst"] == one["place"] else f"{one['worst']} "
-    return f"{place}{quantity(one['value'], one['unit'])} in frame {one['frame']}"
 
 
 def _title(file: str, name: str) -> str:
@@ -524,22 +514,20 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
     return (*others, one) if grounds else others
 
 
-#: Next step of the user, by the check that rejects most frames.
-REMEDIES: Final = {
-    "joint-range": "allow more with --angle-tolerance or --ranges FILE; check axes and left/right labels",
-    "rigid-parts": "check the unit (--unit); allow more with --rigid-tolerance",
-    "collision": "allow overlap with --contact-margin, e.g. -2cm, or take bodies apart with --repair",
-    "swap": "correct right and left with --repair",
-    "orientation": "state the axis that points up with --up",
-    "floating": "state the ground with --ground, or use --repair",
-    "penetration": "state the ground with --ground, or use --repair",
-    "timing": "check the order and the times of frames; state the rate with --rate",
-}
+@lru_cache(maxsize=1)
+def _known_checks() -> Mapping[str, Mapping[str, Any]]:
+    """Return what reports say of checks: whether `posekit.repair` helps, and the user's next step."""
+    table: dict[str, Any] = tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
+    return table
 
 
 def _in_order(spans: list[Span]) -> list[Span]:
     """Sort spans: rejections before what is undecided, causes before effects near them, then by severity."""
-    ranks = [0 if one.check in CAUSES else 1 + EFFECTS.get(one.check, 0) for one in spans]
+    known = [_known_checks().get(one.check, {}) for one in spans]
+    ranks = [
+        0 if span.check in CAUSES else 1 + one.get("follows", 0)
+        for span, one in zip(spans, known, strict=True)
+    ]
     rejected = [span.verdict == "invalid" for span in spans]
 
     def follows(k: int) -> bool:
@@ -564,19 +552,11 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def clip_rows(report: Report) -> list[dict[str, Any]]:
     """Return the clips as rows of a table: file, clip, decision, reason, counts of frames, severity, spans."""
-    return [
-        {
-            "file": clip.file,
-            "clip": clip.name,
-            "decision": clip.decision,
-            "reason": clip.reason,
-            "frames": clip.frames,
-            "invalid": clip.invalid,
-            "undecided": clip.undecided,
-            "severity": round(clip.severity, 3),
-            "first_good": -1 if clip.good is None else clip.good[0],
-            "last_good": -1 if clip.good is None else clip.good[1],
-            "worst": str(clip.spans[0]) if clip.spans else "",
-        }
-        for clip in report.clips
-    ]
+    rows = []
+    for clip in report.clips:
+        row = {name: getattr(clip, name) for name in ("decision", "reason", "frames", "invalid", "undecided")}
+        first, last = clip.good or (-1, -1)
+        row |= {"severity": round(clip.severity, 3), "first_good": first, "last_good": last}
+        worst = str(clip.spans[0]) if clip.spans else ""
+        rows.append({"file": clip.file, "clip": clip.name, **row, "worst": worst})
+    return rows

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -27,48 +26,28 @@ from posekit.validators.check import Judgement
 LIMB_PARTS: Final = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
 
 
-@dataclass(frozen=True, kw_only=True)
-class WalkingThresholds:
-    """When a swing is evidence, and what counts as parallel, flexed and vertical; the paper gives no numbers.
+#: When a swing is evidence, and what counts as parallel, flexed and vertical, by the name of the walkers; the paper
+#: gives no numbers. Least swing of elbows, of knees, and of shoulders and hips, metres; rule 4: angle between a limb's
+#: segment and the plane of moving direction and body axis; rule 5: flexion from which a knee counts as flexed, lean of
+#: the other leg from the body axis; degrees. Those of people are for real walkers (CMU motion capture, 16 clips): their
+#: shoulders lie behind, their hips before the figure's, arms turned outward leave the moving plane, and while one leg
+#: passes the other both knees are bent.
+THRESHOLDS: Final[Mapping[str, Mapping[str, float]]] = {
+    "paper": {"elbow": 0.02, "knee": 0.02, "girdle": 0.01, "out": 10.0, "flexed": 15.0, "lean": 30.0},
+    "people": {"elbow": 0.10, "knee": 0.25, "girdle": 0.06, "out": 35.0, "flexed": 40.0, "lean": 35.0},
+}
 
-    Parameters
-    ----------
-    elbow, knee, girdle : float
-        Least swing of elbows, of knees, and of shoulders and hips, metres.
-    out_of_plane : float
-        Rule 4: angle between a limb's segment and the plane of moving direction and body axis, degrees.
-    flexed_knee : float
-        Rule 5: flexion from which a knee counts as flexed, degrees.
-    vertical : float
-        Rule 5: lean of the other leg from the body axis, degrees.
-    """
-
-    elbow: float = 0.02
-    knee: float = 0.02
-    girdle: float = 0.01
-    out_of_plane: float = 10.0
-    flexed_knee: float = 15.0
-    vertical: float = 30.0
-
-
-#: Thresholds for real walkers (CMU motion capture, 16 clips): their shoulders lie behind, their hips before the
-#: figure's, arms turned outward leave the moving plane, and while one leg passes the other both knees are bent.
-PEOPLE: Final = WalkingThresholds(
-    elbow=0.10, knee=0.25, girdle=0.06, out_of_plane=35.0, flexed_knee=40.0, vertical=35.0
-)
-
-#: Thresholds by the name of the walkers.
-THRESHOLDS: Final[Mapping[str, WalkingThresholds]] = MappingProxyType(
-    {"paper": WalkingThresholds(), "people": PEOPLE, "paper-printed": WalkingThresholds()}
-)
-
-
-class Axes(NamedTuple):
-    """Axes of the walking body (N, 3): where it moves, its left and its down."""
-
-    forward: Array
-    left: Array
-    down: Array
+#: Rules 1 to 3: two joints, and whether they swing to the same side (1) or not (-1). Not both arms, or both legs, are
+#: in front of or behind the torso; arm and leg of one side do not swing together; shoulder and elbow, hip and knee do.
+SWINGS: Final[Mapping[str, tuple[str, str, int]]] = {
+    **{f"rule1.{limb}": (f"right_{mid}", f"left_{mid}", -1) for limb, _, mid, _ in LIMB_PARTS},
+    **{f"rule2.{side}": (f"{side}_elbow", f"{side}_knee", -1) for side in SIDES},
+    **{
+        f"rule3.{side}_{limb[:-1]}": (f"{side}_{girdle}", f"{side}_{mid}", 1)
+        for limb, girdle, mid, _ in LIMB_PARTS
+        for side in SIDES
+    },
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,16 +76,18 @@ class WalkingRules:
 
     def judge(self, body: Body) -> Judgement:
         """Judge the rules; values are shares of their thresholds, positive where a rule is kept."""
-        limits = THRESHOLDS[body.settings.walkers]
+        limits = THRESHOLDS["people" if body.settings.walkers == "people" else "paper"]
         axes = self._axes(body)
-        swing = _swings(body, axes, limits)
-        found: dict[str, Array] = {}
-        for rule in self.rules or tuple(body.settings.rules):
-            found |= _RULES[rule](body, axes, swing, limits)
-        value = np.column_stack(list(found.values())) if found else np.empty((len(body), 0))
-        return Judgement(tuple(found), value, lower=0.0, scale=1.0)
+        swing = _swings(body, axes[0], limits)
+        found = {place: sign * _together(swing, one, other) for place, (one, other, sign) in SWINGS.items()}
+        found |= _planes(body, axes[1], limits["out"]) | _legs(body, axes[2], limits)
+        rules = self.rules or body.settings.rules
+        places = [place for rule in rules for place in found if place.startswith(f"rule{rule}.")]
+        value = np.array([found[place] for place in places]).reshape(len(places), len(body)).T
+        return Judgement(places, value, lower=0.0, scale=1.0)
 
-    def _axes(self, body: Body) -> Axes:
+    def _axes(self, body: Body) -> tuple[Array, Array, Array]:
+        """Return where the walking body moves, its left and its down (N, 3)."""
         joints = body.joints
         R_torso = torso_frame(*(joints[:, JOINT[name]] for name in TORSO))
         down, facing = -R_torso[:, :, 2], R_torso[:, :, 0]
@@ -119,17 +100,14 @@ class WalkingRules:
             if self.heading is not None:
                 facing = np.where(np.isnan(self.heading), facing, self.heading)
         forward = unit(perpendicular(facing, down))
-        return Axes(forward, cross(forward, down), down)
+        return forward, cross(forward, down), down
 
 
-def _swings(body: Body, axes: Axes, limits: WalkingThresholds) -> Array:
+def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
     """Return the swing of each joint (N, 14) in multiples of the least one; NaN where it is not clear."""
-    out = np.einsum("nji,ni->nj", body.joints - body.joints[:, :1], axes.forward)
+    out = np.einsum("nji,ni->nj", body.joints - body.joints[:, :1], forward)
     swing = out - body.figure.neutral_points[: len(JOINTS), 0]
-    least = [
-        {"elbow": limits.elbow, "knee": limits.knee}.get(name.split("_")[-1], limits.girdle)
-        for name in JOINTS
-    ]
+    least = [limits.get(name.split("_")[-1], limits["girdle"]) for name in JOINTS]
     return np.where(np.abs(swing) < least, np.nan, swing / least)
 
 
@@ -139,59 +117,35 @@ def _together(swing: Array, one: str, other: str) -> Array:
     return np.sign(a * b) * np.minimum(np.abs(a), np.abs(b))
 
 
-def _rule_1(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
-    """Not both arms, or both legs, are in front of or behind the torso."""
-    return {
-        f"rule1.{limb}": -_together(swing, f"right_{mid}", f"left_{mid}") for limb, _, mid, _ in LIMB_PARTS
-    }
-
-
-def _rule_2(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
-    """Arm and leg of one side do not swing forward, or backward, together."""
-    return {f"rule2.{side}": -_together(swing, f"{side}_elbow", f"{side}_knee") for side in SIDES}
-
-
-def _rule_3(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
-    """Shoulder and elbow, hip and knee swing the same way."""
-    return {
-        f"rule3.{side}_{limb[:-1]}": _together(swing, f"{side}_{girdle}", f"{side}_{middle}")
-        for limb, girdle, middle, _ in LIMB_PARTS
-        for side in SIDES
-    }
-
-
-def _rule_4(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
-    """Limbs swing in planes parallel to the moving direction."""
+def _planes(body: Body, left: Array, most: float) -> dict[str, Array]:
+    """Judge rule 4: limbs swing in planes parallel to the moving direction."""
     found = {}
     for limb, *names in LIMB_PARTS:
         for side in SIDES:
             start, middle, end = (body.joints[:, JOINT[f"{side}_{name}"]] for name in names)
-            sines = [np.abs(dot(unit(b - a), axes.left)) for a, b in ((start, middle), (middle, end))]
+            sines = [np.abs(dot(unit(b - a), left)) for a, b in ((start, middle), (middle, end))]
             angle = np.degrees(np.arcsin(np.minimum(np.maximum(*sines), 1.0)))
-            found[f"rule4.{side}_{limb[:-1]}"] = 1.0 - angle / limits.out_of_plane
+            found[f"rule4.{side}_{limb[:-1]}"] = 1.0 - angle / most
     return found
 
 
-def _rule_5(body: Body, axes: Axes, swing: Array, limits: WalkingThresholds) -> dict[str, Array]:
-    """At most one knee is flexed; then the other leg stands nearly vertically."""
+def _legs(body: Body, down: Array, limits: Mapping[str, float]) -> dict[str, Array]:
+    """Judge rule 5: at most one knee is flexed; then the other leg stands nearly vertically."""
     flexion, lean = [], []
     for side in SIDES:
         hip, knee, ankle = (body.joints[:, JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))
         flexion.append(_angle(knee - hip, ankle - knee))
-        lean.append(_angle(ankle - hip, axes.down))
+        lean.append(_angle(ankle - hip, down))
     less = np.argmin(flexion, axis=0)
     smaller, larger = np.min(flexion, axis=0), np.max(flexion, axis=0)
     standing = np.array(lean)[less, np.arange(len(body))]
-    standing = np.where(larger > limits.flexed_knee, standing, np.nan)
+    standing = np.where(larger > limits["flexed"], standing, np.nan)
     return {
-        "rule5.knees": 1.0 - smaller / limits.flexed_knee,
-        "rule5.standing_leg": 1.0 - standing / limits.vertical,
+        "rule5.knees": 1.0 - smaller / limits["flexed"],
+        "rule5.standing_leg": 1.0 - standing / limits["lean"],
     }
 
 
 def _angle(a: Array, b: Array) -> Array:
     """Return the angle between vectors (N, 3), degrees."""
     return np.asarray(np.degrees(np.arctan2(np.linalg.norm(cross(a, b), axis=1), dot(a, b))))
-
-
-_RULES: Final = {1: _rule_1, 2: _rule_2, 3: _rule_3, 4: _rule_4, 5: _rule_5}

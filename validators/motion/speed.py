@@ -96,26 +96,24 @@ def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judg
     robot = body.robot
     if robot is None or body.q is None:
         raise NotAskedError("there are no configurations of a robot (--urdf)")
-    import pinocchio as pin
-
-    model, line = robot.model, timeline_of(body)
-    limits = np.array(model.velocityLimit, dtype=np.float64)
-    names, revolute = [""] * model.nv, np.zeros(model.nv, dtype=np.bool_)
-    for joint in range(1, model.njoints):
-        for k in range(model.nvs[joint]):
-            at = model.idx_vs[joint] + k
-            names[at] = model.names[joint] if model.nvs[joint] == 1 else f"{model.names[joint]}.{k}"
-            revolute[at] = model.nvs[joint] == 1 and "P" not in model.joints[joint].shortname()
+    line, sizes = timeline_of(body), robot.model.nvs
+    names = [
+        name if size == 1 else f"{name}.{k}"
+        for name, size in zip(robot.model.names, sizes, strict=True)
+        for k in range(size)
+    ]
+    limits = np.array(robot.model.velocityLimit, dtype=np.float64)
     if most:
+        joints = zip(robot.model.joints, sizes, strict=True)
+        revolute = [size == 1 and "P" not in joint.shortname() for joint, size in joints for _ in range(size)]
         limits = np.where(revolute, most, np.inf)
     # The root has no limit; 0 or a huge number in a URDF is none.
     limited = np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))
     if not len(limited):
         raise NotAskedError("the URDF has no velocity limits")
-    q = line.spread(body.q)
-    velocity = np.full((len(q), model.nv), np.nan)
-    known = np.asarray(np.isfinite(q).all(axis=1))
-    for slot in np.flatnonzero(known[1:] & known[:-1]):
-        velocity[slot + 1] = pin.difference(model, q[slot], q[slot + 1]) / body.dt
-    value = line.of_frames(np.abs(velocity[:, limited])) / limits[limited]
+    velocity = robot.velocities(
+        line.spread(body.q), np.asarray(body.dt * np.arange(line.count), dtype=np.float64)
+    )[:, limited]
+    first = np.full((1, len(limited)), np.nan)
+    value = line.of_frames(np.abs(np.concatenate([first, velocity])) / limits[limited])
     return Judgement([names[k] for k in limited], value, upper=share)

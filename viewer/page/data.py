@@ -283,9 +283,7 @@ def _summary(report: Report) -> Json:
     """Gather the decision, the counts of each check, and the clips, the worst first."""
     checks = []
     for name, one in report.by_check().items():
-        value = one.pop("value")
-        worst = quantity(value, one["unit"]) if one["frames"] else ""
-        checks.append({"name": name, **one, "worst": worst, "message": str(report.messages.get(name, ""))})
+        checks.append({"name": name, **one, "message": str(report.messages.get(name, ""))})
     every = report.clips
     order = sorted(range(len(every)), key=lambda k: (every[k].decision == "keep", -every[k].severity))
     clips = []
