@@ -104,40 +104,29 @@ def validate(
     >>> posekit.validate(standing, rate=30, up="+z").decision
     'keep 1 of 1 clip'
     """
-    judge = _Judge(settings, urdf, changes)
+    judge = Judge(settings, urdf, changes)
+    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
     if rate is not None and not 0 < rate < np.inf:
         raise refusal("", "rate", shown(rate), "frames a second, above 0", "correct it")
-    if not _is_path(given) and not _paths(given) and has_layout(given, layout):
-        from posekit.formats import open as open_array
-
-        given = open_array(given, layout, unit=unit, up=up, rate=rate)
-    if not (_is_path(given) or _paths(given)):
-        if isinstance(given, Motion):
-            given = _stated(given, up, rate)
-        elif unit is not None and np.ndim(given) == 3:
-            given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
-        return judge.report(given, up=up, rate=rate)
-    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
+    if not are_paths(given):
+        return judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
     report = _files(list(files_of(given)), judge, facts)
     if keep is not None:
         report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=keep_spans)))
     return report
 
 
-def _is_path(given: Any) -> bool:
-    return isinstance(given, str | os.PathLike)
+def are_paths(given: Any) -> bool:
+    """Tell whether a path or several are given."""
+    several = given if isinstance(given, list | tuple) and given else [given]
+    return all(isinstance(one, str | os.PathLike) for one in several)
 
 
-def has_layout(given: Any, layout: str) -> bool:
+def _has_layout(given: Any, layout: str | None) -> bool:
     """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's."""
     shape = np.shape(given) if isinstance(given, list | tuple | np.ndarray) else ()
     known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
     return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
-
-
-def _paths(given: Any) -> bool:
-    """Tell whether several paths are given."""
-    return isinstance(given, list | tuple) and bool(given) and all(map(_is_path, given))
 
 
 def files_of(given: Any) -> Iterator[Path]:
@@ -148,7 +137,7 @@ def files_of(given: Any) -> Iterator[Path]:
     InputError
         If a path does not exist or a folder or pattern has no file.
     """
-    for one in [given] if _is_path(given) else given:
+    for one in [given] if isinstance(given, str | os.PathLike) else given:
         path = Path(one)
         if path.is_file():
             yield path
@@ -187,56 +176,64 @@ def _is_hidden(file: Path, folder: Path) -> bool:
     return any(part.startswith((".", "__")) for part in parts) or file.suffix.lower() in SKIPPED
 
 
-def _stated(motion: Motion, up: str | None, rate: float | None) -> Motion:
-    """Return a motion with facts that are stated beside it."""
-    changes: dict[str, Any] = {} if not up else {"up": up}
-    if rate:
-        changes["time"] = np.asarray(motion.frame) / rate
-    return replace(motion, **changes) if changes else motion
+class Judge:
+    """The body and the settings that judge, loaded once for all files.
 
-
-class _Judge:
-    """The body and the settings that judge, loaded once for all files."""
+    Parameters
+    ----------
+    settings : ValidateSettings or None
+        What decides the verdicts.
+    urdf : str, path, Figure or Robot
+        The body that judges; empty for the robot that a file names, else the figure.
+    changes : mapping
+        Single fields of the settings.
+    """
 
     def __init__(self, settings: ValidateSettings | None, urdf: Any, changes: Mapping[str, Any]) -> None:
         self.settings, self.urdf, self.changes = settings, urdf, dict(changes)
         self._made: dict[str, Validator] = {}
         ValidateSettings().changed(**self.changes)
 
+    @property
+    def name(self) -> str:
+        """The name of the robot for readers of tables; readers need none for the figure."""
+        name = str(getattr(self.urdf, "name", self.urdf) or "")
+        return "" if name in ("figure", "stick_figure") else name
+
     def validator(self, robot: str) -> Validator:
         """Return the validator of the body that was given, else of the robot that a file names."""
-        if self.urdf and not _is_path(self.urdf):
-            return Validator(self.urdf, self.settings, **self.changes)
-        name = str(self.urdf or robot or "figure")
-        if name not in self._made:
-            self._made[name] = Validator(name, self.settings, **self.changes)
-        return self._made[name]
+        body = self.urdf or robot or "figure"
+        if str(body) not in self._made:
+            self._made[str(body)] = Validator(body, self.settings, **self.changes)
+        return self._made[str(body)]
 
-    def report(self, given: Any, *, up: str | None = None, rate: float | None = None) -> Report:
-        """Judge an object.
+    def motion(self, given: Any, facts: Mapping[str, Any]) -> Motion:
+        """Return an array or a motion with the facts that are stated beside it."""
+        layout, unit, up, rate = (facts.get(name) for name in ("layout", "unit", "up", "rate"))
+        if not isinstance(given, Motion) and _has_layout(given, layout):
+            import posekit
 
-        Raises
-        ------
-        InputError
-            If it holds no postures.
-        """
-        if hasattr(given, "survivors"):
-            return self._of_recovery(given)
+            opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate)
+            return opened
+        if isinstance(given, Motion):
+            motion, frame = given, np.asarray(given.frame)
+        else:
+            if unit is not None and np.ndim(given) == 3:
+                given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
+            motion = self.validator("").motion(given)
+            frame = np.arange(len(motion))
+        changes: dict[str, Any] = {"up": up} if up else {}
+        changes |= {"frame": frame, "time": frame / rate} if rate else {}
+        return replace(motion, **changes) if changes else motion
+
+    def report(self, given: Motion | Recovery) -> Report:
+        """Judge a motion, or the survivors of a result."""
         if not isinstance(given, Motion):
-            given = self._array(given, up, rate)
+            return self._of_recovery(given)
         validator = self.validator(given.robot)
-        if given.q is not None and given.joints is None:
+        if given.joints is None or (validator.robot is not None and given.q is not None):
             given = in_order(given, validator)
         return validator.check(given)
-
-    def _array(self, given: Any, up: str | None, rate: float | None) -> Motion:
-        motion = self.validator("").motion(given)
-        if rate is None and up is None:
-            return motion
-        count = len(motion)
-        frame = np.arange(count) if rate is not None else np.asarray(motion.frame)
-        time = frame / rate if rate is not None else np.full(count, np.nan)
-        return replace(motion, frame=frame, time=time, up=up or "")
 
     def _of_recovery(self, recovery: Recovery) -> Report:
         """Judge every survivor of a result by its own settings: lengths, ranges, tolerances."""
@@ -293,7 +290,7 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
     return replace(motion, q=q, q_names=names, notes=(*motion.notes, *notes))
 
 
-def _files(paths: Sequence[Path], judge: _Judge, facts: Mapping[str, Any]) -> Report:
+def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Report:
     """Judge files one after the other; of several, those that cannot be read are listed."""
     import posekit
 
@@ -305,7 +302,7 @@ def _files(paths: Sequence[Path], judge: _Judge, facts: Mapping[str, Any]) -> Re
             held: Any = posekit.open(
                 path,
                 **{name: value for name, value in facts.items() if value is not None},
-                urdf=_named(judge.urdf),
+                urdf=judge.name,
             )
             if _holds_postures(held):
                 _refuse_without_joints(held, path)
@@ -368,18 +365,20 @@ def _refuse_without_joints(held: Any, path: Path) -> None:
         raise refusal(path, "", got, "named joints or markers", remedy)
 
 
-def _named(urdf: Any) -> str:
-    """Return the name of a robot for readers of tables; readers need none for the figure."""
-    name = str(getattr(urdf, "name", urdf) or "")
-    return "" if name in ("figure", "stick_figure") else name
-
-
 def _holds_postures(held: Any) -> bool:
     return isinstance(held, Motion) or hasattr(held, "survivors")
 
 
 def _called(report: Report, file: str) -> Report:
     return replace(report, files=(file,) * len(report.files))
+
+
+def new_folder(folder: str | os.PathLike[str]) -> Path:
+    """Return the path of a new or empty folder; refuse one that holds something."""
+    path = Path(folder)
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise refusal(path, "", "something that exists", "a new or empty folder", "name another")
+    return path
 
 
 def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None) -> str:
@@ -406,9 +405,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     InputError
         If the folder holds something, or a file cannot be read or written.
     """
-    folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise refusal(folder, "", "something that exists", "a new or empty folder", "name another")
+    folder = new_folder(folder)
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)

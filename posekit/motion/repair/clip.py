@@ -2,42 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
 from typing import Any, Final, Self
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from posekit.geometry import Array, unit
+from posekit.geometry import Array, Flags, Ints, align, unit
 from posekit.motion.motion import NAMES, Motion
-from posekit.motion.repair.legal import (
-    TIED_SWEEPS,
-    Configurations,
-    PostureBounds,
-    nearest_valid,
-    straightened,
-    tied,
+from posekit.motion.repair.pieces import (
+    FEET,
+    HEAD_PIECE,
+    N_PIECES,
+    PIECE_OF_NAME,
+    PIECE_PARENTS,
+    TRUNK,
+    between,
+    carried,
+    near_good,
 )
-from posekit.motion.repair.pieces import between, interpolated
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.body import Body
-from posekit.validators.check import Check, Judgement, NotAskedError, judged
 from posekit.validators.judge import Validator, chosen_checks
+from posekit.validators.report import Report
 from posekit.validators.robot import sole_points
-
-Bools = NDArray[np.bool_]
 
 #: Motion whose acceleration changes evenly is not changed by smoothing.
 THIRD_DIFFERENCE: Final = (-1.0, 3.0, -3.0, 1.0)
 #: Weight of a frame that stays, beside that of one that is smoothed.
 STAYS: Final = 1e9
-#: Times that postures are sought again: the person's lengths may be those of the repaired postures.
-ROUNDS: Final = 3
+#: Times that the way from a posture that passes to one that does not is halved.
+HALVINGS: Final = 7
+#: Distance inside its limits to which a joint of a robot is brought, radians or metres.
+INSIDE_LIMITS: Final = 2e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,15 +62,18 @@ class Clip:
         Frames made from their neighbours.
     mirrored : bool
         Whether right and left were exchanged in all frames.
+    done : tuple of str
+        Names of the remedies that helped.
     """
 
     motion: Motion
     validator: Validator
     state: Array
     time: Array
-    rows: NDArray[np.intp]
-    filled: Bools
+    rows: Ints
+    filled: Flags
     mirrored: bool = False
+    done: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, motion: Motion, validator: Validator) -> Self:
@@ -92,121 +97,219 @@ class Clip:
         """Return the number of frames."""
         return len(self.state)
 
+    def following(self, first: Clip) -> Self:
+        """Return the changes of a clip and then of this one, which was made of it."""
+        return replace(
+            self,
+            motion=first.motion,
+            rows=np.where(self.rows < 0, -1, first.rows[self.own_rows]),
+            filled=self.filled | first.filled[self.own_rows],
+            mirrored=self.mirrored != first.mirrored,
+        )
+
+    @property
+    def own_rows(self) -> Ints:
+        """Frame of `motion` of each frame (T,); of an inserted one that of the frame before it."""
+        return self.rows[np.maximum.accumulate(np.where(self.rows < 0, 0, np.arange(len(self))))]
+
+    @property
+    def entries(self) -> Sequence[str]:
+        """Names of what the state of a frame consists of."""
+        return NAMES
+
     def as_motion(self) -> Motion:
         """Return the clip as a motion with the points of the recording."""
         columns = [NAMES.index(name) for name in self.motion.joint_names]
-        return self._motion(joints=self.state[:, columns], q=None, q_names=())
+        return self._motion(joints=self.state[:, columns], q=None, q_names=(), robot="")
 
     def _motion(self, **fields: Any) -> Motion:
         whole = len(self) == len(self.motion)
-        frame = np.asarray(self.motion.frame) if whole else np.arange(len(self))
+        frame = np.asarray(self.motion.frame) if whole else self.motion.in_time * np.arange(len(self))
         return replace(
             self.motion, time=self.time, frame=frame, clip=np.zeros(len(self), dtype=np.intp), **fields
         )
 
-    def body(self) -> Body:
-        """Return the clip as checks see it."""
-        return Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
-
-    def judged(self, *, over_time: bool) -> dict[str, tuple[Check, Judgement]]:
+    def report(self, *, over_time: bool) -> Report:
         """Ask the checks over time, or those of postures."""
-        body, found = self.body(), {}
-        of_robot = body.robot is not None
-        for check in chosen_checks(self.validator.settings, of_robot=of_robot, in_time=body.motion):
-            if bool(getattr(check, "over_time", False)) == over_time:
-                try:
-                    found[check.name] = check, judged(check, body)
-                except NotAskedError:
-                    continue
-        return found
+        of_robot = self.validator.robot is not None
+        checks = [
+            one
+            for one in chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
+            if bool(getattr(one, "over_time", False)) == over_time
+        ]
+        validator = copy(self.validator)
+        validator.settings = self.validator.settings.changed(checks=checks)
+        return validator.check(self.as_motion())
 
     def points(self) -> Array:
         """Return the points (T, P, 3) in the order of `NAMES`, metres."""
         return self.state
 
-    def taken(self, order: NDArray[np.intp], time: Array) -> Self:
+    def taken(self, order: Ints, time: Array) -> Self:
         """Return the clip with its frames in another order, at some times."""
         return replace(
             self, state=self.state[order], rows=self.rows[order], filled=self.filled[order], time=time
         )
 
-    def with_gaps(self, gaps: NDArray[np.intp]) -> Self:
+    def with_gaps(self, gaps: Ints) -> Self:
         """Insert frames before each frame (T,), evenly in time, and interpolate them."""
         own = np.cumsum(gaps + 1) - 1
         inserted = np.ones(own[-1] + 1, dtype=np.bool_)
         inserted[own] = False
-        wide = self.taken(
-            np.repeat(np.arange(len(self)), gaps + 1), np.interp(np.arange(len(inserted)), own, self.time)
-        )
+        time = np.interp(np.arange(len(inserted)), own, self.time)
+        wide = self.taken(np.repeat(np.arange(len(self)), gaps + 1), time)
         return replace(wide, rows=np.where(inserted, -1, wide.rows)).interpolated(inserted)
 
-    def interpolated(self, bad: Bools) -> Self:
+    def interpolated(self, bad: Flags) -> Self:
         """Put frames between the good ones around them; a few at an end of the clip continue the motion."""
-        return replace(self, state=interpolated(self.state, bad), filled=self._filled(bad))
+        bad = bad | ~self.placed()
+        rows, before, after, share = between(bad)
+        near = near_good(bad)[rows]
+        out, filled = self.state.copy(), self.filled.copy()
+        out[rows[near]] = self.halfway(self.state[before[near]], self.state[after[near]], share[near])
+        filled[rows[near]] = True
+        return replace(self, state=out, filled=filled)
 
-    def _filled(self, bad: Bools) -> Bools:
-        filled = self.filled.copy()
-        filled[between(bad)[0]] = True
-        return filled
+    def placed(self) -> Flags:
+        """Return the frames (T,) in which enough is known to place a body."""
+        return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
+
+    def carried(self, start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
+        """Move states (n, …) a share (n,) of the way to others: all, or what is loose (n, K), in its place."""
+        return carried(start, end, share, loose)
+
+    def halfway(self, start: Array, end: Array, share: Array) -> Array:
+        """Return states (n, …) between others; lengths go from the ones to the others, too."""
+        there = self.carried(start, end, share)
+        back = self.carried(end, start, 1 - share)
+        return there + share[:, None, None] * (back - there)
 
     def shifted(self, by: Array) -> Self:
         """Move the body by (T, 3), metres."""
         return replace(self, state=self.state + by[:, None])
 
-    def smoothed(self, loose: Bools, places: Sequence[str], strength: float) -> Self:
-        """Smooth the points that `places` name, where they are loose (T, K)."""
-        out = self.state.copy()
-        every = bool(set(JOINTS) <= set(places)) and bool(loose.all(axis=1).any())
-        for column, name in enumerate(NAMES):
-            if name in places:
-                rows = loose[:, places.index(name)]
-            elif every:
-                rows = np.asarray(loose.any(axis=1))
-            else:
-                continue
-            if rows.any() and np.isfinite(out[:, column]).all():
-                out[:, column] = smoothed(out[:, column], rows, strength)
-        return replace(self, state=out)
+    def smoothed(self, loose: Flags, strength: float) -> Self:
+        """Smooth the points that are loose (T, P); head and feet move with necks and ankles."""
+        loose = loose.copy()
+        loose[:, len(JOINTS) :] = loose[:, PIECE_PARENTS[len(JOINTS) :]]
+        loose &= np.isfinite(self.state).all(axis=(0, 2))
+        return replace(self, state=smoothed(self.state, loose, strength))
 
     def legal(self) -> Self:
-        """Return the clip with the nearest postures that the checks of postures pass, tied over time."""
-        given, out = self.state, self.state.copy()
-        for _ in range(ROUNDS):
-            now = replace(self, state=out)
-            found = now.judged(over_time=False)
-            bad = np.flatnonzero(rejected(one for _, one in found.values()))
-            if not bad.size:
+        """Return the clip with postures that checks of postures pass.
+
+        A posture that is rejected goes toward a good one as far as it must: the parts of the body that findings name,
+        else their limbs, else all. The good posture lies between the nearest ones that pass, or is the nearest of
+        these; without any it is at rest.
+        """
+        report = self.report(over_time=False)
+        if not report.invalid.any():
+            return self
+        bad = np.flatnonzero(report.invalid & self.placed())
+        between_good, nearest_good = self.good(bad, ~report.invalid & self.placed())
+        clip = self.bounded(report, bad, between_good)
+        ways = [(between_good, loose) for loose in self.loose(report)]
+        for goal, loose in [*ways, (nearest_good, ways[-1][1])]:
+            left = clip.invalid(bad)
+            if not left.any():
                 break
-            bounds = PostureBounds([check for check, _ in found.values()], now.body())
-            changed = np.flatnonzero((np.nan_to_num(out - given) != 0).any(axis=(1, 2)))
-            ranges = found.get("joint-range")
-            out = tied(
-                partial(nearest_valid, bounds),
-                given if ranges is None else straightened(given, ranges[1]),
-                np.union1d(bad, changed),
-                TIED_SWEEPS if self.motion.in_time else 0,
-            )
+            clip = clip.eased(bad[left], goal[left], loose[bad[left]])
+        return clip
+
+    def eased(self, rows: Ints, goal: Array, loose: Flags) -> Self:
+        """Bring some frames as far toward goals (n, …), by what is loose (n, K), as checks of postures demand.
+
+        Frames that are rejected at their goals stay as they are.
+        """
+        start = self.state[rows]
+        low, high = np.zeros(len(rows)), np.full(len(rows), np.nan)
+        share = np.ones(len(rows))
+        for _ in range(HALVINGS):
+            passes = ~self.with_rows(rows, self.carried(start, goal, share, loose)).invalid(rows)
+            low, high = np.where(passes, low, share), np.where(passes, share, high)
+            if np.isnan(high).all():
+                return self
+            share = (low + high) / 2
+        return self.with_rows(rows, self.carried(start, goal, np.nan_to_num(high), loose))
+
+    def with_rows(self, rows: Ints, state: Array) -> Self:
+        """Return the clip with other states of some frames."""
+        out = self.state.copy()
+        out[rows] = state
         return replace(self, state=out)
 
+    def invalid(self, rows: Ints) -> Flags:
+        """Return which of some frames (n,) checks of postures reject; a person is measured in all frames."""
+        report = self.report(over_time=False)
+        return report.invalid[rows]
 
-def rejected(judgements: Any) -> Bools:
-    """Return the frames that some judgement rejects (T,)."""
-    return np.asarray(np.logical_or.reduce([one.violated.any(axis=1) for one in judgements]))
+    def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
+        """Return good states for some frames: between those that pass, and the nearest; else the body at rest."""
+        if not self.motion.in_time or passing.sum() < 2:
+            rest = self.laid(np.repeat(self.rest()[None], len(rows), axis=0), rows)
+            return rest, rest
+        at = np.searchsorted(np.flatnonzero(~passing), rows)
+        _, before, after, share = (one[at] for one in between(~passing))
+        found = self.halfway(self.state[before], self.state[after], np.clip(share, 0.0, 1.0))
+        nearest = self.state[np.where(share < 0.5, before, after)]
+        return self.laid(found, rows), self.laid(nearest, rows)
+
+    def rest(self) -> Array:
+        """Return the person's posture at rest (P, 3)."""
+        body = Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
+        return np.concatenate([body.figure.neutral_points, np.full((len(FEET), 3), np.nan)])
+
+    def laid(self, state: Array, rows: Ints) -> Array:
+        """Lay states (n, …) on the trunks of some frames."""
+        found = align(state[:, TRUNK], self.state[rows][:, TRUNK], scale=False)
+        turned = np.einsum("nij,npj->npi", found.rotation, state)
+        return np.asarray(turned + found.translation[:, None])
+
+    def bounded(self, report: Report, rows: Ints, good: Array) -> Self:
+        """Give the frames in which distances are wrong those of good postures; all directions stay."""
+        off = rejected(report, "rigid-parts")[rows]
+        return self.with_rows(rows[off], self.carried(good[off], self.state[rows[off]], np.ones(off.sum())))
+
+    def loose(self, report: Report) -> Iterator[Flags]:
+        """Yield what may move (T, 11) of frames that are rejected: named pieces, their limbs, all pieces."""
+        named = np.zeros((len(self), N_PIECES), dtype=np.bool_)
+        for row, place in zip(report.findings["row"], report.findings["place"], strict=True):
+            named[row, [piece for name, piece in PIECE_OF_NAME.items() if name in report.places[place]]] = (
+                True
+            )
+        yield named
+        limbs = named[:, HEAD_PIECE + 1 :].reshape(len(self), -1, 2)
+        named[:, HEAD_PIECE + 1 :] = np.repeat(limbs.any(axis=2), 2, axis=1)
+        yield named
+        yield np.ones_like(named)
 
 
-def smoothed(values: Array, loose: Bools, strength: float) -> Array:
-    r"""Smooth columns (T, K) where they may move.
+def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
+    """Return the frames (T,) that checks reject; if places are given, where (T, K), with unknown ones everywhere."""
+    found = report.findings
+    mine = np.isin(found["check"], [k for k, name in enumerate(report.checks) if name in checks])
+    out = np.zeros((len(report), max(len(places), 1)), dtype=np.bool_)
+    for row, place in zip(found["row"][mine], found["place"][mine], strict=True):
+        name = report.places[place]
+        out[row, places.index(name) if name in places else slice(None)] = True
+    return out if places else out[:, 0]
+
+
+def smoothed(values: Array, loose: Flags, strength: float) -> Array:
+    r"""Smooth the columns of values (T, K, …) in the frames in which they are loose (T, K).
 
     Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the loose frames (Whittaker 1923; Eilers 2003, *A perfect
     smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
     """
-    count = len(values)
+    count, out = len(values), values.copy()
     if count < len(THIRD_DIFFERENCE):
-        return values
+        return out
     difference = sparse.diags_array(THIRD_DIFFERENCE, offsets=range(4), shape=(count - 3, count))
-    weight = sparse.diags_array(np.where(loose, 1.0, STAYS))
-    found = spsolve((weight + strength * difference.T @ difference).tocsc(), weight @ values)
-    return np.where(loose[:, None], found.reshape(values.shape), values)
+    for k in np.flatnonzero(loose.any(axis=0)).tolist():
+        weight = sparse.diags_array(np.where(loose[:, k], 1.0, STAYS))
+        found = spsolve((weight + strength * difference.T @ difference).tocsc(), weight @ values[:, k])
+        out[loose[:, k], k] = found[loose[:, k]]
+    return out
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,34 +321,43 @@ class RobotClip(Clip):
         """Return the configurations."""
         return np.array(motion.q)
 
-    @property
+    @cached_property
     def robot(self) -> Any:
         """The robot, or the figure, whose configurations these are."""
         return self.validator.robot or self.validator.figure
+
+    @property
+    def entries(self) -> Sequence[str]:
+        """Names of the entries of q."""
+        return tuple(self.robot.configuration_names)
 
     def as_motion(self) -> Motion:
         """Return the clip as a motion of configurations."""
         return self._motion(q=self.state, joints=None)
 
-    def body(self) -> Body:
-        """Return the clip as checks see it, with the ends of the soles as feet."""
-        placed = self.motion.in_time  # arms have no joints of a body, and single postures need none
-        body = Body.of(self.as_motion(), self.validator.settings, robot=self.robot, placed=placed)
-        return replace(body, feet=sole_points(self.robot, self.state)) if body.motion else body
-
     def points(self) -> Array:
-        """Return the points (T, P, 3) in the order of `NAMES`, metres."""
-        body = self.body()
+        """Return the points (T, P, 3) in the order of `NAMES`, metres; feet are the ends of the soles."""
+        head = np.full((len(self), len(POINTS) - len(JOINTS), 3), np.nan)
         return np.concatenate(
-            [body.joints, np.full((len(self), len(POINTS) - len(JOINTS), 3), np.nan), body.feet], axis=1
+            [self.robot.points(self.state), head, sole_points(self.robot, self.state)], axis=1
         )
 
-    def interpolated(self, bad: Bools) -> Self:
-        """Put frames between the good ones around them, along the geodesic of the configurations."""
-        out = self.state.copy()
-        for row, before, after, share in zip(*between(bad), strict=True):
-            out[row] = pin.interpolate(self.robot.model, out[before], out[after], share[0])
-        return replace(self, state=out, filled=self._filled(bad))
+    def placed(self) -> Flags:
+        """Return the frames (T,) whose configuration is known."""
+        return np.asarray(np.isfinite(self.state).all(axis=1))
+
+    def carried(self, start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
+        """Move configurations along the geodesics to others: all entries of v, or those that are loose (n, nv)."""
+        model = self.robot.model
+        steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
+        steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
+        steps = steps if loose is None else steps * loose
+        out = [pin.integrate(model, q, step) for q, step in zip(start, steps, strict=True)]
+        return np.asarray(self.robot.with_mimics(np.array(out).reshape(start.shape)))
+
+    def halfway(self, start: Array, end: Array, share: Array) -> Array:
+        """Return configurations between others."""
+        return self.carried(start, end, share)
 
     def shifted(self, by: Array) -> Self:
         """Move the root by (T, 3), metres; a robot with a fixed root stays."""
@@ -254,25 +366,59 @@ class RobotClip(Clip):
             out[:, :3] += by
         return replace(self, state=out)
 
-    def smoothed(self, loose: Bools, places: Sequence[str], strength: float) -> Self:
-        """Smooth all joints, and the root, in the frames in which something is loose (T, K)."""
-        out, names = self.state.copy(), list(self.robot.configuration_names)
-        at = [k for k, name in enumerate(names) if name in places] or list(range(len(names)))
+    def smoothed(self, loose: Flags, strength: float) -> Self:
+        """Smooth the entries of q that are loose (T, nq)."""
+        out = self.state.copy()
         if self.robot.free_flyer:  # quaternions of one sign can be smoothed as numbers
             turn = out[:, 3:7]
             turn[1:] *= np.cumprod(np.where((turn[1:] * turn[:-1]).sum(axis=1) < 0, -1.0, 1.0))[:, None]
-        rows = np.asarray(loose.any(axis=1))
-        out[:, at] = smoothed(out[:, at], rows, strength)
+        out = smoothed(out, loose, strength)
         if self.robot.free_flyer:
-            out[rows, 3:7] = unit(out[rows, 3:7])
-        return replace(self, state=np.where(rows[:, None], out, self.state))
+            out[:, 3:7] = unit(out[:, 3:7])
+        return replace(self, state=np.where(loose.any(axis=1)[:, None], out, self.state))
 
-    def legal(self) -> Self:
-        """Return the clip with the nearest configurations inside their limits whose bodies keep apart."""
-        found = self.judged(over_time=False)
-        bad = np.flatnonzero(rejected(one for _, one in found.values()))
-        if not bad.size:
-            return self
-        problem = Configurations(self.robot, found, self.validator.settings.contact_margin)
-        sweeps = TIED_SWEEPS if self.motion.in_time else 0
-        return replace(self, state=tied(problem.nearest, self.state, bad, sweeps))
+    def invalid(self, rows: Ints) -> Flags:
+        """Return which of some frames (n,) checks of postures reject: each is judged by itself."""
+        return super(RobotClip, self.taken(rows, self.time[rows])).invalid(np.arange(len(rows)))
+
+    def rest(self) -> Array:
+        """Return the neutral configuration (nq,)."""
+        return np.asarray(self.robot.neutral)
+
+    def laid(self, state: Array, rows: Ints) -> Array:
+        """Return states as they are: the root of a configuration is not moved."""
+        return state
+
+    def bounded(self, report: Report, rows: Ints, good: Array) -> Self:
+        """Bring joints within the limits that they violate, and mimicking joints to their targets."""
+        out, table = self.state.copy(), report.findings
+        columns = (table[name] for name in ("row", "check", "place", "lower", "upper"))
+        for row, check, place, lower, upper in zip(*columns, strict=True):
+            name, scale = report.places[place], np.radians(1.0) if report.units[check] == "deg" else 1.0
+            if name in self.entries and report.checks[check] in ("joint-range", "joint-travel"):
+                entry = self.entries.index(name)
+                raised = np.fmax(out[row, entry], scale * lower + INSIDE_LIMITS)
+                out[row, entry] = np.fmin(raised, scale * upper - INSIDE_LIMITS)
+        return replace(self, state=self.robot.with_mimics(out))
+
+    def loose(self, report: Report) -> Iterator[Flags]:
+        """Yield what may move (T, nv) of frames that are rejected: joints between bodies that touch, then all."""
+        model, named = self.robot.model, np.zeros((len(self), self.robot.model.nv), dtype=np.bool_)
+        between_bodies = self._joints_between()
+        for row, place in zip(report.findings["row"], report.findings["place"], strict=True):
+            for joint in between_bodies.get(report.places[place], ()):
+                named[row, model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]] = True
+        yield named
+        every = np.ones_like(named)
+        every[:, : 6 if self.robot.free_flyer else 0] = False
+        yield every
+
+    def _joints_between(self) -> dict[str, set[int]]:
+        """Return the joints on the way from one body of each pair to the other, by the pair's place in findings."""
+        found: dict[str, set[int]] = {}
+        bodies = () if self.robot.geometry is None else self.robot.geometry.geometryObjects
+        on_the_way = {body.name: set(self.robot.model.supports[body.parentJoint]) for body in bodies}
+        links = dict(zip(self.robot.body_names, self.robot.body_links, strict=True))
+        for one, other in self.robot.collision_pairs:
+            found[f"{links[one]}-{links[other]}"] = on_the_way[one] ^ on_the_way[other]
+        return found

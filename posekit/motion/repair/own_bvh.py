@@ -5,77 +5,55 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from posekit.geometry import (
-    Array,
-    coordinate_rotation,
-    rotation_from_vector,
-    turned_near,
-    vector_from_rotation,
-)
+from posekit.formats.bvh import UNITS, Bvh, parse, positions_are_absolute, read, with_values, world_points
+from posekit.formats.options import Options
+from posekit.geometry import Array, Flags, Ints, turned_near
 from posekit.motion.motion import NAMES, Motion
 from posekit.motion.repair.clip import Clip
 from posekit.motion.repair.pieces import HEAD_PIECE, HIPS_PIECE, TORSO_PIECE, TRUNK, between, turns_between
-from posekit.skeleton import JOINTS, LIMB_JOINTS, other_side
-
-if TYPE_CHECKING:
-    from posekit.formats.bvh import Bvh
-    from posekit.formats.options import Options
+from posekit.skeleton import JOINTS, LIMB_JOINTS, SIDES
 
 #: Distance below which a node of a hierarchy is a joint of ours.
 SAME_METRES: Final = 1e-6
-#: Distance by which the points of a frame may be off that keeps its channels.
-STAYS_METRES: Final = 1e-7
-#: Change of a channel below which its text stays, file's unit.
+#: Distance by which the points of a frame may be off that keeps its channels: joints that a layout derives depend on
+#: medians over all frames.
+STAYS_METRES: Final = 5e-6
+#: Change of a channel below which its text stays, file's unit; and of a rotation below which its node stays.
 TINY: Final = 1e-10
+#: Words for one side in names of joints.
+SIDE_WORDS: Final = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"))
 
 
-def in_bvh(clip: Clip, document: Bvh, options: Options) -> Motion:
+def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
     """Turn the joints of a BVH file as a clip's points are turned.
 
     The pieces of the body turn by the rotations that bring the points of the file to those of the clip. Nodes of one
     piece keep their channels, except the first; frames whose points stay keep all of them. Frames that were made from
     their neighbours are interpolated channel by channel first.
-
-    Returns
-    -------
-    Motion
-        The file's motion as it is read again, with the changed document.
     """
-    from posekit.formats.bvh import read, with_values
-
-    source = clip.motion.source
-    if clip.mirrored:
-        document = _renamed(document, _landmarks(document, clip.motion))
+    document = _renamed(document) if clip.mirrored else document
     values = _filled(document, document.values[clip.rows], clip.filled)
     moved = with_values(document, values)
-    base = read(moved, source, options)
+    base = read(moved, clip.motion.source, options)
     before, after = base.points(NAMES), clip.state
     changed = np.flatnonzero((np.abs(np.nan_to_num(after - before)) > STAYS_METRES).any(axis=(1, 2)))
     if changed.size:
         nodes = _landmarks(moved, base)
         values[changed] = _turned(document, values[changed], nodes, before[changed], after[changed], base)
     values = np.where(np.abs(values - document.values) < TINY, document.values, values)
-    return read(with_values(document, values), source, options)
-
-
-def _metres(motion: Motion) -> float:
-    from posekit.formats.bvh import UNITS
-
-    return float(UNITS[motion.unit])
+    return with_values(document, values).text.encode()
 
 
 def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
     """Return the node at each point of the motion; of several in one place the nearest to the next joint."""
-    from posekit.formats.bvh import positions_are_absolute, world_points
-
     sample = slice(None, None, max(1, len(motion) // 20))
     absolute = positions_are_absolute(document)
-    points = world_points(document, absolute=absolute, values=document.values[sample]) * _metres(motion)
+    points = world_points(document, absolute=absolute, values=document.values[sample]) * UNITS[motion.unit]
     ours = motion.points(NAMES)[sample]
     beyond = {JOINTS[limb[k]]: JOINTS[limb[k + 1]] for limb in LIMB_JOINTS for k in (0, 1)}
     found: dict[str, int] = {}
@@ -97,22 +75,21 @@ def _above(document: Bvh, node: int) -> list[int]:
     return way
 
 
-def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[NDArray[np.intp], int]:
+def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[Ints, int]:
     """Return the piece that each node turns with (P,), -1 above the body, and the node on which the body hangs."""
-    starts = [nodes[JOINTS[limb[0]]] for limb in LIMB_JOINTS if JOINTS[limb[0]] in nodes]
-    ways = [_above(document, start)[1:] for start in starts]
-    common = set.intersection(*map(set, ways)) if ways else {0}
+    limbs = [[nodes.get(JOINTS[joint]) for joint in limb[:2]] for limb in LIMB_JOINTS]
+    ways = [set(_above(document, start)[1:]) for start, _ in limbs if start is not None]
+    common = set.intersection(*ways) if ways else {0}
     body = max(common, default=0)
-    marks = {body: HIPS_PIECE}
-    for limb, (start, middle, _) in enumerate(LIMB_JOINTS):
-        if JOINTS[start] in nodes:
-            part = TORSO_PIECE if limb < 2 else HIPS_PIECE
-            for node in _above(document, nodes[JOINTS[start]])[1:]:
-                if node not in common:
-                    marks.setdefault(node, part)
-            marks[nodes[JOINTS[start]]] = HEAD_PIECE + 1 + 2 * limb
-        if JOINTS[middle] in nodes:
-            marks[nodes[JOINTS[middle]]] = HEAD_PIECE + 2 + 2 * limb
+    marks: dict[int, int] = {}
+    for limb, (start, middle) in enumerate(limbs):
+        if start is not None:
+            part = TORSO_PIECE if limb < len(SIDES) else HIPS_PIECE
+            marks |= {node: part for node in _above(document, start)[1:] if node not in marks}
+            marks[start] = HEAD_PIECE + 1 + 2 * limb
+        if middle is not None:
+            marks[middle] = HEAD_PIECE + 2 + 2 * limb
+    marks |= {**dict.fromkeys(common, -1), body: HIPS_PIECE}
     pieces = np.full(len(document.names), -1)
     for node, parent in enumerate(document.parents):
         inherited = pieces[parent] if parent >= 0 else -1
@@ -122,19 +99,20 @@ def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[NDArray[np.intp], 
     return pieces, body
 
 
-def _rotations_of(document: Bvh, node: int) -> tuple[list[int], list[int]]:
-    """Return the columns of a node's rotations, and their axes."""
+def _channels(document: Bvh, node: int, *, rotations: bool) -> tuple[list[int], list[int]]:
+    """Return the columns of a node's rotations, or of its positions, and their axes."""
     start = document.columns[node].start
-    own = [(start + k, axis) for k, (rotates, axis) in enumerate(document.channels[node]) if rotates]
+    own = [(start + k, axis) for k, (one, axis) in enumerate(document.channels[node]) if one == rotations]
     return [column for column, _ in own], [axis for _, axis in own]
 
 
-def _local_rotations(document: Bvh, values: Array, node: int) -> Array:
+def _local(document: Bvh, values: Array, node: int) -> Array:
     """Return a node's rotations in its parent (T, 3, 3)."""
-    R = np.tile(np.eye(3), (len(values), 1, 1))
-    for column, axis in zip(*_rotations_of(document, node), strict=True):
-        R = R @ coordinate_rotation(axis, np.radians(values[:, column]))
-    return R
+    at, axes = _channels(document, node, rotations=True)
+    if not at:
+        return np.tile(np.eye(3), (len(values), 1, 1))
+    order = "".join("XYZ"[axis] for axis in axes)
+    return np.asarray(Rotation.from_euler(order, values[:, at], degrees=True).as_matrix())
 
 
 def _with_rotation(document: Bvh, values: Array, node: int, R: Array) -> Array:
@@ -142,12 +120,10 @@ def _with_rotation(document: Bvh, values: Array, node: int, R: Array) -> Array:
 
     A node with fewer than three rotations keeps the part that they can express.
     """
-    from scipy.spatial.transform import Rotation
-
-    at, axes = _rotations_of(document, node)
-    order = axes + [axis for axis in range(3) if axis not in axes]
-    first = Rotation.from_matrix(R).as_euler("".join("XYZ"[axis] for axis in order), degrees=True)
-    second = np.stack([first[:, 0] + 180.0, 180.0 - first[:, 1], first[:, 2] + 180.0], axis=1)
+    at, axes = _channels(document, node, rotations=True)
+    order = "".join("XYZ"[axis] for axis in [*axes, *({0, 1, 2} - set(axes))])
+    first = Rotation.from_matrix(R).as_euler(order, degrees=True)
+    second = first * [1, -1, 1] + 180.0
     near, out = values[:, at], values.copy()
     tried = [turned_near(one[:, : len(at)], near, half_turn=180.0) for one in (first, second)]
     off = [np.abs(one - near).sum(axis=1) for one in tried]
@@ -159,76 +135,56 @@ def _turned(
     document: Bvh, values: Array, nodes: Mapping[str, int], before: Array, after: Array, base: Motion
 ) -> Array:
     """Return channels (n, C) of frames whose points (n, P, 3) go from one place to another."""
-    from posekit.formats.bvh import positions_are_absolute, world_points
-
     values = values.copy()
     pieces, body = _pieces(document, nodes)
     turn = turns_between(before, after)
+    world = np.eye(3)[None]
     old: list[Array] = []
     new: list[Array] = []
     for node, parent in enumerate(document.parents):
-        local = _local_rotations(document, values, node)
-        old.append(local if parent < 0 else old[parent] @ local)
-        piece = pieces[node]
-        if piece < 0 or not _rotations_of(document, node)[0]:
-            new.append(old[node] if parent < 0 else new[parent] @ local)
-            continue
-        above = new[parent] if parent >= 0 else np.eye(3)
-        new.append(turn[:, piece] @ old[node])
-        wanted = above.swapaxes(-1, -2) @ new[node]
-        rows = np.flatnonzero(np.abs(wanted - local).max(axis=(1, 2)) > 1e-12)
-        if rows.size:
+        local = _local(document, values, node)
+        old.append((old[parent] if parent >= 0 else world) @ local)
+        above = new[parent] if parent >= 0 else world
+        if pieces[node] >= 0 and _channels(document, node, rotations=True)[0]:
+            wanted = above.swapaxes(-1, -2) @ turn[:, pieces[node]] @ old[node]
+            rows = np.flatnonzero(np.abs(wanted - local).max(axis=(1, 2)) > TINY)
             values[rows] = _with_rotation(document, values[rows], node, wanted[rows])
-            new[node] = above @ _local_rotations(document, values, node)
+            local = _local(document, values, node)
+        new.append(above @ local)
     points = world_points(document, absolute=positions_are_absolute(document), values=values)
     trunk = [k for k in TRUNK if JOINTS[k] in nodes]
-    shift = after[:, trunk] / _metres(base) - points[:, [nodes[JOINTS[k]] for k in trunk]]
+    shift = after[:, trunk] / UNITS[base.unit] - points[:, [nodes[JOINTS[k]] for k in trunk]]
     shift = np.nanmean(shift, axis=1)
     shift[np.linalg.norm(shift, axis=1) < SAME_METRES * 1e-2] = 0.0
-    for carrier in _above(document, body):
-        places = [
-            (document.columns[carrier].start + k, axis)
-            for k, (rotates, axis) in enumerate(document.channels[carrier])
-            if not rotates
-        ]
-        if len(places) == 3:
-            parent = document.parents[carrier]
-            shift = np.einsum("tji,tj->ti", new[parent], shift) if parent >= 0 else shift
-            for column, axis in places:
-                values[:, column] += shift[:, axis]
-            break
+    carrier = next(
+        (k for k in _above(document, body) if len(_channels(document, k, rotations=False)[0]) == 3), None
+    )
+    if carrier is not None:
+        at, axes = _channels(document, carrier, rotations=False)
+        parent = document.parents[carrier]
+        values[:, at] += np.einsum("tji,tj->ti", new[parent] if parent >= 0 else world, shift)[:, axes]
     return values
 
 
-def _filled(document: Bvh, values: Array, filled: NDArray[np.bool_]) -> Array:
+def _filled(document: Bvh, values: Array, filled: Flags) -> Array:
     """Interpolate the channels of frames between those around them."""
     values = values.copy()
     rows, before, after, share = between(filled)
     start, end = values[before], values[after]
-    values[rows] = start + share * (end - start)
-    for node, channels in enumerate(document.channels):
-        if rows.size and sum(rotates for rotates, _ in channels) == 3:
-            first, last = (_local_rotations(document, one, node) for one in (start, end))
-            turn = share * vector_from_rotation(first.swapaxes(1, 2) @ last)
-            values[rows] = _with_rotation(document, values[rows], node, first @ rotation_from_vector(turn))
+    values[rows] = start + share[:, None] * (end - start)
+    for node in range(len(document.names) if rows.size else 0):
+        if len(_channels(document, node, rotations=True)[0]) == 3:
+            first, last = (_local(document, one, node) for one in (start, end))
+            turn = Rotation.from_matrix(first.swapaxes(1, 2) @ last).as_rotvec()
+            turned = first @ Rotation.from_rotvec(share[:, None] * turn).as_matrix()
+            values[rows] = _with_rotation(document, values[rows], node, turned)
     return values
 
 
-def _renamed(document: Bvh, nodes: Mapping[str, int]) -> Bvh:
-    """Return the file with the names of right and left exchanged: of points, and of all that hangs on limbs."""
-    from posekit.formats.bvh import parse
-
-    other: dict[str, str] = {}
-    for name, node in nodes.items():
-        twin = nodes.get(other_side(name), node)
-        ways = _above(document, node), _above(document, twin)
-        tops = [[one for one in way if one not in ways[1 - k]][-1:] for k, way in enumerate(ways)]
-        below = [
-            [k for k, site in enumerate(document.sites) if not site and set(top) & set(_above(document, k))]
-            for top in tops
-        ]
-        other |= {document.names[a]: document.names[b] for a, b in zip(*below, strict=False)}
+def _renamed(document: Bvh) -> Bvh:
+    """Return the file with the names of right and left exchanged."""
     head, mark, rest = re.split(r"(^[ \t]*MOTION)", document.text, maxsplit=1, flags=re.M | re.I)
+    other = {name: _twin(name, document.names) for name in document.names}
     head = re.sub(
         r"((?:ROOT|JOINT)[ \t]+)([^{}\r\n]*?)(?=[ \t]*[\r\n{])",
         lambda match: match[1] + other.get(" ".join(match[2].split()), match[2]),
@@ -236,3 +192,14 @@ def _renamed(document: Bvh, nodes: Mapping[str, int]) -> Bvh:
         flags=re.I,
     )
     return replace(parse((head + mark + rest).encode(), ""), values=document.values)
+
+
+def _twin(name: str, names: tuple[str, ...]) -> str:
+    """Return the name of the joint on the other side; the name itself if there is none."""
+    for words in SIDE_WORDS:
+        for one, other in (words, words[::-1]):
+            for match in re.finditer(one, name):
+                twin = name[: match.start()] + other + name[match.end() :]
+                if twin in names:
+                    return twin
+    return name

@@ -41,7 +41,7 @@ DIGITS: Final = 7
 
 def in_own_file(
     path: str | Path, before: Motion, after: Motion, rows: NDArray[np.intp]
-) -> tuple[bytes | None, list[str]]:
+) -> tuple[bytes, list[str]]:
     """Return a table or arrays with the numbers that a repair changed.
 
     Columns are found by their numbers: a column, or the mean of two markers, is an entry of the motion times a factor.
@@ -58,8 +58,8 @@ def in_own_file(
 
     Returns
     -------
-    data : bytes or None
-        The file; None if its container is not changed in place.
+    data : bytes
+        The file; empty if its container is not changed in place.
     notes : list of str
         What could not follow the repair.
     """
@@ -99,7 +99,7 @@ def in_own_file(
     elif container == "arrays":
         written = _in_arrays(data, str(path), change_array)
     else:
-        return None, []
+        return b"", []
     following = f"left as they were, although they may follow from q: {', '.join(stale)}"
     return written, [following] if stale else []
 
@@ -181,8 +181,8 @@ def _turned(before: Motion, after: Motion, rows: NDArray[np.intp]) -> Array:
     return np.asarray(np.where(np.abs(step) > TINY, step, 0.0) * signs)
 
 
-def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], change: Change) -> bytes | None:
-    """Return a text whose last `count` lines with numbers are changed; None if they are not one a frame."""
+def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], change: Change) -> bytes:
+    """Return a text whose last `count` lines with numbers are changed; empty if they are not one a frame."""
     lines = whole.splitlines(keepends=True)
     at = [number - 1 for number in table.numbers_of_lines[-count:]]
     apart = table.delimiter or r"\s+"
@@ -193,7 +193,7 @@ def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], chan
     for k, (parts, places) in enumerate(zip(parted, cells, strict=True)):
         values[k, : len(places)] = numbers([parts[place].strip() for place in places])
     if len(table.lines) < count or np.isnan(values).all(axis=1).any():
-        return None
+        return b""
     new = change(values, [*table.names, *[""] * (width - len(table.names))][:width])
     changed = (new != values[rows]) & np.isfinite(new)
     made = []
@@ -218,7 +218,7 @@ def _like(cell: str, value: float) -> str:
     return written.replace(".", ",") if "," in cell else written
 
 
-def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> bytes | None:
+def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> bytes:
     """Return arrays of NPZ, NPY or a pickle with changed ones; what does not change keeps its bytes in an NPZ."""
     file = io.BytesIO()
     if data[:6] == b"\x93NUMPY":
@@ -230,7 +230,7 @@ def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> b
         for member in given.infolist():
             held = given.read(member)
             if member.filename.endswith("data.pkl"):  # tensors of PyTorch
-                return None
+                return b""
             try:
                 array = np.load(io.BytesIO(held), allow_pickle=False)
             except ValueError:  # of objects, or no array

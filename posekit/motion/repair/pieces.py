@@ -1,8 +1,7 @@
 r"""How a measured body moves as rigid pieces: torso, hips, head and eight segments, each turned about its own start.
 
-A point is its parent's place plus a vector of its piece. Turning the pieces by :math:`\omega_k` and shifting the neck
-by :math:`\tau` moves it by :math:`\tau + \sum \omega_{k(p)} \times b_p` over the points p on the way from the neck,
-with vectors b. All lengths stay.
+A point is its parent's place plus a vector of its piece: :math:`x_p = x_{parent(p)} + R_{piece(p)} b_p`. All lengths
+stay.
 """
 
 from __future__ import annotations
@@ -10,43 +9,47 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.geometry import (
     Array,
+    Flags,
     Ints,
     best_rotation,
-    cross_matrix,
     rotation_between,
     rotation_from_vector,
     unit,
     vector_from_rotation,
 )
 from posekit.motion.motion import NAMES
-from posekit.skeleton import HEAD, HIPS, JOINT, LIMB_JOINTS, PARENTS, POINTS, TORSO
-
-Bools = NDArray[np.bool_]
+from posekit.robots.capsules import PARTS
+from posekit.skeleton import (
+    HEAD,
+    HIPS,
+    JOINT,
+    JOINTS,
+    LIMB_JOINTS,
+    LIMB_SEGMENTS,
+    N_TRUNK_JOINTS,
+    PARENTS,
+    POINTS,
+)
 
 TORSO_PIECE, HIPS_PIECE, HEAD_PIECE = 0, 1, 2
 N_PIECES: Final = 3 + 2 * len(LIMB_JOINTS)
-#: A shift of the neck, then a rotation vector a piece.
-N_UNKNOWNS: Final = 3 + 3 * N_PIECES
-
 FEET: Final = tuple(range(len(POINTS), len(NAMES)))
+#: Joints without which nothing of a posture can be placed.
+TRUNK: Final = list(range(N_TRUNK_JOINTS))
 #: The point from which the vector of each of `NAMES` starts; -1 for the neck.
 PIECE_PARENTS: Final = (
     *PARENTS,
     *(JOINT["neck"] for _ in HEAD),
     *(JOINT[f"{NAMES[foot].split('_')[0]}_ankle"] for foot in FEET),
 )
-
 #: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
 MOST_CONTINUED: Final = 3
-#: Joints without which nothing of a posture can be placed.
-TRUNK: Final = tuple(JOINT[name] for name in (*TORSO, *HIPS[1:]))
 
 
-def _piece_of_points() -> tuple[int, ...]:
+def _piece_of_points() -> list[int]:
     pieces = [TORSO_PIECE] * len(NAMES)
     for name in HIPS[1:]:
         pieces[JOINT[name]] = HIPS_PIECE
@@ -56,46 +59,31 @@ def _piece_of_points() -> tuple[int, ...]:
         pieces[middle], pieces[end] = HEAD_PIECE + 1 + 2 * limb, HEAD_PIECE + 2 + 2 * limb
     for foot in FEET:
         pieces[foot] = pieces[PIECE_PARENTS[foot]]
-    return tuple(pieces)
+    return pieces
 
 
 #: The piece whose vector ends at each point; that of the neck is not read.
 PIECE_OF_POINT: Final = _piece_of_points()
+#: The pieces of limbs by the names that findings have for them: of the joint at their start, and of their capsule.
+PIECE_OF_NAME: Final = {
+    **{JOINTS[start]: PIECE_OF_POINT[end] for start, end in LIMB_SEGMENTS},
+    **{part: PIECE_OF_POINT[JOINT[end]] for part, (_, end) in PARTS.items() if part not in ("torso", "hips")},
+}
 
 
-def columns_of(piece: int) -> slice:
-    """Return the place of a piece's rotation vector among the unknowns."""
-    return slice(3 + 3 * piece, 6 + 3 * piece)
-
-
-def _vectors(points: Array) -> Array:
+def vectors_of(points: Array) -> Array:
     """Return the vector that ends at each point (N, P, 3); of the neck its place."""
     vectors = points.copy()
     vectors[:, 1:] -= points[:, list(PIECE_PARENTS[1:])]
     return vectors
 
 
-def jacobian_of(points: Array) -> Array:
-    """Return the derivative of points (N, P, 3) by the unknowns (N, P, 3, 36); zero for unknown points."""
-    jacobian = np.zeros((*points.shape, N_UNKNOWNS))
-    jacobian[:, 0, :, :3] = np.eye(3)
-    turned = -cross_matrix(np.nan_to_num(_vectors(points)))
-    for point in range(1, len(NAMES)):
-        jacobian[:, point] = jacobian[:, PIECE_PARENTS[point]]
-        jacobian[:, point, :, columns_of(PIECE_OF_POINT[point])] += turned[:, point]
-    return jacobian
-
-
-def moved(points: Array, step: Array) -> Array:
-    """Turn the pieces of postures (N, P, 3) by steps (N, 36), radians, and shift them, metres."""
-    turn = rotation_from_vector(step[:, 3:].reshape(-1, N_PIECES, 3))
-    vectors = _vectors(points)
-    out = np.empty_like(points)
-    out[:, 0] = points[:, 0] + step[:, :3]
-    for point in range(1, len(NAMES)):
-        vector = (turn[:, PIECE_OF_POINT[point]] @ vectors[:, point, :, None])[..., 0]
-        out[:, point] = out[:, PIECE_PARENTS[point]] + vector
-    return out
+def placed(vectors: Array) -> Array:
+    """Return the points (N, P, 3) at the ends of vectors: the inverse of `vectors_of`."""
+    points = vectors.copy()
+    for point in range(1, len(NAMES)):  # parents come before their points
+        points[:, point] += points[:, PIECE_PARENTS[point]]
+    return points
 
 
 def turns_between(start: Array, end: Array) -> Array:
@@ -104,52 +92,54 @@ def turns_between(start: Array, end: Array) -> Array:
     A piece of one vector turns by the shortest rotation; one of which nothing is known does not turn.
     """
     R = np.tile(np.eye(3), (len(start), N_PIECES, 1, 1))
-    before, after = _vectors(start), _vectors(end)
+    before, after = vectors_of(start), vectors_of(end)
+    known = np.asarray(np.isfinite(before + after).all(axis=(0, 2)))
     for piece in range(N_PIECES):
-        mine = [k for k in range(1, len(NAMES)) if PIECE_OF_POINT[k] == piece and k not in FEET]
-        known = np.asarray(np.isfinite(before[:, mine] + after[:, mine]).all(axis=(0, 2)))
-        mine = [k for k, use in zip(mine, known, strict=True) if use]
+        mine = [k for k in range(1, FEET[0]) if PIECE_OF_POINT[k] == piece and known[k]]
         if len(mine) == 1:
             R[:, piece] = rotation_between(unit(before[:, mine[0]]), unit(after[:, mine[0]]))
         elif mine:
             R[:, piece] = best_rotation(np.einsum("nki,nkj->nij", after[:, mine], before[:, mine]))[0]
-    same = np.all(np.nan_to_num(after[:, 1:] - before[:, 1:]) == 0, axis=2)
-    for piece in range(N_PIECES):
-        mine = [k - 1 for k in range(1, len(NAMES)) if PIECE_OF_POINT[k] == piece]
-        R[same[:, mine].all(axis=1), piece] = np.eye(3)
     return R
 
 
-def between(bad: Bools) -> tuple[Ints, Ints, Ints, Array]:
-    """Return bad frames, the good ones before and after each, and the share of the way (n, 1) between them.
+def carried(start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
+    """Turn the pieces of postures (N, P, 3) a share (N,) of the way to others, and move the neck as far.
 
-    At an end of the clip a few frames go on as the two nearest good ones do, with shares below 0 or above 1; more of
-    them stay as they are.
+    If `loose` (N, 11) is given, only these pieces turn, and the neck stays.
+    """
+    turn = share[:, None, None] * vector_from_rotation(turns_between(start, end))
+    shift = share[:, None] * (end[:, 0] - start[:, 0])
+    if loose is not None:
+        turn, shift = turn * loose[..., None], np.zeros_like(shift)
+    vectors = vectors_of(start)
+    vectors[:, 1:] = np.einsum(
+        "npij,npj->npi", rotation_from_vector(turn)[:, PIECE_OF_POINT[1:]], vectors[:, 1:]
+    )
+    vectors[:, 0] += shift
+    return placed(vectors)
+
+
+def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
+    """Return bad frames, the good ones before and after each, and the share (n,) of the way between them.
+
+    At an end of the clip the two nearest good ones have shares below 0 or above 1. Of fewer than two good frames there
+    are none.
     """
     good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
     if len(good) < 2:
-        return rows[:0], rows[:0], rows[:0], np.empty((0, 1))
-    rows = rows[(rows > good[0]) | (good[0] <= MOST_CONTINUED)]
-    rows = rows[(rows < good[-1]) | (len(bad) - 1 - good[-1] <= MOST_CONTINUED)]
+        return rows[:0], rows[:0], rows[:0], np.empty(0)
     place = np.clip(np.searchsorted(good, rows), 1, len(good) - 1)
     before, after = good[place - 1], good[place]
-    return rows, before, after, ((rows - before) / (after - before))[:, None]
+    return rows, before, after, (rows - before) / (after - before)
 
 
-def interpolated(points: Array, bad: Bools) -> Array:
-    """Put postures (T, P, 3) between the good frames around them.
-
-    Each piece of the body turns evenly, and the neck moves evenly, from the one good frame to the other.
-    """
-    out = points.copy()
-    known = np.isfinite(points[:, list(TRUNK)]).all(axis=(1, 2))
-    rows, before, after, share = between(bad | ~known)
-    ways = []
-    for start, end, part in ((before, after, share), (after, before, 1 - share)):
-        turn = vector_from_rotation(turns_between(points[start], points[end])).reshape(
-            len(rows), 3 * N_PIECES
-        )
-        ways.append(moved(points[start], part * np.hstack([points[end, 0] - points[start, 0], turn])))
-    out[rows] = (1 - share[..., None]) * ways[0] + share[..., None] * ways[1]
-    out[~bad] = points[~bad]
-    return out
+def near_good(bad: Flags) -> Flags:
+    """Return the bad frames (T,) that their neighbours can replace: at an end of the clip only a few."""
+    good = np.flatnonzero(~bad)
+    found = bad.copy()
+    if len(good) and good[0] > MOST_CONTINUED:
+        found[: good[0]] = False
+    if len(good) and len(bad) - 1 - good[-1] > MOST_CONTINUED:
+        found[good[-1] :] = False
+    return found

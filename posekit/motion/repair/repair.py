@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal
 from posekit.files import write_bytes
-from posekit.formats import open as open_array
 from posekit.formats.bvh import Bvh
 from posekit.formats.options import Options
 from posekit.geometry import Record
@@ -24,21 +21,28 @@ from posekit.motion.motion import PER_FRAME, Motion
 from posekit.motion.repair.clip import Clip, RobotClip
 from posekit.motion.repair.own_bvh import in_bvh
 from posekit.motion.repair.own_file import in_own_file
-from posekit.motion.repair.time import mended
-from posekit.motion.validation import files_of, has_layout, in_order, names_below
+from posekit.motion.repair.remedies import mended
+from posekit.motion.validation import Judge, are_paths, files_of, in_order, names_below, new_folder
 from posekit.progress import watched
 from posekit.settings import ValidateSettings
-from posekit.validators.judge import Validator
+from posekit.skeleton import JOINTS
 from posekit.validators.report import Report, joined, plural
 
 #: Times that a motion is repaired again: postures can tremble that time does not, and a file rounds.
-ROUNDS: Final = 3
+ROUNDS: Final = 4
 #: Change of a frame that counts, metres or radians.
-SEEN: Final = 1e-7
+SEEN: Final = 5e-6
 #: Start of the note of what is left.
 LEFT: Final = "left: "
-#: From the name of a robot to its validator.
-Judges = Callable[[str], Validator]
+#: Sentences about remedies.
+SAID: Final = {
+    "reordered": "frames put in order",
+    "lengthened": "lengths of limbs restored",
+    "stepped back": "steps of the whole body taken out",
+    "smoothed": "trembling smoothed",
+    "shifted": "the body shifted to the ground",
+    "held": "standing feet held",
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -54,7 +58,7 @@ class Repaired(Record):
     notes : tuple of str
         What was invented, and what is left, one sentence each.
     data : bytes
-        The repaired table or arrays with the user's own columns; empty for other files.
+        The repaired file with all that is the user's own; empty if the motion is written anew.
     """
 
     motion: Motion | None
@@ -80,14 +84,18 @@ class Repaired(Record):
         if self.motion is None:
             remedy = "repair them into a folder: repair(source, target)"
             raise refusal(path, "", "several files", "one motion", remedy)
-        source = Path(self.motion.source or "")
-        same = source.is_file() and source.suffix.lower() == path.suffix.lower()
+        same = _same_format(self.motion, path)
         if same and bool(self.before.ok.all()):
-            shutil.copyfile(source, path)
+            shutil.copyfile(self.motion.source, path)
         elif same and self.data:
             write_bytes(path, self.data)
         else:
             posekit.save(self.motion, path)
+
+
+def _same_format(motion: Motion, path: Path) -> bool:
+    source = Path(motion.source)
+    return source.is_file() and source.suffix.lower() == path.suffix.lower()
 
 
 def repair(
@@ -143,38 +151,18 @@ def repair(
     >>> bool(posekit.repair(standing).report.ok.all())
     True
     """
-
-    @cache
-    def judge(robot: str) -> Validator:
-        """Return the validator of the given body, else of the robot that a file names."""
-        return Validator(urdf or robot or "figure", settings, **changes)
-
-    name = str(getattr(urdf, "name", urdf) or "")
-    name = "" if name in ("figure", "stick_figure") else name
-    given = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
-    facts = {key: one for key, one in given.items() if one is not None} | {"urdf": name}
-    paths = isinstance(source, str | PathLike) or (
-        isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source)
-    )
-    if paths:
+    judge = Judge(settings, urdf, changes)
+    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person, "urdf": judge.name}
+    facts = {name: one for name, one in facts.items() if one is not None}
+    if are_paths(source):
         files = list(files_of(source))
         if len(files) > 1 or not Path(files[0]).samefile(str(source)):
             return _folder(files, target, judge, facts)
         source = _opened(files[0], facts)
     else:
-        if has_layout(source, layout):
-            source = open_array(source, layout, unit=unit, up=up, rate=rate)
-        source = _given(source, judge(""), up, rate)
+        source = judge.motion(source, facts)
     done = _repaired(source, judge, facts)
     return done if target is None else _written(done, Path(target), judge, facts)
-
-
-def _given(source: Any, validator: Validator, up: str | None, rate: float | None) -> Motion:
-    motion = source if isinstance(source, Motion) else validator.motion(source)
-    fields: dict[str, Any] = {} if up is None else {"up": up if len(up) > 1 else f"+{up}"}
-    if rate is not None:
-        fields |= {"frame": np.arange(len(motion)), "time": np.arange(len(motion)) / rate}
-    return replace(motion, **fields)
 
 
 def _opened(path: Path, facts: dict[str, Any]) -> Motion:
@@ -186,13 +174,12 @@ def _opened(path: Path, facts: dict[str, Any]) -> Motion:
     return held
 
 
-def _written(done: Repaired, path: Path, judge: Judges, facts: dict[str, Any]) -> Repaired:
+def _written(done: Repaired, path: Path, judge: Judge, facts: dict[str, Any]) -> Repaired:
     """Write a repaired motion, and judge the file as it is read again."""
     done.save(path)
-    same = Path(getattr(done.motion, "source", "")).suffix.lower() == path.suffix.lower()
-    if not same or done.report is done.before:
+    if done.motion is None or done.report is done.before or not _same_format(done.motion, path):
         return done
-    report = _judged(_opened(path, facts), judge)
+    report = judge.report(_opened(path, facts))
     return replace(done, report=report, notes=_with_left(done.notes, report))
 
 
@@ -205,15 +192,10 @@ def _with_left(notes: Sequence[str], report: Report) -> tuple[str, ...]:
 
 
 def _folder(
-    files: Sequence[Path],
-    target: str | PathLike[str] | None,
-    judge: Judges,
-    facts: dict[str, Any],
+    files: Sequence[Path], target: str | PathLike[str] | None, judge: Judge, facts: dict[str, Any]
 ) -> Repaired:
     """Repair files into a new folder; a file that cannot be read or written is named."""
-    folder = None if target is None else Path(target)
-    if folder is not None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise refusal(folder, "", "something that exists", "a new or empty folder", "name another")
+    folder = None if target is None else new_folder(target)
     names = names_below(str(path) for path in files)
     done: list[Repaired] = []
     notes: list[str] = []
@@ -240,168 +222,97 @@ def _folder(
     return Repaired(motion=None, before=before, report=report, notes=(first, *notes, *refused))
 
 
-def _of_points(motion: Motion, validator: Validator) -> bool:
-    return validator.robot is None and motion.joints is not None
-
-
-def _judged(motion: Motion, judge: Judges) -> Report:
-    """Judge a motion as it is repaired: points by themselves, configurations in the order of their robot."""
-    validator = judge(motion.robot)
-    if _of_points(motion, validator):
-        return validator.check(replace(motion, q=None, q_names=(), robot=""))
-    if motion.q is None:
-        got, remedy = "positions of a person", "leave --urdf out, or convert the file first"
-        raise refusal(motion.source or "repair", "urdf", got, "configurations of the robot", remedy)
-    return validator.check(in_order(motion, validator))
-
-
-def _repaired(motion: Motion, judge: Judges, facts: dict[str, Any]) -> Repaired:
-    """Repair every recording of a motion."""
-    validator, before = judge(motion.robot), _judged(motion, judge)
+def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
+    """Repair every recording of a motion, until it passes as its file is read again."""
+    before = judge.report(motion)
     if before.ok.all():
         return Repaired(motion=motion, before=before, report=before, notes=(_changed(0, len(motion)),))
-    if _of_points(motion, validator):
-        own = motion = replace(motion, q=None, q_names=(), robot="")
-    else:
-        own, motion = motion, in_order(motion, validator)
-    parts, rows = [], []
-    notes: list[str] = []
-    for k, (name, recording) in enumerate(motion.recordings()):
-        done, own_notes, own_rows = _recording(recording, validator, facts)
-        parts.append(done)
-        rows.append(np.flatnonzero(np.unique(np.asarray(motion.clip), return_inverse=True)[1] == k)[own_rows])
-        notes += [f"{name}: {note}" if name else note for note in own_notes]
-    repaired = parts[0] if len(parts) == 1 else _concatenated(parts, motion)
-    report, data = validator.check(repaired), b""
-    if repaired.document is None and len(before.files) == 1 and Path(own.source).is_file():
-        after = repaired if own is motion else _as_in_file(repaired, own, np.concatenate(rows))
-        written, lost = in_own_file(own.source, own, after, np.concatenate(rows))
-        if written is not None:
-            with tempfile.TemporaryDirectory() as folder:
-                place = Path(folder) / Path(own.source).name
-                write_bytes(place, written)
-                again = _judged(_opened(place, facts), judge)
-            if int(again.ok.sum()) >= int(report.ok.sum()):
-                data, report = written, again
-                notes += lost
-            else:
-                notes.append(
-                    f"the columns of {Path(own.source).name} cannot hold the repair; joints are written"
-                )
-    return Repaired(motion=repaired, before=before, report=report, notes=_with_left(notes, report), data=data)
+    validator = judge.validator(motion.robot)
+    of_points = validator.robot is None and motion.joints is not None
+    motion = replace(motion, q=None, q_names=(), robot="") if of_points else in_order(motion, validator)
+    kind: type[Clip] = Clip if of_points else RobotClip
+    given = clips = [kind.of(recording, validator) for _, recording in motion.recordings()]
+    now, whole = motion, clips
+    tried: list[Repaired] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number in watched(range(ROUNDS), "repairing"):
+            clips = [mended(clip, filled=number % 2 > 0) for clip in clips]
+            whole = [clip.following(first) for clip, first in zip(clips, whole, strict=True)]
+            after = _joined(clips, now)
+            report = judge.report(after)
+            data, lost = _in_its_file(now, after, clips, facts)
+            if data:
+                place = Path(folder) / f"{number}{Path(motion.source).name}"
+                write_bytes(place, data)
+                again = _opened(place, facts)
+                own = replace(judge.report(again), files=before.files)
+                if isinstance(motion.document, Bvh) or own.ok.sum() >= report.ok.sum():
+                    after, report = again, own
+                else:
+                    name = Path(motion.source).name
+                    data, lost = b"", [f"the columns of {name} cannot hold the repair; joints are written"]
+            notes = [note for one, clip in zip(given, whole, strict=True) for note in _told(one, clip)]
+            said = _with_left([*notes, *lost], report)
+            shown = replace(after, source=motion.source)
+            tried.append(Repaired(motion=shown, before=before, report=report, notes=said, data=data))
+            if report.ok.all():
+                break
+            now = after if of_points else in_order(after, validator)
+            parts = zip(now.recordings(), clips, strict=True)
+            clips = [replace(kind.of(part, validator), done=clip.done) for (_, part), clip in parts]
+    return max(tried, key=lambda one: int(one.report.ok.sum()))
 
 
-def _as_in_file(motion: Motion, own: Motion, rows: NDArray[np.intp]) -> Motion:
-    """Return configurations in the order of a file's columns; those that the robot lacks stay."""
-    if not own.q_names:
-        return motion
-    place = {_plain(name): k for k, name in enumerate(motion.q_names)}
-    q = np.array(own.q)[rows]
-    for column, name in enumerate(own.q_names):
-        if _plain(name) in place:
-            q[:, column] = np.asarray(motion.q)[:, place[_plain(name)]]
-    return replace(motion, q=q, q_names=own.q_names)
+def _joined(clips: Sequence[Clip], motion: Motion) -> Motion:
+    """Return repaired recordings one after the other."""
+    parts = [clip.as_motion() for clip in clips]
+    if len(parts) == 1:
+        return parts[0]
+    held = [name for name in PER_FRAME if getattr(parts[0], name) is not None]
+    fields: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in held}
+    fields["clip"] = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    return replace(parts[0], **fields, clips=motion.clips, document=None)
 
 
-def _plain(name: str) -> str:
-    return name.removesuffix("_joint").lower()
+def _in_its_file(
+    before: Motion, after: Motion, clips: Sequence[Clip], facts: dict[str, Any]
+) -> tuple[bytes, list[str]]:
+    """Return a motion's own file with what was repaired, empty if it cannot be kept, and what does not follow."""
+    if isinstance(before.document, Bvh):
+        options = Options(**{name: facts.get(name, "") for name in ("layout", "unit", "up")})
+        return in_bvh(clips[0], before.document, options) if len(after) == len(before) else b"", []
+    if not Path(before.source).is_file():
+        return b"", []
+    of_clip = [np.flatnonzero(before.clip == index) for index in np.unique(np.asarray(before.clip))]
+    rows = [own[clip.own_rows] for own, clip in zip(of_clip, clips, strict=True)]
+    return in_own_file(before.source, before, after, np.concatenate(rows))
 
 
-def _recording(
-    motion: Motion, validator: Validator, facts: dict[str, Any]
-) -> tuple[Motion, list[str], NDArray[np.intp]]:
-    """Repair one recording; return it, what was done, and the given frame of each frame.
-
-    Where remedies do not suffice, the rejected frames are interpolated first.
-    """
-    given = (Clip if _of_points(motion, validator) else RobotClip).of(motion, validator)
-    options = Options(**{key: facts.get(key, "") for key in ("layout", "unit", "up")})
-    found = _searched(given, options)
-    if found[0] and motion.in_time:
-        bad = np.convolve(~validator.check(motion).ok, np.ones(3), mode="same") > 0
-        found = min(found, _searched(given.interpolated(bad), options), key=lambda one: one[0])
-    _, best, clip, done = found
-    return best, _told(given, clip, done), np.maximum.accumulate(clip.rows)
-
-
-def _searched(start: Clip, options: Options) -> tuple[int, Motion, Clip, list[str]]:
-    """Repair a clip; return the number of frames that are not valid, the motion, the clip, and the remedies."""
-    motion, validator = start.motion, start.validator
-    clip = total = start
-    document = motion.document
-    done: list[str] = []
-    tried: list[tuple[int, Motion, Clip, list[str]]] = []
-    for _ in range(ROUNDS):
-        for causes in (True, False) if motion.in_time else ():
-            clip, remedies = mended(clip, causes=causes)
-            done = [*done, *remedies]
-            clip = clip.legal()
-        clip = clip if motion.in_time else clip.legal()
-        if isinstance(document, Bvh) and not isinstance(clip, RobotClip) and len(clip) == len(motion):
-            now = in_bvh(clip, document, options)
-            total = replace(
-                clip,
-                state=clip.state_of(now),
-                motion=motion,
-                rows=total.rows[clip.rows],
-                filled=total.filled[clip.rows] | clip.filled,
-                mirrored=total.mirrored != clip.mirrored,
-            )
-            document, clip = now.document, type(clip).of(now, validator)  # as the file is read again
-        else:
-            now, total = clip.as_motion(), clip
-        tried.append((int((~validator.check(now).ok).sum()), now, total, done))
-        if not tried[-1][0]:
-            break
-    return min(tried, key=lambda one: one[0])
-
-
-def _told(given: Clip, clip: Clip, done: Sequence[str]) -> list[str]:
+def _told(given: Clip, clip: Clip) -> list[str]:
     """Say what was changed and what was invented."""
-    rows = np.where(clip.rows < 0, 0, clip.rows)
-    moved = np.nan_to_num(clip.state - given.state[rows]).reshape(len(clip), -1)
-    inserted, filled = clip.rows < 0, clip.filled
-    changed = (np.abs(moved) > SEEN).any(axis=1) | inserted | (rows != np.arange(len(rows)))
-    notes = [_changed(int(changed.sum()), len(clip))]
-    if inserted.any():
-        notes.append(f"{plural(int(inserted.sum()), 'missing frame')} inserted")
+    rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
+    moved = np.nan_to_num(clip.state - given.state[rows])
+    changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
+    changed |= rows != np.arange(len(rows))
     ends = filled & (np.logical_and.accumulate(filled) | np.logical_and.accumulate(filled[::-1])[::-1])
-    for rows_made, how in (
-        (filled & ~inserted & ~ends, "interpolated"),
-        (ends, "continued to an end of the clip"),
+    notes = [_changed(int(changed.sum()), len(clip))]
+    for made, how in (
+        (inserted, "missing frame{} inserted"),
+        (filled & ~inserted & ~ends, "frame{} interpolated"),
+        (ends, "frame{} continued to an end of the clip"),
     ):
-        if rows_made.any():
-            notes.append(f"{plural(int(rows_made.sum()), 'frame')} {how}")
+        if made.any():
+            notes.append(f"{made.sum()} {how.format('s' if made.sum() > 1 else '')}")
     if clip.mirrored:
         notes.append("right and left exchanged in all frames")
-    elif "exchanged" in done:
+    elif "exchanged" in clip.done:
         notes.append("right and left exchanged back")
-    notes += [SAID[name] for name in dict.fromkeys(done) if name in SAID]
+    notes += [SAID[name] for name in dict.fromkeys(clip.done) if name in SAID]
     if not isinstance(clip, RobotClip) and not clip.mirrored:
-        way = np.nanmax(np.linalg.norm((clip.state - given.state[rows])[:, :14], axis=-1), initial=0.0)
+        way = np.linalg.norm(moved[:, : len(JOINTS)], axis=-1).max(initial=0.0)
         notes.append(f"joints moved by up to {100 * way:.3g} cm")
-    return notes
-
-
-#: Sentences about remedies.
-SAID: Final = {
-    "reordered": "frames put in order",
-    "lengthened": "lengths of limbs restored",
-    "stepped back": "steps of the whole body taken out",
-    "smoothed": "trembling smoothed",
-    "shifted": "the body shifted to the ground",
-    "held": "standing feet held",
-}
+    return [f"{clip.motion.clips[0]}: {note}" for note in notes] if clip.motion.clips else notes
 
 
 def _changed(count: int, frames: int) -> str:
     return f"{count} of {plural(frames, 'frame')} changed"
-
-
-def _concatenated(parts: Sequence[Motion], motion: Motion) -> Motion:
-    """Return recordings one after the other."""
-    held = [name for name in PER_FRAME if getattr(parts[0], name) is not None]
-    fields: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in held}
-    fields["clip"] = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    names = [part.clips[0] if part.clips else "" for part in parts]
-    return replace(motion, **fields, clips=names if any(names) else (), document=None)
