@@ -45,7 +45,7 @@ BAD_INPUT = 2
     "--repair",
     metavar="FILE|DIR",
     type=click.Path(path_type=Path),
-    help="Write the nearest motion that passes.",
+    help="Write a motion nearby that passes.",
 )
 @reading()
 @settings_options(ValidateSettings, SHOWN, panel="Judging")

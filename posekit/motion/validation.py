@@ -122,7 +122,7 @@ def are_paths(given: Any) -> bool:
     return all(isinstance(one, str | os.PathLike) for one in several)
 
 
-def _has_layout(given: Any, layout: str | None) -> bool:
+def has_layout(given: Any, layout: str | None) -> bool:
     """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's."""
     shape = np.shape(given) if isinstance(given, list | tuple | np.ndarray) else ()
     known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
@@ -210,7 +210,7 @@ class Judge:
     def motion(self, given: Any, facts: Mapping[str, Any]) -> Motion:
         """Return an array or a motion with the facts that are stated beside it."""
         layout, unit, up, rate = (facts.get(name) for name in ("layout", "unit", "up", "rate"))
-        if not isinstance(given, Motion) and _has_layout(given, layout):
+        if not isinstance(given, Motion) and has_layout(given, layout):
             import posekit
 
             opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate)

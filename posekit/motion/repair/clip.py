@@ -28,6 +28,7 @@ from posekit.motion.repair.pieces import (
 )
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.body import Body
+from posekit.validators.check import Check
 from posekit.validators.judge import Validator, chosen_checks
 from posekit.validators.report import Report
 from posekit.validators.robot import sole_points
@@ -129,16 +130,16 @@ class Clip:
             self.motion, time=self.time, frame=frame, clip=np.zeros(len(self), dtype=np.intp), **fields
         )
 
-    def report(self, *, over_time: bool) -> Report:
-        """Ask the checks over time, or those of postures."""
+    def checks(self, *, over_time: bool) -> list[Check]:
+        """Return the checks over time that are asked for, or those of postures."""
         of_robot = self.validator.robot is not None
-        checks = [
-            one
-            for one in chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
-            if bool(getattr(one, "over_time", False)) == over_time
-        ]
+        asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
+        return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
+
+    def report(self, *, over_time: bool) -> Report:
+        """Ask the checks over time, or those of postures; there must be some."""
         validator = copy(self.validator)
-        validator.settings = self.validator.settings.changed(checks=checks)
+        validator.settings = self.validator.settings.changed(checks=self.checks(over_time=over_time))
         return validator.check(self.as_motion())
 
     def points(self) -> Array:
@@ -202,10 +203,12 @@ class Clip:
         else their limbs, else all. The good posture lies between the nearest ones that pass, or is the nearest of
         these; without any it is at rest.
         """
-        report = self.report(over_time=False)
-        if not report.invalid.any():
+        if not self.checks(over_time=False):
             return self
+        report = self.report(over_time=False)
         bad = np.flatnonzero(report.invalid & self.placed())
+        if not bad.size:
+            return self
         between_good, nearest_good = self.good(bad, ~report.invalid & self.placed())
         clip = self.bounded(report, bad, between_good)
         ways = [(between_good, loose) for loose in self.loose(report)]
@@ -375,7 +378,7 @@ class RobotClip(Clip):
         out = smoothed(out, loose, strength)
         if self.robot.free_flyer:
             out[:, 3:7] = unit(out[:, 3:7])
-        return replace(self, state=np.where(loose.any(axis=1)[:, None], out, self.state))
+        return replace(self, state=np.where(loose.any(axis=1, keepdims=True), out, self.state))
 
     def invalid(self, rows: Ints) -> Flags:
         """Return which of some frames (n,) checks of postures reject: each is judged by itself."""
@@ -390,16 +393,9 @@ class RobotClip(Clip):
         return state
 
     def bounded(self, report: Report, rows: Ints, good: Array) -> Self:
-        """Bring joints within the limits that they violate, and mimicking joints to their targets."""
-        out, table = self.state.copy(), report.findings
-        columns = (table[name] for name in ("row", "check", "place", "lower", "upper"))
-        for row, check, place, lower, upper in zip(*columns, strict=True):
-            name, scale = report.places[place], np.radians(1.0) if report.units[check] == "deg" else 1.0
-            if name in self.entries and report.checks[check] in ("joint-range", "joint-travel"):
-                entry = self.entries.index(name)
-                raised = np.fmax(out[row, entry], scale * lower + INSIDE_LIMITS)
-                out[row, entry] = np.fmin(raised, scale * upper - INSIDE_LIMITS)
-        return replace(self, state=self.robot.with_mimics(out))
+        """Bring joints within the limits of the URDF, and mimicking joints to their targets."""
+        lower, upper = self.robot.lower + INSIDE_LIMITS, self.robot.upper - INSIDE_LIMITS
+        return self.with_rows(rows, self.robot.with_mimics(np.clip(self.state[rows], lower, upper)))
 
     def loose(self, report: Report) -> Iterator[Flags]:
         """Yield what may move (T, nv) of frames that are rejected: joints between bodies that touch, then all."""

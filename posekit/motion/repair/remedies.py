@@ -57,7 +57,7 @@ def mended(clip: Clip, *, filled: bool = False) -> Clip:
     Remedies of labels and single frames are tried first, then postures are made legal, then all remedies are tried:
     wrong postures tremble, and their feet slide. If `filled`, the rejected frames are interpolated before.
     """
-    if not clip.motion.in_time:
+    if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
     if filled:
         clip = clip.interpolated(binary_dilation(clip.validator.check(clip.as_motion()).invalid))
@@ -180,7 +180,7 @@ def _interpolate(clip: Clip, report: Report) -> Iterator[Clip]:
         yield clip.interpolated(still)
     for bad in (jumps & ~np.roll(jumps, 1, axis=0), jumps & np.roll(jumps, -1, axis=0), jumps):
         if bad.any():
-            whole = clip.interpolated(bad.any(axis=1))
+            whole = clip.interpolated(np.asarray(bad.any(axis=1)))
             yield whole
             if not isinstance(clip, RobotClip):
                 own = np.pad(bad, ((0, 0), (0, len(NAMES) - len(JOINTS))))
@@ -189,7 +189,9 @@ def _interpolate(clip: Clip, report: Report) -> Iterator[Clip]:
 
 def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
     """Smooth trembling, and motion that is too fast, by as little as helps most; more if it comes again."""
-    checks = ("jitter", "speed", "acceleration", "jerk", "joint-velocity", "teleport")
+    checks = ["jitter", "speed", "acceleration", "jerk", "joint-velocity"]
+    if rejected(report, "teleport").sum() > 1:  # several jumps near each other are trembling
+        checks.append("teleport")
     loose = rejected(report, *checks, places=clip.entries)
     strengths = STRENGTHS[min(clip.done.count("smoothed"), len(STRENGTHS) - 1) :]
     for frames in AROUND_FRAMES if loose.any() else ():
@@ -242,7 +244,7 @@ def _hold(clip: Clip, report: Report) -> Iterator[Clip]:
     stands = np.argmin(length, axis=1)  # of two feet that slide, the slower one stands
     slow = np.nan_to_num(slip[np.arange(len(clip)), stands])
     even = np.zeros_like(slow)
-    for start, stop in runs(bad.any(axis=1)):
+    for start, stop in runs(np.asarray(bad.any(axis=1))):
         even[start:stop] = np.median(slow[start:stop], axis=0)
     yield from (clip.shifted(_most_stay(np.cumsum(step, axis=0))) for step in (even, slow))
 

@@ -1,4 +1,4 @@
-"""`repair`: the nearest motion that passes, in the user's own file, and what was invented for it."""
+"""`repair`: a motion nearby that passes, in the user's own file, and what was invented for it."""
 
 from __future__ import annotations
 
@@ -111,13 +111,13 @@ def repair(
     person: int | None = None,
     **changes: Any,
 ) -> Repaired:
-    """Find the nearest motion that passes all checks.
+    """Find a motion near the given one that passes all checks.
 
     Over time, frames are put in order, sides exchanged back, lengths of limbs restored, jumps and frozen frames
     interpolated, trembling smoothed by as little as helps, the body shifted to the ground, and standing feet held. Then
-    each posture that is rejected is replaced by the nearest one inside all bounds, with changes that are alike in
-    neighbouring frames. A first frame from which the body jumps, such as a T-pose, is replaced by one from which the
-    motion goes on as it does after it.
+    each posture that is rejected goes toward a good one between its neighbours as far as it must, first by the parts of
+    the body that findings name. Joints of a robot beyond their limits are set on these. A first frame from which the
+    body jumps, such as a T-pose, is replaced by one from which the motion goes on as it does after it.
 
     Frames that need no change stay as they are, byte for byte in BVH files and in tables. A file that is written is
     judged as it is read again.
