@@ -243,3 +243,23 @@ def test_derivatives_are_those_of_a_polynomial(check: str, order: int, rate: flo
     assert check == "jerk" or found.frame.max() >= len(time) - 1 - reach
     slower = gesture(0.1)[:1] + 0.9 * BOUNDS[check]["trunk"] / constant * way[:, None, None] * [1.0, 0.0, 0.0]
     assert not judged(slower, time=time, checks=[check]).invalid.any()
+
+
+@pytest.mark.parametrize("deviation", [0.002, 0.004, 0.008])
+def test_noise_is_that_of_the_coordinates_whatever_two_limbs_do(deviation: float) -> None:
+    rng = np.random.default_rng(0)
+    joints = gesture(8.0)
+    joints += rng.normal(0, deviation, joints.shape)
+    for shaken_limbs in (False, True):
+        if shaken_limbs:
+            joints[:, [JOINT["right_wrist"], JOINT["left_wrist"]]] += rng.normal(0, 0.04, (len(joints), 2, 3))
+        assert judged(joints).settings["noise"] == pytest.approx(deviation, rel=0.15)
+
+
+@pytest.mark.parametrize(("step", "found"), [(0.0006, False), (0.0014, True)])
+def test_frames_come_again_only_while_the_body_moves(step: float, found: bool) -> None:
+    """A millimetre a frame is motion; below it rounding makes neighbours equal."""
+    joints = np.repeat(gesture(0.1)[:1], 120, axis=0)
+    joints += (step * np.arange(120))[:, None, None] * [1.0, 0.0, 0.0]
+    joints[50:53] = joints[49]
+    assert bool(len(rows_of(judged(joints), "repeated"))) is found

@@ -102,37 +102,33 @@ def test_an_arm_is_raised_by_less_backward_than_forward(degrees: float) -> None:
         assert validator.check(posed(**{f"{side}_shoulder__flexion": degrees})).ok.all()
 
 
+WORDS = (RANGES / "table1.toml").read_text(encoding="utf-8")
+ELBOW = "[elbow]\nflexion = [0.0, 160.0]"
+
+
 @pytest.mark.parametrize(
-    ("text", "field"),
+    ("given", "instead", "field"),
     [
-        ("kind = 'rotation'", "schema"),
-        ("schema = 'posekit.ranges/1'\nkind = 'bent'", "kind"),
-        (
-            "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexion = [130.0, 0.0]",
-            "knee.flexion",
-        ),
-        (
-            "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexing = [0.0, 130.0]",
-            "knee.flexing",
-        ),
-        ("schema = 'posekit.ranges/1'\nkind = 'configuration'\n[knee]\nflexion = [0.0]", "knee.flexion"),
-        ("schema = 'posekit.ranges/1'\nkind = 'rotation'", "shoulder.flexion"),
-        ("schema = 'posekit.ranges/1'\nkind = 'anatomical'", "spreads"),
+        ("posekit.ranges/1", "posekit.ranges/2", "schema"),
+        ('"rotation"', '"bent"', "kind"),
+        (ELBOW, "[elbow]\nflexion = [160.0, 0.0]", "elbow.flexion"),
+        (ELBOW, "[elbow]\nflexion = [0.0]", "elbow.flexion"),
+        (ELBOW, "[elbow]\nflexing = [0.0, 160.0]", "elbow.flex"),
+        (ELBOW, "", "elbow.flexion"),
+        (WORDS, 'schema = "posekit.ranges/1"\nkind = "anatomical"', "spreads"),
     ],
 )
-def test_a_broken_table_names_the_field(text: str, field: str, tmp_path: Path) -> None:
+def test_a_broken_table_names_the_field(given: str, instead: str, field: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
+    assert given in WORDS
+    path.write_text(WORDS.replace(given, instead), encoding="utf-8")
     with pytest.raises(InputError, match=rf"mine\.toml: {field}"):
         posekit.Validator(ranges=str(path)).check(posed())
 
 
-def test_own_ranges_judge_the_angles_that_they_name(tmp_path: Path) -> None:
+def test_own_ranges_judge_by_their_own_ends(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    path.write_text(
-        "schema = 'posekit.ranges/1'\nkind = 'configuration'\n[elbow]\nflexion = [10.0, 50.0]\n",
-        encoding="utf-8",
-    )
+    path.write_text(WORDS.replace(ELBOW, "[elbow]\nflexion = [10.0, 50.0]"), encoding="utf-8")
     validator = posekit.Validator(checks=["joint-range"], ranges=str(path), strict=True)
     for angle, places in ((5.0, {"right_elbow.flexion"}), (30.0, set()), (55.0, {"right_elbow.flexion"})):
         found = validator.check(posed(right_elbow__flexion=angle, left_elbow__flexion=30.0)).table()
