@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from posekit.body import load_figure as load_figure
-    from posekit.cameras import Detections as Detections
     from posekit.cameras import View as View
     from posekit.doors import convert as convert
     from posekit.doors import recover as recover
     from posekit.doors import render as render
     from posekit.errors import InputError as InputError
     from posekit.errors import PosekitError as PosekitError
-    from posekit.following import Tracker as Tracker
+    from posekit.following.detections import Detections as Detections
+    from posekit.following.tracker import Tracker as Tracker
     from posekit.formats import open as open
     from posekit.formats import save as save
     from posekit.motion import Motion as Motion
@@ -39,10 +39,11 @@ __version__ = "1.0.0"
 
 _HOMES = {
     "posekit.body": ("load_figure",),
-    "posekit.cameras": ("Detections", "View"),
+    "posekit.cameras": ("View",),
     "posekit.doors": ("convert", "recover", "render"),
     "posekit.errors": ("InputError", "PosekitError"),
-    "posekit.following": ("Tracker",),
+    "posekit.following.detections": ("Detections",),
+    "posekit.following.tracker": ("Tracker",),
     "posekit.formats": ("open", "save"),
     "posekit.motion": ("Motion",),
     "posekit.motion.repair.repair": ("repair",),

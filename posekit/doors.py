@@ -13,7 +13,8 @@ from posekit.settings import RecoverSettings, number
 
 if TYPE_CHECKING:
     from posekit.body import Figure
-    from posekit.cameras import Detections, PinholeCamera, View
+    from posekit.cameras import PinholeCamera, View
+    from posekit.following.detections import Detections
     from posekit.recovery import Recovery
 
 #: A path, an array, a `View`, `Detections` or a `Motion`.
@@ -142,7 +143,8 @@ def view_of(
     InputError
         If the source holds no view and no key points, or the calibration does not fit.
     """
-    from posekit.cameras import Detections, View
+    from posekit.cameras import View
+    from posekit.following.detections import Detections
     from posekit.formats import open as open_file
     from posekit.formats.arrays import key_points_of
     from posekit.formats.options import Options
@@ -326,7 +328,8 @@ def render(
     >>> import posekit
     >>> posekit.render(posekit.recover(posekit.builtin_view("seq1")), "walk.html")
     """
-    from posekit.cameras import Detections, View
+    from posekit.cameras import View
+    from posekit.following.detections import Detections
     from posekit.viewer import draw
 
     name = source if isinstance(source, str | PathLike) else "render"

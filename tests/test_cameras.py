@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posekit.cameras import (
-    Detections,
     LeeChenCamera,
     PinholeCamera,
     ScaledOrthographicCamera,
@@ -18,6 +17,7 @@ from posekit.cameras.lee_chen import (
 )
 from posekit.cameras.lens import distort, fold_radius, undistort
 from posekit.errors import CameraError, InputError
+from posekit.following.detections import Detections
 
 K = np.array([[1000.0, 0.7, 640.0], [0.0, 1100.0, 360.0], [0.0, 0.0, 1.0]])
 LENSES = {

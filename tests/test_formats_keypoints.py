@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cameras import Detections, PinholeCamera
+from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
 from posekit.formats.layout import load_layout
 
@@ -209,7 +209,7 @@ FORMATS = (
 @pytest.mark.parametrize("make", FORMATS, ids=lambda make: make.__name__)
 def test_all_formats_hold_the_same_people(make: Callable[[Path], Path], tmp_path: Path) -> None:
     found = posekit.open(make(tmp_path))
-    assert isinstance(found, Detections)
+    assert isinstance(found, posekit.Detections)
     assert found.film and found.frame.tolist() == list(range(FRAMES))
     for k in range(FRAMES):
         expected = person(k)

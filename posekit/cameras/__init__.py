@@ -1,8 +1,7 @@
-"""Cameras, and what they saw: image points of a person as a `View`, key points of detectors as `Detections`."""
+"""Cameras, and what they saw of a person: image points as a `View`."""
 
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift
-from posekit.cameras.detections import Detections as Detections
 from posekit.cameras.guesses import camera_from_fov as camera_from_fov
 from posekit.cameras.lee_chen import LeeChenCamera as LeeChenCamera
 from posekit.cameras.pinhole import PinholeCamera as PinholeCamera

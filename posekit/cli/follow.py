@@ -36,8 +36,8 @@ def follow(
     if not stdin:
         raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")
     from posekit.doors import opened_camera
-    from posekit.following import Tracker
     from posekit.following.lines import answers
+    from posekit.following.tracker import Tracker
 
     tracker = Tracker(
         settings=settings_from(RecoverSettings, given),

@@ -102,8 +102,8 @@ def steps(seconds: float) -> tuple[Array, Array]:
     return np.kron(np.array([[1.0, t], [0.0, 1.0]]), one), np.kron(noise, one)
 
 
-def smooth(time: Array, joints: Array, covariance: Array) -> tuple[Array, Array]:
-    """Smooth a path.
+def smooth(time: Array, joints: Array, covariance: Array) -> Array:
+    """Return the joints (T, 14, 3) of a smoothed path; NaN where a joint is never known.
 
     Parameters
     ----------
@@ -113,13 +113,6 @@ def smooth(time: Array, joints: Array, covariance: Array) -> tuple[Array, Array]
         Metres; NaN where a joint is not known: it is interpolated.
     covariance : array (T, 14, 3, 3)
         Square metres.
-
-    Returns
-    -------
-    joints : array (T, 14, 3)
-        NaN where a joint is never known.
-    deviation : array (T, 14)
-        Root of the trace of each joint's covariance, metres.
     """
     body = Moving.nothing(1)
     ahead, after = [], []
@@ -128,17 +121,13 @@ def smooth(time: Array, joints: Array, covariance: Array) -> tuple[Array, Array]
         ahead.append((body.mean[0], body.spread[0]))
         body = body.given(joints[None, k], covariance[None, k])
         after.append((body.mean[0], body.spread[0]))
-    mean, spread = after[-1]
-    means, spreads = [mean], [spread]
+    mean = after[-1][0]
+    means = [mean]
     for k in range(len(time) - 2, -1, -1):
         F, _ = steps(float(time[k + 1] - time[k]))
-        own, own_spread = after[k]
-        back = np.linalg.solve(ahead[k + 1][1], F @ own_spread).swapaxes(-1, -2)
+        own, spread = after[k]
+        back = np.linalg.solve(ahead[k + 1][1], F @ spread).swapaxes(-1, -2)
         mean = own + (back @ (mean - ahead[k + 1][0])[..., None])[..., 0]
-        spread = own_spread + back @ (spread - ahead[k + 1][1]) @ back.swapaxes(-1, -2)
         means.append(mean)
-        spreads.append(spread)
-    trace = np.trace(np.stack(spreads[::-1])[..., :3, :3], axis1=-2, axis2=-1)
     never = np.asarray((~np.isfinite(joints).all(axis=2)).all(axis=0))
-    found = np.where(never[:, None], np.nan, np.stack(means[::-1])[..., :3])
-    return found, np.where(never, np.nan, np.sqrt(np.maximum(trace, 0.0)))
+    return np.where(never[:, None], np.nan, np.stack(means[::-1])[..., :3])

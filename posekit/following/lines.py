@@ -13,9 +13,6 @@ from posekit.following.tracker import TrackedPosture, Tracker
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS, segment_name
 
-#: Longest line that is read: a picture of 133 points needs ten thousand.
-MAX_LINE_BYTES: Final = 1_000_000
-
 #: Decimals of metres, seconds and probabilities that are written.
 DECIMALS: Final = 6
 
@@ -37,22 +34,11 @@ def answers(stream: IO[bytes], tracker: Tracker, *, keep_going: bool = False) ->
     InputError
         If a line cannot be read.
     """
-    number = 0
-    while line := stream.readline(MAX_LINE_BYTES + 1):
-        number += 1
-        too_long = len(line) > MAX_LINE_BYTES
-        while too_long and not line.endswith(b"\n"):
-            line = stream.readline(MAX_LINE_BYTES + 1)
-            if not line:
-                break
-        if not too_long and not line.strip():
+    for number, line in enumerate(iter(stream.readline, b""), start=1):
+        if not line.strip():
             continue
         where = f"line {number}"
         try:
-            if too_long:
-                raise refusal(
-                    where, "", "a longer line", f"at most {MAX_LINE_BYTES:,} bytes", "send fewer points"
-                )
             time, points, root = _picture(where, line, tracker.names)
             answer = _document(tracker.update(points, time, root=root))
         except InputError as error:

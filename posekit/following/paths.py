@@ -19,7 +19,7 @@ from scipy.special import digamma, logsumexp
 
 from posekit.errors import refusal
 from posekit.following.kalman import DENSITY, Moving, smooth
-from posekit.geometry import Array
+from posekit.geometry import Array, unit
 from posekit.progress import watched
 from posekit.recovery.answer import lay
 from posekit.recovery.recovery import Paths, Recovery
@@ -84,6 +84,12 @@ class Candidates(NamedTuple):
     covariance: Array
     cost: Array
 
+    def at(self, survivor: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return joints and covariances of survivors (S,); -1 passes the frame over and has unknown joints."""
+        joints = np.concatenate([self.joints, np.full((1, *self.joints.shape[1:]), np.nan)])
+        covariance = np.concatenate([self.covariance, np.zeros((1, *self.covariance.shape[1:]))])
+        return joints[survivor], covariance[survivor]
+
 
 class Stage(NamedTuple):
     """The S ends of paths after a frame, from the P before it.
@@ -145,12 +151,9 @@ class Trellis:
         self.cheapest = total[parent, target]
         forward = logsumexp(self.forward[:, None] - step, axis=0)
         self.forward = forward - forward.max()
-        seen = np.full((len(parent), *joints.shape[1:]), np.nan)
-        spread = np.zeros((len(parent), *covariance.shape[1:]))
-        here = target < len(chosen)
-        seen[here], spread[here] = joints[target[here]], covariance[target[here]]
-        self.ends = led.take(parent).given(seen, spread)
-        self.stages.append(Stage(np.append(chosen, -1)[target], parent, step, self.forward))
+        survivor = np.append(chosen, -1)[target]
+        self.ends = led.take(parent).given(*frame.at(survivor))
+        self.stages.append(Stage(survivor, parent, step, self.forward))
 
     def cheapest_path(self) -> NDArray[np.intp]:
         """Return the survivors of the cheapest path (T,); -1 for frames that it passes over."""
@@ -251,7 +254,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     Examples
     --------
     >>> import posekit
-    >>> from posekit.following import follow
+    >>> from posekit.following.paths import follow
     >>> follow(posekit.recover(posekit.builtin_view("seq1"))).path.survivor.shape
     (2, 5)
     """
@@ -291,15 +294,10 @@ def candidates(recovery: Recovery, k: int) -> Candidates:
     rows = recovery.rows(k)
     table = recovery.survivors
     joints, radius = table.joints[rows], np.asarray(table.radius)[rows]
-    orthographic = bool(np.isfinite(np.asarray(table.scale)[rows]).any())
-    if orthographic:
+    ray = unit(joints)
+    if np.isfinite(np.asarray(table.scale)[rows]).any():  # a scaled orthographic camera
         joints = joints - joints[:, :1]
-    deep = np.array([0.0, 0.0, 1.0])
-    ray = (
-        np.broadcast_to(deep, joints.shape)
-        if orthographic
-        else joints / np.linalg.norm(joints, axis=2)[..., None]
-    )
+        ray = np.broadcast_to([0.0, 0.0, 1.0], joints.shape)
     along = np.nan_to_num(ray[..., :, None] * ray[..., None, :])
     deviation = radius / RADIUS_DEVIATIONS
     covariance = deviation[..., None, None] ** 2 * (along + ACROSS**2 * (np.eye(3) - along))
@@ -353,9 +351,7 @@ def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.
     most = max(1, WIDTH // total.shape[1]) if near.sum() > WIDTH else len(total)
     masked = np.where(near, total, np.inf)
     order = np.argsort(masked, axis=0, kind="stable")[:most]
-    place, target = np.nonzero(np.isfinite(np.take_along_axis(masked, order, axis=0)))
-    by_target = np.lexsort((place, target))
-    place, target = place[by_target], target[by_target]
+    target, place = np.nonzero(np.isfinite(np.take_along_axis(masked, order, axis=0)).T)
     parent = order[place, target]
     first = np.minimum(np.searchsorted(target, np.arange(total.shape[1])), len(target) - 1)
     into = np.tile(first, (len(total), 1))
@@ -379,9 +375,9 @@ def _expected(
     each = [expected_posture(*one) for one in zip(frames, ends, marginals, strict=True)]
     survivor = np.array([one[0] for one in each], dtype=np.intp)
     time = np.array([frame.time for frame in frames])
-    own = np.stack([f.joints[k] if k >= 0 else e[1] for f, k, e in zip(frames, survivor, each, strict=True)])
+    own = np.concatenate([frame.at(survivor[[k]])[0] for k, frame in enumerate(frames)])
     given, covariance = np.stack([one[1] for one in each]), np.stack([one[2] for one in each])
-    joints, _ = smooth(time, given, covariance)
+    joints = smooth(time, given, covariance)
     if covariance.any():
         joints = lay(joints, np.broadcast_to(lengths, (len(time), len(lengths))))
     else:
@@ -400,12 +396,8 @@ def _elsewhere(
     places: list[Array] = []
     away: list[NDArray[np.bool_]] = []
     for k, (frame, chosen, share) in enumerate(zip(frames, ends, marginals, strict=True)):
-        joints = np.full((len(chosen), *frame.joints.shape[1:]), np.nan)
-        joints[chosen >= 0] = frame.joints[chosen[chosen >= 0]]
-        places.append(joints)
-        away.append(
-            (chosen >= 0) & np.all([_apart(joints, path[k]) > APART_METRES for path in found], axis=0)
-        )
+        places.append(frame.at(chosen)[0])
+        away.append(np.all([_apart(places[k], path[k]) > APART_METRES for path in found], axis=0))
         most = float(share[away[k]].max(initial=0.0))
         best, at = (most, k) if most > best else (best, at)
     if at < 0:
@@ -413,7 +405,7 @@ def _elsewhere(
     share, joints = marginals[at], places[at]
     one = int(np.argmax(np.where(away[at], share, -1.0)))
     among = away[at] & (_apart(joints, joints[one]) <= APART_METRES)
-    near = (ends[at] < 0) | (_apart(joints, found[0][at]) <= APART_METRES)
+    near = _apart(joints, found[0][at]) <= APART_METRES
     odds = float(share[among].sum() / max(float(share[near].sum()), LEAST_SHARE))
     return at, among, min(odds, 1.0)
 

@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Detections, PinholeCamera, View
+from posekit.cameras import PinholeCamera, View
 from posekit.cameras.guesses import camera_from_fov
 from posekit.errors import PosekitError, refusal
+from posekit.following.detections import Detections
 from posekit.following.paths import Candidates, Trellis, candidates, expected_posture
 from posekit.geometry import Array, Record
 from posekit.recovery.conductor import recover
@@ -230,11 +231,10 @@ class Tracker:
         if self.layout:
             names, image, _ = self.layout.seen((), image)
             confidence = self.layout.seen((), confidence)[1]
-        kept = [k for k, name in enumerate(names) if name in POINTS]
         detections = Detections(
-            points=image[:, kept],
-            confidence=confidence[:, kept, 0],
-            names=tuple(names[k] for k in kept),
+            points=image,
+            confidence=confidence[..., 0],
+            names=names,
             frame=np.zeros(1, dtype=np.intp),
             time=np.array([time]),
         )

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from posekit.cameras import Detections
 from posekit.errors import refusal
+from posekit.following.detections import Detections
 from posekit.formats import joint_arrays
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.options import Options

@@ -10,9 +10,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.detections import FARTHEST_PIXEL, Detections
-from posekit.cameras.picking import FRACTIONS_UP_TO, persons
 from posekit.errors import InputError, cut, refusal
+from posekit.following.detections import FARTHEST_PIXEL, FRACTIONS_UP_TO, Detections
 from posekit.formats.layout import LIMBS, Layout, by_names, by_order, layout_names, load_layout
 from posekit.formats.options import Options
 from posekit.geometry import Array
@@ -178,7 +177,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
         derived=derived,
     )
     if film and len(np.unique(found.frame)) < len(found) <= MOST_TRACKED:
-        numbers, counts = np.unique(persons(found), return_counts=True)
+        numbers, counts = np.unique(found.people(), return_counts=True)
         listed = ", ".join(f"{who} in {n}" for who, n in zip(numbers[:MOST_LISTED], counts, strict=False))
         found = replace(found, notes=(f"people by number, and their pictures: {listed}", *notes))
     return found

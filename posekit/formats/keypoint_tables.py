@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.detections import Detections
 from posekit.errors import refusal, shown
+from posekit.following.detections import Detections
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.layout import load_layout, plain
 from posekit.formats.options import Options

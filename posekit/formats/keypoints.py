@@ -14,8 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.detections import Detections
 from posekit.files import read_bytes
+from posekit.following.detections import Detections
 from posekit.formats import json_file
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.node import Node

@@ -106,7 +106,7 @@ def recover(
         from importlib import import_module
 
         # Following is a layer above this one; it is loaded only if a path is wanted.
-        recovery = import_module("posekit.following").follow(recovery, paths=settings.follow)
+        recovery = import_module("posekit.following.paths").follow(recovery, paths=settings.follow)
     return recovery
 
 

@@ -30,6 +30,7 @@ POINT_SIGMA: Final = {
 COMPARED: Final = [k for k, name in enumerate(POINTS) if name.rpartition("_")[2] in POINT_SIGMA]
 FALLOFF: Final = np.array([2 * POINT_SIGMA[POINTS[k].rpartition("_")[2]] for k in COMPARED])
 
+#: Largest number of people in a picture: the work grows with its square.
 MAX_PEOPLE: Final = 1000
 
 #: Standard deviation of the predicted place a picture ahead, in units of the square root of the area.
@@ -63,7 +64,7 @@ VIDEO_SHARE: Final = 0.75
 VIDEO_RATE: Final = 30.0
 
 
-def track(points: Array, frame: Ints, first: int = 0, source: str = "", times: Array | None = None) -> Ints:
+def track(points: Array, frame: Ints, source: str = "", times: Array | None = None) -> Ints:
     """Assign numbers to people along the pictures of a film.
 
     Each detection is compared with the predicted places of the people of earlier pictures (the last place, moved on at
@@ -76,8 +77,6 @@ def track(points: Array, frame: Ints, first: int = 0, source: str = "", times: A
         Joints and head points, pixels; NaN if unseen.
     frame : int array (N,)
         Number of the picture, ascending.
-    first : int
-        Number of the first person.
     source : str
         File of the detections, for errors.
     times : array, optional
@@ -86,81 +85,52 @@ def track(points: Array, frame: Ints, first: int = 0, source: str = "", times: A
     Returns
     -------
     int array (N,)
-        Numbers from `first`, by appearance.
+        Numbers from 0, by appearance.
 
     Raises
     ------
     InputError
-        If a picture has more than `MAX_PEOPLE` people: the work grows with their square.
+        If a picture has more than `MAX_PEOPLE` people.
     """
+    from scipy.optimize import linear_sum_assignment
+
     busiest = int(np.bincount(frame).max(initial=0))
     if busiest > MAX_PEOPLE:
         expected, remedy = f"at most {MAX_PEOPLE:,} people in a picture", "leave out uncertain detections"
         raise refusal(source, "people", f"{busiest:,}", expected, remedy)
     points = points[:, COMPARED]
     size = areas(points)
-    person = np.full(len(points), -1, dtype=np.intp)
-    if len(np.unique(frame)) == len(frame) and _moves_far(points, size):
-        return first + np.cumsum(np.diff(frame, prepend=frame[:1]) > PATIENCE_PICTURES + 1)
+    if busiest == 1 and _moves_far(points, size):
+        return np.asarray(np.cumsum(np.diff(frame, prepend=frame[:1]) > PATIENCE_PICTURES + 1))
     moments = np.arange(int(frame.max(initial=-1)) + 1, dtype=np.float64)
     if times is not None and np.isfinite(times).all():
         moments[1:] = np.cumsum(np.maximum(VIDEO_RATE * np.diff(times[: len(moments)]), 1.0))
+    person = np.full(len(points), -1, dtype=np.intp)
     last = np.empty(0, dtype=np.intp)  # the last row of each person who may be seen again
-    velocity = np.empty((0, 2))
-    known = np.empty((0, *points.shape[1:]))  # the last place of every point, those unseen since moved along
-    count = 0
+    place, velocity = (
+        points.copy(),
+        np.full((len(points), 2), np.nan),
+    )  # points unseen are moved along with the others
     for number in np.unique(frame):
         rows = np.flatnonzero(frame == number)
-        waiting = number - frame[last] <= PATIENCE_PICTURES + 1
-        last, velocity, known = last[waiting], velocity[waiting], known[waiting]
+        last = last[number - frame[last] <= PATIENCE_PICTURES + 1]
         gap = moments[number] - moments[frame[last]]
         ahead = np.minimum(gap, TRUSTED_VELOCITY_PICTURES)
-        fresh = np.isnan(velocity[:, 0])
-        expected = known + (ahead[:, None] * np.nan_to_num(velocity))[:, None]
-        common = np.fmax(size[last][:, None], size[rows])
-        reach = np.where(fresh, FRESH_MOTION_FACTOR * ahead, ahead)
-        old, new = _matches(_similarity(expected, points[rows], common, reach))
-        step = _median(points[rows[new]] - known[old])
-        velocity[old] = step / gap[old, None]
-        known[old] = np.where(np.isnan(points[rows[new]]), known[old] + step[:, None], points[rows[new]])
-        person[rows[new]] = person[last[old]]
-        size[rows[new]] = np.where(np.isnan(size[rows[new]]), size[last[old]], size[rows[new]])
-        last[old] = rows[new]
-        started = np.setdiff1d(rows, rows[new])
-        person[started] = count + np.arange(len(started))
-        count += len(started)
-        last = np.concatenate([last, started])
-        velocity = np.concatenate([velocity, np.full((len(started), 2), np.nan)])
-        known = np.concatenate([known, points[started]])
-    return first + person
-
-
-def _median(moved: Array) -> Array:
-    """Return the median motion (N, 2) of points (N, P, 2); zero if none is known."""
-    ordered, row = np.sort(moved, axis=1), np.arange(len(moved))  # NaN sorts last
-    count = np.maximum((~np.isnan(moved[..., 0])).sum(axis=1), 1)
-    return np.asarray(np.nan_to_num((ordered[row, (count - 1) // 2] + ordered[row, count // 2]) / 2))
-
-
-def _matches(alike: Array) -> tuple[Ints, Ints]:
-    """Return pairs (old, new) with the largest sum of similarities, none below `MIN_SIMILARITY`."""
-    from scipy.optimize import linear_sum_assignment
-
-    alike = np.where(alike < MIN_SIMILARITY, 0.0, alike)
-    old, new = linear_sum_assignment(alike, maximize=True)
-    kept = alike[old, new] > 0
-    return old[kept], new[kept]
-
-
-def _similarity(expected: Array, seen: Array, sizes: Array, reach: Array) -> Array:
-    """Compare expected people (T, P, 2) with seen ones (N, P, 2): similarities (T, N)."""
-    squared = ((expected[:, None] - seen[None]) ** 2).sum(axis=-1)
-    both = ~np.isnan(squared)
-    falloff = FALLOFF**2 + (MOTION_SIGMA * reach[:, None, None]) ** 2
-    spread = np.nan_to_num(sizes, nan=1.0)[..., None] * falloff
-    alike = np.where(both, np.exp(-np.where(both, squared, 0.0) / (2 * spread)), 0.0)
-    count = both.sum(axis=-1)
-    return np.where(count > 0, alike.sum(axis=-1) / np.maximum(count, 1), UNSEEN_SIMILARITY)
+        reach = np.where(np.isnan(velocity[last, 0]), FRESH_MOTION_FACTOR * ahead, ahead)
+        expected = place[last] + (ahead[:, None] * np.nan_to_num(velocity[last]))[:, None]
+        alike = _similarity(expected, points[rows], np.fmax(size[last][:, None], size[rows]), reach)
+        old, new = linear_sum_assignment(np.where(alike < MIN_SIMILARITY, 0.0, alike), maximize=True)
+        same = alike[old, new] >= MIN_SIMILARITY
+        old, before, now = old[same], last[old[same]], rows[new[same]]
+        step = _median(points[now] - place[before])
+        velocity[now] = step / gap[old, None]
+        place[now] = np.where(np.isnan(points[now]), place[before] + step[:, None], points[now])
+        size[now] = np.where(np.isnan(size[now]), size[before], size[now])
+        person[now] = person[before]
+        started = np.setdiff1d(rows, now)
+        person[started] = person.max() + 1 + np.arange(len(started))
+        last = np.concatenate([np.delete(last, old), rows])
+    return person
 
 
 def areas(points: Array) -> Array:
@@ -173,11 +143,24 @@ def areas(points: Array) -> Array:
     return np.where(found > 0, found, np.nan)
 
 
+def _median(values: Array) -> Array:
+    """Return the median (N, ...) of the known values (N, P, ...) of each row; zero if none is known."""
+    return np.asarray(
+        np.nanmedian(np.where(np.isnan(values).all(axis=1, keepdims=True), 0.0, values), axis=1)
+    )
+
+
+def _similarity(expected: Array, seen: Array, sizes: Array, reach: Array) -> Array:
+    """Compare expected people (T, P, 2) with seen ones (N, P, 2): similarities (T, N)."""
+    squared = ((expected[:, None] - seen[None]) ** 2).sum(axis=-1)
+    falloff = FALLOFF**2 + (MOTION_SIGMA * reach[:, None, None]) ** 2
+    alike = np.exp(-squared / (2 * np.nan_to_num(sizes, nan=1.0)[..., None] * falloff))
+    count = (~np.isnan(squared)).sum(axis=-1)
+    return np.where(count > 0, np.nansum(alike, axis=-1) / np.maximum(count, 1), UNSEEN_SIMILARITY)
+
+
 def _moves_far(points: Array, size: Array) -> bool:
     """Tell whether a person, seen at points (F, P, 2), moves farther from picture to picture than in a video."""
-    if len(points) == 1:
-        return True
-    moved = np.linalg.norm(np.diff(points, axis=0), axis=2)
-    moved[np.isnan(moved).all(axis=1)] = 0.0
-    far = np.nanmedian(moved, axis=1) / np.sqrt(np.fmax(np.fmax(size[1:], size[:-1]), 1.0))
-    return float(np.nanquantile(far, VIDEO_SHARE)) > MOTION_SIGMA
+    moved = _median(np.linalg.norm(np.diff(points, axis=0), axis=2))
+    far = moved / np.sqrt(np.fmax(np.fmax(size[1:], size[:-1]), 1.0))
+    return bool(len(far)) and float(np.quantile(far, VIDEO_SHARE)) > MOTION_SIGMA
