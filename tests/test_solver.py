@@ -19,7 +19,8 @@ from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS
 from posekit.solver import Limits, Problem, backend, engine, reference, solve
 from posekit.solver.limits import ENDS, MIDDLES, STARTS
 from posekit.solver.modes import KNOWN
-from posekit.solver.starts import DEPTHS, Rays, limb_starts, trunk_starts
+from posekit.solver.problem import EXACT_ROOT_METRES
+from posekit.solver.starts import DEPTHS, limb_starts, trunk_starts
 from posekit.tree import grow
 from posekit.validators.judge import POSTURE_CHECKS, PostureJudge
 
@@ -126,7 +127,7 @@ def test_gradient_is_that_of_chi2(kind):
     here = reference.evaluate(problem.records[frame], problem.limits, x, 31)
     assert np.isfinite(here.chi2).all()
     for step in 1e-6 * np.random.default_rng(4).normal(size=(8, 43)):
-        step[42] *= problem.size_deviation[0] > 0
+        step[42] *= problem.sized[0]
         up, down = (
             reference.evaluate(problem.records[frame], problem.limits, x + s * step, 31).chi2 for s in (1, -1)
         )
@@ -400,7 +401,7 @@ def test_starts_lie_on_the_rays_at_the_lengths(camera, rooted):
     """Every start projects onto the image; segments have their lengths, or end at the foot of the start on the ray."""
     image = camera.project(TRUTH)
     problem = observed(image=image, camera=camera, root=TRUTH[:, 0] if rooted else None)
-    frame, trunk = trunk_starts(problem, Rays(problem))
+    frame, trunk = trunk_starts(problem)
     count = np.bincount(frame)
     assert (np.diff(frame) >= 0).all()
     assert (count == 32 * (1 if rooted or not camera.perspective else len(DEPTHS))).all()
@@ -408,7 +409,7 @@ def test_starts_lie_on_the_rays_at_the_lengths(camera, rooted):
     for limb in (None, 0, 1, 2, 3):
         chains, own = ([(a, b) for a, b in SEGMENTS[:13] if b < 6], trunk), frame
         if limb is not None:
-            row, ends = limb_starts(problem, Rays(problem), frame, trunk, limb)
+            row, ends = limb_starts(problem, frame, trunk, limb)
             assert (np.bincount(row) == 4).all()
             a, b, c = STARTS[limb], MIDDLES[limb], ENDS[limb]
             joints = np.full((len(row), 14, 3), np.nan)
@@ -437,7 +438,7 @@ def test_starts_of_hidden_joints_have_the_lengths_all_around(hidden, count):
     image[:, hidden] = np.nan
     problem = observed(image=image)
     frame = np.arange(len(TRUTH))
-    row, ends = limb_starts(problem, Rays(problem), frame, TRUTH[:, :6], 0)
+    row, ends = limb_starts(problem, frame, TRUTH[:, :6], 0)
     assert (np.bincount(row) == count).all() and (np.diff(row) >= 0).all()
     upper, lower = (
         LENGTHS[list(SEGMENT_NAMES).index(f"right_{name}")]
@@ -467,7 +468,7 @@ def test_trunks_with_hidden_joints_start_with_the_figures_shape(hidden):
     image = IMAGE.copy()
     image[:, hidden] = np.nan
     problem = observed(image=image, root=None if 0 in hidden else TRUTH[:, 0])
-    frame, trunk = trunk_starts(problem, Rays(problem))
+    frame, trunk = trunk_starts(problem)
     assert np.isfinite(trunk).all() and set(frame) == set(range(len(TRUTH)))
     seen = [j for j in range(6) if j not in hidden]
     np.testing.assert_allclose(CAMERA.project(trunk[:, seen]), IMAGE[frame][:, seen], atol=1e-6)
@@ -481,7 +482,7 @@ def test_trunks_with_hidden_joints_start_with_the_figures_shape(hidden):
 )
 def test_residuals_are_the_deviations_of_points_lengths_and_priors(camera):
     seen = camera.project(TRUTH) + 2.0 * NOISE
-    known = {"length_deviation": 0.02, "size_deviation": 0.03, "root_covariance": 0.05**2 * np.eye(3)}
+    known = {"length_deviation": 0.02, "size_deviation": 0.03}
     problem = observed(image=seen, camera=camera, **known)
     modes = solve(problem)
     found = modes.residuals()
@@ -498,5 +499,5 @@ def test_residuals_are_the_deviations_of_points_lengths_and_priors(camera):
         deviation = abs(np.log(length / LENGTHS[k]) - modes.size) / 0.02
         np.testing.assert_allclose(found[f"length {name}"], deviation, atol=1e-9)
     np.testing.assert_allclose(found["size"], abs(modes.size) / 0.03, atol=1e-9)
-    root = np.linalg.norm(joints[:, 0] - TRUTH[frame, 0], axis=1) / 0.05
+    root = np.linalg.norm(joints[:, 0] - TRUTH[frame, 0], axis=1) / EXACT_ROOT_METRES
     np.testing.assert_allclose(found["root"], root, rtol=1e-6, atol=1e-9)

@@ -252,11 +252,10 @@ class _Conductor:
         if not len(some):
             return
         strict = problem.take(some)
-        loose = replace(
-            strict,
-            length_deviation=strict.length_deviation + LOOSE_LENGTHS,
-            whitening=strict.whitening / LOOSE_TIMES,
-        )
+        records = strict.records.copy()
+        records["length_weight"] = 1 / (1 / records["length_weight"] + LOOSE_LENGTHS)
+        records["image"] /= LOOSE_TIMES
+        loose = replace(strict, records=records)
         # The nearest posture is measured with the stated deviations.
         nearest = replace(solve(loose, max_chi2=LOOSE_CHI2, most=1), problem=strict)
         owner = sight.frame[some][nearest.frame]

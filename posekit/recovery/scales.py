@@ -58,19 +58,14 @@ def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array)
     scale_deviation : array (F,)
         Relative deviation of the scale.
     """
-    d = USUAL_DISTANCE_METRES
-    root = np.broadcast_to([0.0, 0.0, d], problem.root.shape)
-    weight = np.zeros_like(problem.root_whitening)
-    weight[:, 2, 2] = 1 / (d * scale_deviation)
-    seen = problem.seen_joints[..., None]
-    return replace(
-        problem,
-        rays=np.where(seen, (problem.rays - middle[:, None]) / d, 0.0),
-        whitening=problem.whitening * d,
-        root=root,
-        root_whitening=weight,
-        perspective=True,
-    )
+    d, out = USUAL_DISTANCE_METRES, problem.records.copy()
+    out["ray"] = np.where(problem.seen_joints[..., None], (out["ray"] - middle[:, None]) / d, 0.0)
+    out["image"] *= d
+    out["root"] = 0.0, 0.0, d
+    out["root_weight"] = 0.0
+    out["root_weight"][:, 2, 2] = 1 / (d * scale_deviation)
+    out["perspective"] = 1.0
+    return replace(problem, records=out)
 
 
 def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]:

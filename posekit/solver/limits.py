@@ -98,8 +98,7 @@ class Limits:
         Parameters
         ----------
         ranges : mapping or None
-            A parsed table ``posekit.ranges/1`` of kind ``anatomical``, or of kind ``configuration`` with ``joints`` of
-            ``dof = [lower, upper]`` degrees; None for the figure's own limits.
+            A parsed table ``posekit.ranges/1`` of kind ``anatomical``; None for the figure's own limits.
         figure_limits : array (22, 2)
             Limits of the figure's degrees of freedom in the order of `posekit.skeleton.DOFS`, degrees.
         above_hips : float
@@ -114,27 +113,20 @@ class Limits:
         """
         n = np.zeros((), dtype=LIMITS)
         table = np.array(figure_limits, dtype=np.float64)
-        spreads, zeros = 0.0, {}
-        own = dict(ranges.get("joints", ranges)) if ranges else {}
-        anatomical = bool(ranges) and ranges.get("kind") == "anatomical"  # type: ignore[union-attr]
-        means = table.copy()
+        means, zeros, spreads = table.copy(), {}, ranges["spreads"] if ranges else 0.0
         for k, dof in enumerate(DOFS):
             joint, angle = dof.split(".")
             sideless = joint.removeprefix("right_").removeprefix("left_")
-            if anatomical:
-                one = own.get(sideless, {}).get(angle)
-                if one is None:
-                    continue
-                spreads = float(ranges["spreads"])  # type: ignore[index]
-                zero = one.get("zero", {"mean": 0.0, "spread": 0.0})
-                lean = degrees(atan2(zero.get("pelvis", 0.0), max(above_hips, zero.get("pelvis", 0.0), 1e-9)))
-                spread = hypot(zero["spread"], lean) if zero.get("pelvis") else zero["spread"]
-                zeros[f"{sideless}.{angle}"] = (zero["mean"], spread)
-                for side, (name, sign) in enumerate((("lower", -1), ("upper", 1))):
-                    means[k, side] = one[name]["mean"] + zero["mean"]
-                    table[k, side] = means[k, side] + sign * spreads * hypot(one[name]["spread"], spread)
-            elif dof in own or f"{sideless}.{angle}" in own:
-                table[k] = means[k] = own.get(dof, own.get(f"{sideless}.{angle}"))
+            one = (ranges or {}).get(sideless, {}).get(angle)
+            if one is None:
+                continue
+            zero = one.get("zero", {"mean": 0.0, "spread": 0.0})
+            lean = degrees(atan2(zero.get("pelvis", 0.0), max(above_hips, zero.get("pelvis", 0.0), 1e-9)))
+            spread = hypot(zero["spread"], lean) if zero.get("pelvis") else zero["spread"]
+            zeros[f"{sideless}.{angle}"] = (zero["mean"], spread)
+            for side, (name, sign) in enumerate((("lower", -1), ("upper", 1))):
+                means[k, side] = one[name]["mean"] + zero["mean"]
+                table[k, side] = means[k, side] + sign * spreads * hypot(one[name]["spread"], spread)
         first = [DOFS.index(f"{limb}.flexion") for limb in LIMBS]
         n["limit"] = np.radians([table[k : k + 4] for k in first])
         n["mean"] = np.radians([means[k : k + 4] for k in first[::2]])
@@ -143,8 +135,8 @@ class Limits:
         if pelvis_between_hips:
             n["between_hips"] = 1.0
             n["hip_turn"] = np.radians(figure_limits[pelvis])
-        if anatomical:
-            _couple(n, ranges, spreads, zeros)  # type: ignore[arg-type]
+        if ranges:
+            _couple(n, ranges, zeros)
         return Limits(numbers=n)
 
     @property
@@ -268,7 +260,7 @@ class Limits:
         return over[np.arange(len(best)), best], best
 
 
-def _couple(n: NDArray[Any], ranges: Mapping[str, Any], spreads: float, zeros: dict[str, Any]) -> None:
+def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -> None:
     """Write couplings and sinuses into the numbers."""
     nothing = (0.0, 0.0)
     couplings = ranges.get("coupling", ())
@@ -283,7 +275,7 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], spreads: float, zeros: d
         target, of = (_place(kind, one[name]) for name in ("angle", "of"))
         knots = np.array(one["points"], dtype=np.float64).T
         count = knots.shape[1]
-        out = (2 * side - 1) * spreads * hypot(one["spread"], spread)
+        out = (2 * side - 1) * ranges["spreads"] * hypot(one["spread"], spread)
         n["role"][k] = kind, target, side, of, count
         n["knots"][k, :, :count] = np.radians([knots[0] + origin, knots[1] + shift, knots[1] + shift + out])
         n["couplings"] = k + 1

@@ -112,7 +112,7 @@ class Modes:
         out = dict(zip(RESIDUAL_NAMES, table.T, strict=True))
         if self.problem.limits is not None:
             beyond, _ = limit_rows(self.problem.limits, joints, 31)
-            off = np.abs(beyond) / self.problem.limit_deviation
+            off = np.abs(beyond) * p["limit_weight"][:, None]
             out |= {f"limit {name}": off[:, k] for k, name in enumerate(self.problem.limits.names)}
         return out
 

@@ -12,7 +12,7 @@ share. With :math:`\pi` the projection, the residuals are
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.cameras import Camera
-from posekit.geometry import Array, Flags, Ints
+from posekit.geometry import Array, Flags, Ints, unit
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.solver.limits import Limits
 
@@ -47,7 +47,13 @@ RESIDUAL_NAMES: Final = (
     "size",
 )
 
-#: A frame as the compiled solver reads it.
+#: A frame as the solver reads it.
+#:
+#: Image points are free of intrinsics and lens, x/z and y/z; before a scaled orthographic camera they are x and y in
+#: metres. `image` maps their errors to standard deviations. Both are zero where a joint is hidden. `root` is the neck,
+#: metres, `root_weight` the inverse square root of its covariance, zero if it is unknown. Other weights are one over
+#: standard deviations: of lengths, of the size (0 if the lengths are of the person's own size), of limits (radians).
+#: `robust` is the square of `ROBUST_DEVIATIONS`, or 0 where image points have no gross errors.
 PROBLEM: Final = np.dtype(
     [
         ("ray", "f8", (14, 2)),
@@ -64,47 +70,20 @@ PROBLEM: Final = np.dtype(
 )
 
 
-PER_FRAME: Final = "rays whitening log_lengths length_deviation size_deviation root root_whitening".split()
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
     """F frames to be solved, each alone.
 
     Parameters
     ----------
-    rays : array (F, 14, 2)
-        Image points free of intrinsics and lens: x/z and y/z; x and y in metres before a scaled orthographic camera.
-        Zero where a joint is hidden.
-    whitening : array (F, 14, 2, 2)
-        Maps an error of a ray to standard deviations of the image point; zero where a joint is hidden.
-    log_lengths, length_deviation : array (F, 17)
-        Natural logarithms of the lengths (metres) in the order of `posekit.skeleton.SEGMENTS`, and their deviations.
-    size_deviation : array (F,)
-        Standard deviation of the logarithm of the shared size; 0 if the lengths are of the person's own size.
-    root, root_whitening : array (F, 3), (F, 3, 3)
-        Known position of the neck, metres, and the inverse square root of its covariance; zero if unknown.
-    perspective : bool
-        Whether the camera has an optical centre.
+    records : records (F,) of `PROBLEM`
+        The frames, before one kind of camera.
     limits : Limits, optional
         Joint ranges that pull at postures beyond them.
-    limit_deviation : float
-        Radians.
-    robust : bool
-        Whether the image's residuals are bounded, for detectors, whose points may be gross errors.
     """
 
-    rays: Array
-    whitening: Array
-    log_lengths: Array
-    length_deviation: Array
-    size_deviation: Array
-    root: Array
-    root_whitening: Array
-    perspective: bool = True
+    records: NDArray[np.void]
     limits: Limits | None = None
-    limit_deviation: float = LIMIT_DEVIATION
-    robust: bool = False
 
     @staticmethod
     def seen(
@@ -116,7 +95,6 @@ class Problem:
         length_deviation: ArrayLike = 0.0,
         size_deviation: ArrayLike = 0.0,
         root: Array | None = None,
-        root_covariance: Array | None = None,
         limits: Limits | None = None,
         robust: bool = False,
     ) -> Problem:
@@ -136,57 +114,60 @@ class Problem:
             Relative standard deviations of each length, and of the size that all lengths share.
         root : array (F, 3), optional
             Known position of the neck, metres; NaN where it is not known.
-        root_covariance : array (3, 3) or (F, 3, 3), optional
-            Its covariance, square metres; (2 mm)^2 if not given.
-        limits, robust
-            See `Problem`.
+        limits : Limits, optional
+            Joint ranges.
+        robust : bool
+            Whether the image's residuals are bounded, for detectors, whose points may be gross errors.
         """
-        count = len(image)
         rays = camera.normalize(image)
         hidden = np.asarray(np.isnan(rays).any(axis=-1))
         rays = np.where(hidden[..., None], 0.0, rays)
-        sigma = np.broadcast_to(np.asarray(deviation, dtype=np.float64), (count, 14))
+        sigma = np.broadcast_to(np.asarray(deviation, dtype=np.float64), hidden.shape)
         whitening = camera.jacobian(rays) / sigma[..., None, None]
-        whitening = np.where((hidden | ~np.isfinite(sigma))[..., None, None], 0.0, whitening)
-        place, weight = np.zeros((count, 3)), np.zeros((count, 3, 3))
+        out = np.zeros(len(image), dtype=PROBLEM)
+        out["ray"] = rays
+        out["image"] = np.where((hidden | ~np.isfinite(sigma))[..., None, None], 0.0, whitening)
         if not camera.perspective:
-            weight[:, 2, 2] = HELD_DEPTH_WEIGHT
+            out["root_weight"][:, 2, 2] = HELD_DEPTH_WEIGHT
         if root is not None:
             known = np.asarray(np.isfinite(root).all(axis=1))
-            place[known] = root[known]
-            spread = np.eye(3) * EXACT_ROOT_METRES**2 if root_covariance is None else root_covariance
-            spread = np.broadcast_to(spread, (count, 3, 3))[known] + np.eye(3) * 1e-12
-            weight[known] = np.linalg.inv(np.linalg.cholesky(spread))
-        return Problem(
-            rays=rays,
-            whitening=whitening,
-            log_lengths=np.log(np.broadcast_to(np.asarray(lengths, dtype=np.float64), (count, 17))),
-            length_deviation=np.broadcast_to(np.asarray(length_deviation, dtype=np.float64), (count, 17)),
-            size_deviation=np.broadcast_to(np.asarray(size_deviation, dtype=np.float64), (count,)),
-            root=place,
-            root_whitening=weight,
-            perspective=camera.perspective,
-            limits=limits,
-            robust=robust,
-        )
+            out["root"][known] = root[known]
+            out["root_weight"][known] = np.eye(3) / EXACT_ROOT_METRES
+        out["log_length"] = np.log(lengths)
+        out["length_weight"] = 1 / np.maximum(length_deviation, LEAST_LENGTH_DEVIATION)
+        size = np.broadcast_to(np.asarray(size_deviation, dtype=np.float64), len(out))
+        out["size_weight"][size > 0] = 1 / size[size > 0]
+        out["limit_weight"] = 0.0 if limits is None else 1 / LIMIT_DEVIATION
+        out["perspective"], out["robust"] = camera.perspective, ROBUST_DEVIATIONS**2 * robust
+        return Problem(records=out, limits=limits)
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self.rays)
+        return len(self.records)
 
     def take(self, frames: Ints | slice) -> Problem:
         """Return some frames."""
-        return replace(self, **{name: getattr(self, name)[frames] for name in PER_FRAME})
+        return Problem(records=self.records[frames], limits=self.limits)
+
+    @property
+    def perspective(self) -> bool:
+        """Whether the camera has an optical centre."""
+        return bool((self.records["perspective"] > 0).any())
 
     @cached_property
     def seen_joints(self) -> Flags:
         """Which joints have an image point (F, 14)."""
-        return np.asarray((self.whitening != 0).any(axis=(2, 3)))
+        return np.asarray((self.records["image"] != 0).any(axis=(2, 3)))
+
+    @property
+    def sized(self) -> Flags:
+        """In which frames the size of the lengths is not known (F,)."""
+        return np.asarray(self.records["size_weight"] > 0)
 
     @property
     def rooted(self) -> Flags:
         """In which frames the position of the neck is known (F,)."""
-        return np.asarray((self.root_whitening != 0).any(axis=2).all(axis=1))
+        return np.asarray((self.records["root_weight"] != 0).any(axis=2).all(axis=1))
 
     @property
     def freedom(self) -> Ints:
@@ -196,20 +177,14 @@ class Problem:
         root against six unknowns, and the hips' points against three.
         """
         seen = self.seen_joints
-        priors = (self.root_whitening != 0).any(axis=2).sum(axis=1) - (self.size_deviation > 0)
+        priors = (self.records["root_weight"] != 0).any(axis=2).sum(axis=1) - self.sized
         torso = 2 * seen[:, :4].sum(axis=1) + priors - 6
         return np.asarray(np.maximum(torso, 0) + np.maximum(2 * seen[:, 4:6].sum(axis=1) - 3, 0))
 
     @cached_property
-    def records(self) -> NDArray[np.void]:
-        """The frames as numbers (F,) of `PROBLEM`."""
-        out = np.zeros(len(self), dtype=PROBLEM)
-        out["ray"], out["image"] = self.rays, self.whitening
-        out["root"], out["root_weight"] = self.root, self.root_whitening
-        out["log_length"] = self.log_lengths
-        out["length_weight"] = 1 / np.maximum(self.length_deviation, LEAST_LENGTH_DEVIATION)
-        some = self.size_deviation > 0
-        out["size_weight"] = np.where(some, 1 / np.where(some, self.size_deviation, 1.0), 0.0)
-        out["limit_weight"] = 0.0 if self.limits is None else 1 / self.limit_deviation
-        out["perspective"], out["robust"] = self.perspective, ROBUST_DEVIATIONS**2 * self.robust
-        return out
+    def rays(self) -> tuple[Array, Array]:
+        """Origins and unit directions (F, 14, 3) of the rays of the image points."""
+        flat, ones = self.records["ray"], np.ones((len(self), 14, 1))
+        if self.perspective:
+            return np.zeros((len(self), 14, 3)), unit(np.concatenate([flat, ones], axis=2))
+        return np.concatenate([flat, 0 * ones], axis=2), np.broadcast_to([0.0, 0.0, 1.0], (len(self), 14, 3))

@@ -11,9 +11,9 @@ from posekit.solver import reference
 from posekit.solver.engine import descend
 from posekit.solver.limits import ENDS, MIDDLES
 from posekit.solver.modes import Modes, distinct, merged
-from posekit.solver.problem import ROBUST_DEVIATIONS, Problem
+from posekit.solver.problem import Problem
 from posekit.solver.reference import Pull
-from posekit.solver.starts import Rays, limb_starts, trunk_starts
+from posekit.solver.starts import limb_starts, trunk_starts
 
 #: Probability with which noise alone exceeds the largest chi2 that passes.
 REJECTION_PROBABILITY: Final = 1e-3
@@ -88,8 +88,7 @@ def solve(
         from scipy.special import gammainccinv
 
         passing = 2 * gammainccinv(np.maximum(problem.freedom, LEAST_FREEDOM) / 2, REJECTION_PROBABILITY)
-        if problem.robust:
-            passing = passing + ROBUST_DEVIATIONS**2  # one gross error of a detector
+        passing = passing + problem.records["robust"]  # one gross error of a detector
     else:
         passing = np.full(len(problem), float(max_chi2))
     found = [
@@ -107,8 +106,7 @@ def solve(
 def _solved(whole: Problem, frames: Ints, passing: Array, pull: Pull | None) -> tuple[Ints, Array, Array]:
     """Return the modes of some frames: frames of the whole problem (M,), unknowns (M, 43), and chi2."""
     problem, passing = whole.take(frames), passing[frames]
-    rays = Rays(problem)
-    frame, x, chi2 = _bodies(problem, rays, *_trunks(problem, rays, passing), passing)
+    frame, x, chi2 = _bodies(problem, *_trunks(problem, passing), passing)
     if pull is not None:
         near = chi2 <= passing[frame]
         frame, hopeless = frame[near], HOPELESS * passing[frame[near]]
@@ -122,9 +120,9 @@ def _solved(whole: Problem, frames: Ints, passing: Array, pull: Pull | None) -> 
     return frames[modes.frame], modes.x, modes.chi2
 
 
-def _trunks(problem: Problem, rays: Rays, passing: Array) -> tuple[Ints, Array, Array]:
+def _trunks(problem: Problem, passing: Array) -> tuple[Ints, Array, Array]:
     """Return the trunks' modes: frames (T,), unknowns (T, 43), and chi2."""
-    frame, trunk = trunk_starts(problem, rays)
+    frame, trunk = trunk_starts(problem)
     x = np.zeros((len(frame), 43))
     x[:, :18] = trunk.reshape(-1, 18)
     damping = None
@@ -140,20 +138,20 @@ def _trunks(problem: Problem, rays: Rays, passing: Array) -> tuple[Ints, Array, 
 
 
 def _bodies(
-    problem: Problem, rays: Rays, frame: Ints, x: Array, chi2: Array, passing: Array
+    problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
 ) -> tuple[Ints, Array, Array]:
     """Return whole bodies at their minima: frames (B,), unknowns (B, 43), and chi2."""
-    open_ = (problem.size_deviation > 0) | ~problem.rooted
+    open_ = problem.sized | ~problem.rooted
     if open_[frame].any():
         # At the depth of a trunk alone a limb may be too short for its image, so that near and far fall together:
         # each trunk is first moved to where its best limbs want it.
-        row, body, _ = _combined(problem, rays, frame, x, chi2, most=1)
+        row, body, _ = _combined(problem, frame, x, chi2, most=1)
         row, body = row[open_[frame[row]]], body[open_[frame[row]]]
         body, value, _ = descend(problem, frame[row], body, WHOLE, hopeless=HOPELESS * passing[frame[row]])
         good = value <= 2 * HOPELESS * passing[frame[row]]
         x = x.copy()
         x[row[good]] = body[good]
-    row, body, _ = _combined(problem, rays, frame, x, chi2, most=None)
+    row, body, _ = _combined(problem, frame, x, chi2, most=None)
     frame = frame[row]
     hopeless = HOPELESS * passing[frame]
     x, chi2, damping = descend(problem, frame, body, WHOLE, most=FIRST_STEPS, hopeless=hopeless)
@@ -167,7 +165,7 @@ def _bodies(
 
 
 def _combined(
-    problem: Problem, rays: Rays, frame: Ints, x: Array, chi2: Array, most: int | None
+    problem: Problem, frame: Ints, x: Array, chi2: Array, most: int | None
 ) -> tuple[Ints, Array, Array]:
     """Put limbs on trunks in all combinations that can pass: trunks (B,), unknowns (B, 43), and predicted chi2.
 
@@ -177,7 +175,7 @@ def _combined(
     row, body, total = np.arange(len(frame)), x, chi2
     for limb in range(4):
         column = [3 * joint + k for joint in (MIDDLES[limb], ENDS[limb]) for k in range(3)]
-        on, start = limb_starts(problem, rays, frame, trunk, limb)
+        on, start = limb_starts(problem, frame, trunk, limb)
         alone = x[on].copy()
         alone[:, column] = start.reshape(-1, 6)
         alone, value, _ = descend(problem, frame[on], alone, 2 << limb, most=LIMB_STEPS)

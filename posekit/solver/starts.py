@@ -40,49 +40,32 @@ def sphere(count: int) -> Array:
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
 
 
-class Rays:
-    """Rays of the image points of F frames: origins and unit directions (F, 14, 3).
-
-    Parameters
-    ----------
-    problem : Problem
-        The frames.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        ones = np.ones((*problem.rays.shape[:2], 1))
-        if problem.perspective:
-            self.direction = unit(np.concatenate([problem.rays, ones], axis=2))
-            self.origin = np.zeros_like(self.direction)
-        else:
-            self.direction = np.broadcast_to([0.0, 0.0, 1.0], (*problem.rays.shape[:2], 3))
-            self.origin = np.concatenate([problem.rays, 0 * ones], axis=2)
-
-    def lift(self, frame: Ints, joint: int, start: Array, length: Array, far: Flags) -> Array:
-        """Return the end (N, 3) of segments on a joint's ray, near or far; the foot of the start if it is too short."""
-        o, d = self.origin[frame, joint], self.direction[frame, joint]
-        foot = o + dot(start - o, d)[:, None] * d
-        off = foot - start
-        half = np.sqrt(np.maximum(length * length - dot(off, off), 0.0))
-        return np.asarray(foot + np.where(far, half, -half)[:, None] * d)
+def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array, far: Flags | bool) -> Array:
+    """Return the end (N, 3) of segments on a joint's ray, near or far; the foot of the start if it is too short."""
+    o, d = (one[frame, joint] for one in problem.rays)
+    foot = o + dot(start - o, d)[:, None] * d
+    off = foot - start
+    half = np.sqrt(np.maximum(length * length - dot(off, off), 0.0))
+    return np.asarray(foot + np.where(far, half, -half)[:, None] * d)
 
 
-def necks(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
+def necks(problem: Problem) -> tuple[Ints, Array]:
     """Return where necks may be: frames (K,), ascending, and positions (K, 3)."""
-    rooted, deep = problem.rooted, (problem.root_whitening[:, 2, 2] > 0) & problem.seen_joints[:, 0]
+    rooted, p, (origins, directions) = problem.rooted, problem.records, problem.rays
+    deep = (p["root_weight"][:, 2, 2] > 0) & problem.seen_joints[:, 0]
     known = rooted | deep | (not problem.perspective)
     # Where only the depth is known, the neck is there on its ray.
-    root, origin, ray = (one[known] for one in (problem.root, rays.origin[:, 0], rays.direction[:, 0]))
+    root, origin, ray = (one[known] for one in (p["root"], origins[:, 0], directions[:, 0]))
     beside = origin + ((root - origin)[:, 2] / ray[:, 2])[:, None] * ray
     frames, places = [np.flatnonzero(known)], [np.where(rooted[known, None], root, beside)]
     open_ = np.flatnonzero(~known)
     if open_.size:
-        d, seen = rays.direction[open_], problem.seen_joints[open_]
+        d, seen = directions[open_], problem.seen_joints[open_]
         farthest = np.full(open_.size, np.inf)
         for k in TRUNK_SEGMENTS:
             a, b = SEGMENTS[k]
             sine = np.linalg.norm(cross(d[:, a], d[:, b]), axis=1)
-            length = np.exp(problem.log_lengths[open_, k])
+            length = np.exp(p["log_length"][open_, k])
             both = seen[:, a] & seen[:, b] & (sine > 1e-6)
             farthest = np.where(both, np.minimum(farthest, length / np.where(both, sine, 1.0)), farthest)
         farthest = np.where(np.isfinite(farthest), farthest, UNSEEN_TRUNK_METRES)
@@ -97,10 +80,10 @@ def necks(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
     return frame[order], np.concatenate(places)[order]
 
 
-def trunk_starts(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
+def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
     """Return frames (S,) and trunks (S, 6, 3): near and far of five joints from every neck."""
-    frame, neck = necks(problem, rays)
-    lengths = np.exp(problem.log_lengths)
+    frame, neck = necks(problem)
+    lengths = np.exp(problem.records["log_length"])
     signs = (np.arange(32)[:, None] >> np.arange(5)[::-1]) & 1
     own = np.repeat(frame, 32)
     far = np.tile(signs, (len(frame), 1)).astype(np.bool_)
@@ -108,7 +91,7 @@ def trunk_starts(problem: Problem, rays: Rays) -> tuple[Ints, Array]:
     trunk[:, 0] = np.repeat(neck, 32, axis=0)
     for joint in range(1, TRUNK):
         length = lengths[own, LIFTED[joint]]
-        trunk[:, joint] = rays.lift(own, joint, trunk[:, PARENTS[joint]], length, far[:, joint - 1])
+        trunk[:, joint] = lift(problem, own, joint, trunk[:, PARENTS[joint]], length, far[:, joint - 1])
     hidden = ~problem.seen_joints[:, :TRUNK]
     if not hidden.any():
         return own, trunk
@@ -162,12 +145,12 @@ def _template(lengths: Array) -> Array:
     return out
 
 
-def limb_starts(problem: Problem, rays: Rays, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
+def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
     """Return trunks (S,), ascending, and middle and end (S, 2, 3) of one limb from each of them.
 
     Parameters
     ----------
-    problem, rays
+    problem : Problem
         The frames.
     frame : int array (T,)
         Of each trunk.
@@ -177,7 +160,7 @@ def limb_starts(problem: Problem, rays: Rays, frame: Ints, trunk: Array, limb: i
         Of `posekit.solver.limits.LIMBS`.
     """
     middle, end = MIDDLES[limb], ENDS[limb]
-    lengths = np.exp(problem.log_lengths[frame])
+    lengths = np.exp(problem.records["log_length"][frame])
     upper, lower = lengths[:, LIFTED[middle]], lengths[:, LIFTED[end]]
     start = trunk[:, STARTS[limb]]
     seen = problem.seen_joints[frame][:, [middle, end]]
@@ -189,7 +172,7 @@ def limb_starts(problem: Problem, rays: Rays, frame: Ints, trunk: Array, limb: i
         s, f, u, w = start[own], frame[own], upper[own], lower[own]
 
         def lifts(joint: int, origin: Array, length: Array, f: Ints = f) -> list[Array]:
-            return [rays.lift(f, joint, origin, length, np.full(len(f), far)) for far in (False, True)]
+            return [lift(problem, f, joint, origin, length, far) for far in (False, True)]
 
         ways = sphere(DIRECTIONS)
         if of_middle and of_end:
