@@ -16,12 +16,13 @@ def main() -> None:
 
     q = random_postures(figure, 20, np.random.default_rng(0))
     joints = figure.points(q)
-    report = posekit.Validator(figure, strict=True).check(joints)
+    validator = posekit.Validator(figure, strict=True)  # as the model itself: no tolerance
+    report = validator.check(joints)
     print(f"{report.ok.sum()} of {len(joints)} postures are valid")
 
     torn = joints[:1].copy()
     torn[0, 8] += [0.0, 0.0, 0.4]  # the right wrist, metres
-    report = posekit.Validator(figure, strict=True).check(torn)
+    report = validator.check(torn)
     print(report.verdicts[0], *map(str, report.spans), sep="\n  ")
 
 

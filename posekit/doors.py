@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posekit.errors import refusal, shown
-from posekit.settings import RecoverSettings, number
+from posekit.settings import RecoverSettings, number, stated
 
 if TYPE_CHECKING:
     from posekit.body import Figure
@@ -92,19 +92,17 @@ def recover(
     """
     from posekit.recovery.conductor import recover as recover_view
 
-    given = {
-        "checks": checks,
-        "ranges": ranges,
-        "deviation": deviation,
-        "length_deviation": length_deviation,
-        "coverage": coverage,
-        "group": group,
-        "follow": follow,
-        "stature": stature,
-    }
-    asked = (settings or RecoverSettings()).changed(
-        **{name: one for name, one in given.items() if one is not None}
+    given = stated(
+        checks=checks,
+        ranges=ranges,
+        deviation=deviation,
+        length_deviation=length_deviation,
+        coverage=coverage,
+        group=group,
+        follow=follow,
+        stature=stature,
     )
+    asked = (settings or RecoverSettings()).changed(**given)
     view = view_of(source, camera=camera, person=person, layout=layout, rate=rate)
     return recover_view(view, asked, figure=figure)
 

@@ -115,7 +115,8 @@ class Settings(Record):
     checks : sequence of str or Check, optional
         Checks by name, as ``module:Name``, or as objects. The usual ones by default.
     ranges : str
-        Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML table.
+        Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML table; ``auto``: anatomical, and for
+        configurations the limits of their URDF.
     rules : sequence of int
         Rules of walking, 1 to 5, for the check ``walking``.
     walkers : {"paper", "people", "paper-printed"}
@@ -322,6 +323,7 @@ class ValidateSettings(Settings):
     ('joint-range', 'collision')
     """
 
+    ranges: str = "auto"
     noise: float | None = None
     strict: bool = False
     ground: float | None = None
@@ -338,6 +340,11 @@ class ValidateSettings(Settings):
         self._number("ground", None)
         dirs = (self.package_dirs,) if isinstance(self.package_dirs, str) else self.package_dirs
         self._set("package_dirs", tuple(map(str, dirs)))
+
+
+def stated(**given: Any) -> dict[str, Any]:
+    """Return the arguments that are not None."""
+    return {name: one for name, one in given.items() if one is not None}
 
 
 def asdict_shallow(settings: Settings) -> dict[str, Any]:

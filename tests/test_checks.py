@@ -96,7 +96,10 @@ def test_verdicts_do_not_depend_on_order_batches_or_the_frame_of_the_points(name
 )
 def test_a_looser_tolerance_never_rejects_more(field: str, values: tuple[float, ...]) -> None:
     joints = postures(200) + np.random.default_rng(2).normal(0, 0.02, (200, 14, 3))
-    rejected = [posekit.Validator(**{field: value}).check(joints).invalid for value in values]
+    rejected = [
+        posekit.Validator(settings=posekit.ValidateSettings(**{field: value})).check(joints).invalid
+        for value in values
+    ]
     for tighter, looser in pairwise(rejected):
         assert not (looser & ~tighter).any()
     assert rejected[0].sum() > rejected[-1].sum()
@@ -186,7 +189,9 @@ def test_configurations_are_judged_by_the_limits_of_their_urdf() -> None:
 
 
 def test_table1_of_the_paper_bounds_its_own_angles() -> None:
-    validator = posekit.Validator(ranges="table1", strict=True, checks=["joint-range"])
+    validator = posekit.Validator(
+        settings=posekit.ValidateSettings(ranges="table1", strict=True, checks=["joint-range"])
+    )
     assert validator.check(bent("right_shoulder.flexion", 170.0)).ok[0]
     assert validator.check(bent("right_knee.flexion", 131.0)).table()["place"].tolist() == [
         "right_knee.flexion"
@@ -222,7 +227,9 @@ def test_rules_of_walking(rule: int, flexions: tuple[float, ...]) -> None:
             q[FIGURE.angle_index[DOFS.index(f"{part}.flexion")]] = math.radians(angle)
         return FIGURE.points(q[None])
 
-    validator = posekit.Validator(checks=["walking"], rules=(rule,), strict=True)
+    validator = posekit.Validator(
+        settings=posekit.ValidateSettings(checks=["walking"], rules=(rule,), strict=True)
+    )
     assert validator.check(posture(flexions)).invalid[0]
     in_turn = (40.0, -40.0, -40.0, 40.0)
     assert not validator.check(posture(in_turn)).invalid[0]
@@ -354,7 +361,7 @@ def test_every_check_has_a_message_and_one_spelling() -> None:
 
 
 def test_joint_angles_alone_have_their_root_at_neutral_and_a_zero_quaternion_is_unknown() -> None:
-    validator = posekit.Validator("g1", bodies="capsules")
+    validator = posekit.Validator("g1", posekit.ValidateSettings(bodies="capsules"))
     q = np.tile(validator.robot.neutral, (3, 1))
     assert validator.check(q[:, 7:]).ok.all()
     q[1, 3:7] = 0.0

@@ -217,7 +217,7 @@ def test_speeds_of_robots_are_shares_of_the_limits_of_their_urdf(share: float, f
     q = np.tile(robot.neutral, (11, 1))
     q[:, at] = step * (np.arange(11) - 5)
     walk = Motion(q=q, robot="g1", q_names=robot.configuration_names, time=np.arange(11) / 200.0, up="+z")
-    rows = rows_of(posekit.validate(walk, bodies="capsules"), "joint-velocity")
+    rows = rows_of(posekit.validate(walk, posekit.ValidateSettings(bodies="capsules")), "joint-velocity")
     assert rows.frame.tolist() == (span(1, 10) if found else [])
     assert set(rows.place) <= {name} and rows.value.to_numpy() == pytest.approx(share)
 

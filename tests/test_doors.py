@@ -77,6 +77,19 @@ def test_every_door_takes_an_array_in_the_order_of_a_layout(folder: Path, tmp_pa
     assert posekit.open(joints[..., :2], "posekit_14").points.shape == (5, 14, 2)
 
 
+def test_configurations_are_judged_by_their_urdf_and_by_ranges_where_they_are_asked_for() -> None:
+    model = posekit.load_figure().model
+    rng = np.random.default_rng(0)
+    q = np.tile(posekit.load_figure().neutral, (50, 1))
+    q[:, 7:] = rng.uniform(model.lowerPositionLimit[7:], model.upperPositionLimit[7:], (50, model.nq - 7))
+    by_urdf = posekit.Validator(checks=["joint-range"]).check(q)
+    settings = ValidateSettings(ranges="anatomical", checks=["joint-range"])
+    asked = posekit.Validator(settings=settings).check(q)
+    assert by_urdf.ok.all() and not asked.ok.all()
+    again = posekit.Validator(ranges="anatomical", checks=["joint-range"]).check(q)
+    assert np.array_equal(asked.ok, again.ok)
+
+
 @pytest.mark.parametrize("name", ["jump.bvh", "walk.npz"])
 def test_validate_gives_the_same_verdicts_for_a_path_an_object_and_an_array(folder: Path, name: str) -> None:
     motion = posekit.open(folder / name)

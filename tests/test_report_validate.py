@@ -61,7 +61,9 @@ def test_severity_tells_a_slight_overlap_from_a_deep_one() -> None:
         joints = STANDING.copy()
         direction = joints[11] - joints[10]
         joints[[11, 13]] -= direction / np.linalg.norm(direction) * (np.linalg.norm(direction) - gap)
-        return posekit.Validator(checks=["collision"], strict=True).check(joints)
+        return posekit.Validator(settings=posekit.ValidateSettings(checks=["collision"], strict=True)).check(
+            joints
+        )
 
     radius = sum(one.radius for one in FIGURE.capsules if one.link.endswith("shank"))
     slight, deep = report_of(radius - 0.0005), report_of(radius - 0.03)

@@ -15,7 +15,7 @@ from posekit.body import Figure, load_figure, with_head
 from posekit.errors import InputError, PosekitError, refusal, shown
 from posekit.geometry import Array
 from posekit.motion.motion import Motion
-from posekit.settings import Settings, Tolerance, ValidateSettings
+from posekit.settings import Settings, Tolerance, ValidateSettings, stated
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree.steps import Step
 from posekit.validators.body import Body
@@ -328,9 +328,8 @@ class Validator:
         `posekit.robots.Robot`.
     settings : ValidateSettings, optional
         What decides the verdicts.
-    **changes
-        Single fields of the settings, as ``contact_margin=0.01``. If ``ranges`` is given, configurations of the figure
-        are judged by these ranges; otherwise by the limits of its URDF.
+    checks, ranges, profile, ground, strict : optional
+        As the fields of `ValidateSettings`, on top of the settings.
 
     Examples
     --------
@@ -343,10 +342,18 @@ class Validator:
     """
 
     def __init__(
-        self, urdf: Any = "figure", settings: ValidateSettings | None = None, **changes: Any
+        self,
+        urdf: Any = "figure",
+        settings: ValidateSettings | None = None,
+        *,
+        checks: Any = None,
+        ranges: str | None = None,
+        profile: str | None = None,
+        ground: str | float | None = None,
+        strict: bool | None = None,
     ) -> None:
+        changes = stated(checks=checks, ranges=ranges, profile=profile, ground=ground, strict=strict)
         self.settings = (settings or ValidateSettings()).changed(**changes)
-        self._by_ranges = "ranges" in changes and changes["ranges"] != "urdf"
         self.figure: Figure | None = None
         self.robot: Robot | None = None
         if isinstance(urdf, Figure):
@@ -403,7 +410,7 @@ class Validator:
         motion = given if isinstance(given, Motion) else self.motion(given, head)
         robot, figure = self.robot, self.figure
         if figure is not None and motion.joints is None and motion.q is not None:
-            if not self._by_ranges:  # by the limits of the URDF
+            if self.settings.ranges in ("auto", "urdf"):
                 robot = figure
             else:
                 motion = replace(motion, joints=figure.points(motion.q), joint_names=JOINTS)
@@ -473,14 +480,21 @@ def _loaded(name: str, settings: ValidateSettings) -> tuple[Figure | None, Robot
     return None, found
 
 
-def assert_valid(given: Any, urdf: Any = "figure", **changes: Any) -> None:
+def assert_valid(
+    given: Any,
+    urdf: Any = "figure",
+    settings: ValidateSettings | None = None,
+    *,
+    checks: Any = None,
+    ranges: str | None = None,
+) -> None:
     """Raise unless every posture is valid.
 
     Parameters
     ----------
     given : array, Motion or path
         As `Validator.check` takes it, or a file.
-    urdf, **changes
+    urdf, settings, checks, ranges
         As `Validator` takes them.
 
     Raises
@@ -496,9 +510,9 @@ def assert_valid(given: Any, urdf: Any = "figure", **changes: Any) -> None:
     if isinstance(given, str | Path):
         import posekit
 
-        report = posekit.validate(given, urdf=urdf, **changes)
+        report = posekit.validate(given, settings, urdf=urdf, checks=checks, ranges=ranges)
     else:
-        report = Validator(urdf, **changes).check(given)
+        report = Validator(urdf, settings, checks=checks, ranges=ranges).check(given)
     bad = int((~report.ok).sum())
     if bad or report.refused:
         reasons = "; ".join(str(span) for span in report.spans[:3]) or "joints are missing"

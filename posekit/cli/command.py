@@ -13,7 +13,7 @@ from typing import Any, Final
 import click
 
 from posekit.errors import InputError, one_line, refusal, shown
-from posekit.settings import Settings
+from posekit.settings import Settings, stated
 
 #: Parameters that name what a command writes.
 OUTPUTS: Final = frozenset({"output", "keep", "repair"})
@@ -261,7 +261,7 @@ def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
             raise refusal("", "--set", shown(pair), "FIELD=VALUE", "write it as --set coverage=1")
         record = record.changed(**{name.strip().replace("-", "_"): _value(text.strip())})
     try:
-        return record.changed(**{name: value for name, value in options.items() if value is not None})
+        return record.changed(**stated(**options))
     except InputError as error:
         name, colon, rest = str(error).partition(": ")
         if name not in names:

@@ -18,7 +18,7 @@ from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.errors import InputError, refusal, shown
 from posekit.motion.motion import Motion
 from posekit.progress import watched
-from posekit.settings import EXACT, Tolerance, ValidateSettings, number
+from posekit.settings import EXACT, Tolerance, ValidateSettings, number, stated
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.judge import Validator, validate_motion
 from posekit.validators.report import GROUND_NOTE, ClipDecision, Report, clip_rows, joined, plural
@@ -64,7 +64,10 @@ def validate(
     person: int | None = None,
     keep: str | Path | None = None,
     keep_spans: float | None = None,
-    **changes: Any,
+    checks: Any = None,
+    ranges: str | None = None,
+    profile: str | None = None,
+    ground: str | float | None = None,
 ) -> Report:
     """Judge whatever holds postures: files, folders and patterns, arrays, motions, results.
 
@@ -85,8 +88,8 @@ def validate(
         New folder for the clips that pass: see `keep_clips`.
     keep_spans : float, optional
         Least duration of the longest valid span, seconds, that is kept of other clips.
-    **changes
-        Single fields of the settings.
+    checks, ranges, profile, ground : optional
+        As the fields of `ValidateSettings`, on top of the settings.
 
     Returns
     -------
@@ -104,8 +107,8 @@ def validate(
     >>> posekit.validate(standing, rate=30, up="+z").decision
     'keep 1 of 1 clip'
     """
-    judge = Judge(settings, urdf, changes)
-    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person}
+    judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
+    facts = stated(layout=layout, unit=unit, up=up, rate=rate, person=person)
     if rate is not None and not 0 < rate < np.inf:
         raise refusal("", "rate", shown(rate), "frames a second, above 0", "correct it")
     if not are_paths(given):
@@ -301,7 +304,7 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
         try:
             held: Any = posekit.open(
                 path,
-                **{name: value for name, value in facts.items() if value is not None},
+                **facts,
                 urdf=judge.name,
             )
             if _holds_postures(held):

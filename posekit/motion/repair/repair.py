@@ -24,7 +24,7 @@ from posekit.motion.repair.own_file import in_own_file
 from posekit.motion.repair.remedies import mended
 from posekit.motion.validation import Judge, are_paths, files_of, in_order, names_below, new_folder
 from posekit.progress import watched
-from posekit.settings import ValidateSettings
+from posekit.settings import ValidateSettings, stated
 from posekit.skeleton import JOINTS
 from posekit.validators.report import Report, joined, plural
 
@@ -109,7 +109,10 @@ def repair(
     up: str | None = None,
     rate: float | None = None,
     person: int | None = None,
-    **changes: Any,
+    checks: Any = None,
+    ranges: str | None = None,
+    profile: str | None = None,
+    ground: str | float | None = None,
 ) -> Repaired:
     """Find a motion near the given one that passes all checks.
 
@@ -129,7 +132,7 @@ def repair(
     target : path, optional
         File to write; for a folder or several files a new folder of files of the same names, in which valid files are
         copied unchanged.
-    urdf, settings, layout, unit, up, rate, person, **changes
+    urdf, settings, layout, unit, up, rate, person, checks, ranges, profile, ground
         As in `posekit.validate`.
 
     Returns
@@ -151,9 +154,8 @@ def repair(
     >>> bool(posekit.repair(standing).report.ok.all())
     True
     """
-    judge = Judge(settings, urdf, changes)
-    facts = {"layout": layout, "unit": unit, "up": up, "rate": rate, "person": person, "urdf": judge.name}
-    facts = {name: one for name, one in facts.items() if one is not None}
+    judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
+    facts = stated(layout=layout, unit=unit, up=up, rate=rate, person=person, urdf=judge.name)
     if are_paths(source):
         files = list(files_of(source))
         if len(files) > 1 or not Path(files[0]).samefile(str(source)):
