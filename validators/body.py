@@ -6,30 +6,39 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
+from posekit.body.lengths import lengths_in_frames
+from posekit.body.measured import Person, figure_of, person_of
 from posekit.geometry import Array, Record
 from posekit.motion.motion import Motion
 from posekit.settings import EXACT, MEASURED, Tolerance, ValidateSettings
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINT, JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
-from posekit.validators.measured import (
-    ALLOWED_DEVIATIONS,
-    MADE_UP_METRES,
-    Person,
-    figure_of,
-    girdle_gives,
-    person_of,
-    segment_lengths,
-    spine_gives,
-)
 
 if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.robots import Robot
 
 Found = TypeVar("Found")
+
+#: Standard deviations of measuring noise that are allowed for: one point in 370 is beyond.
+ALLOWED_DEVIATIONS: Final = 3.0
+
+#: Overlap that is allowed between capsules scaled to a person, metres: their radii are the built-in figure's, and flesh
+#: gives.
+MADE_UP_METRES: Final = 0.01
+
+#: Bending of the spine to the side (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
+SIDE_BENDING_DEGREES: Final = 38.2
+
+#: Length of a clavicle, as a share of the distance from the neck's middle line to the shoulder.
+CLAVICLE_SHARE: Final = 0.8
+
+#: Rotation of a clavicle about its inner end, forward or upward with the shoulder (Inman, Saunders & Abbott 1944, J
+#: Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
+CLAVICLE_DEGREES: Final = 30.0
 
 #: Length by which the direction of the head is measured, neck to nose, metres.
 NECK_TO_HEAD_METRES = 0.2
@@ -181,7 +190,7 @@ class Body(Record):
     @cached_property
     def segment_lengths(self) -> Array:
         """Length of each of `posekit.skeleton.SEGMENTS` in each frame (17, T), metres."""
-        return segment_lengths(self.joints)
+        return lengths_in_frames(self.joints)
 
     @property
     def measured(self) -> bool:
@@ -283,6 +292,30 @@ class Body(Record):
             "rigid_tolerance": f"{min(bones):.2g} to {max(bones):.2g} cm",
             "contact_margin": f"{100 * self.contact_margin:.3g} cm",
         }
+
+
+def spine_gives(lengths: Mapping[str, float]) -> float:
+    r"""Return by how much bending to the side brings a shoulder nearer to the pelvis, metres.
+
+    A spine of length h bent evenly by an angle :math:`\varphi` has a chord :math:`c = h \sin(\varphi/2) / (\varphi/2)`
+    that leans by half the angle; a shoulder at w beside the neck is then at
+    :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}` from the pelvis.
+    """
+    half = math.radians(SIDE_BENDING_DEGREES) / 2
+    h, w = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
+    c = h * math.sin(half) / half
+    return math.hypot(h, w) - math.sqrt(c * c + w * w - 2 * c * w * math.sin(half))
+
+
+def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
+    r"""Return how much the shoulder girdle changes two distances, metres: shoulder to shoulder, and shoulder to pelvis.
+
+    A clavicle of length c turns by up to :math:`\varphi` about its inner end, forward or upward. The shoulders then
+    come nearer to each other by :math:`2 c (1 - \cos\varphi)`, and one rises by :math:`c \sin\varphi`.
+    """
+    clavicle = CLAVICLE_SHARE * lengths["right_shoulder-left_shoulder"] / 2
+    turn = math.radians(CLAVICLE_DEGREES)
+    return 2 * clavicle * (1 - math.cos(turn)), clavicle * math.sin(turn)
 
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:

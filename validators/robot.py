@@ -10,9 +10,8 @@ import numpy as np
 from posekit.geometry import Array, cross, unit
 from posekit.settings import EXACT, MEASURED
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
-from posekit.validators.body import Body
+from posekit.validators.body import MADE_UP_METRES, Body
 from posekit.validators.check import Judgement, NotAskedError, check
-from posekit.validators.measured import MADE_UP_METRES
 from posekit.validators.ranges import load_ranges
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.body import Figure, load_figure, segment_lengths, with_head
+from posekit.body import Figure, load_figure, scaled_to, with_head
 from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import InputError, refusal
 from posekit.geometry import Array, cross
 from posekit.recovery import Recovery
-from posekit.skeleton import POINTS, SEGMENT_NAMES, TREE_SEGMENTS
+from posekit.skeleton import POINTS, TREE_SEGMENTS
 from posekit.validators import Report
 from posekit.viewer.files import Pixels, av_library, pillow
 from posekit.viewer.subjects import COLOURS, frame_rows, frame_with_postures, side
@@ -111,9 +111,8 @@ def _of_joints(source: Any, view: View) -> tuple[Figure, list[list[Posture]]]:
     camera, joints = view.camera, source.truth if isinstance(source, View) else source.figure_joints
     if not isinstance(source, View) and isinstance(camera, PinholeCamera) and camera.R is not None:
         joints = joints @ camera.R.T + (0.0 if camera.t is None else camera.t)
-    known = {name: one for name, one in segment_lengths(joints).items() if name in SEGMENT_NAMES and one > 0}
     whole = with_head(np.asarray(joints))
-    return load_figure().scaled(known), [[(one, np.nan)] if np.isfinite(one).any() else [] for one in whole]
+    return scaled_to(joints), [[(one, np.nan)] if np.isfinite(one).any() else [] for one in whole]
 
 
 def _painted(image: Any, postures: list[Posture], figure: Figure, view: View, row: int) -> Any:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import load_figure, segment_lengths, shoulders_are_behind
+from posekit.body import load_figure, scaled_to
 from posekit.cameras import PinholeCamera, View
 from posekit.errors import refusal, shown
 from posekit.geometry import (
@@ -25,7 +25,7 @@ from posekit.geometry import (
 from posekit.motion import Motion
 from posekit.recovery import Recovery
 from posekit.robots import Robot, load_robot
-from posekit.skeleton import JOINT, SEGMENT_NAMES
+from posekit.skeleton import JOINT
 
 #: Colours (red, green, blue) of right limbs, left limbs and the trunk, 0 to 255.
 COLOURS: Final = {"right": (230, 115, 26), "left": (38, 102, 204), "middle": (140, 148, 158)}
@@ -189,9 +189,7 @@ def configured(motion: Motion, urdf: str = "") -> tuple[Robot, Array]:
     if motion.joints is None or not np.isfinite(joints).all(axis=(1, 2)).any():
         remedy = "give --urdf for a robot"
         raise refusal(motion.source or "render", "", "no complete posture", "at least one", remedy)
-    lengths = segment_lengths(joints)
-    known = {name: metres for name, metres in lengths.items() if name in SEGMENT_NAMES and metres > 0}
-    figure = load_figure().scaled(known, behind=shoulders_are_behind(joints))
+    figure = scaled_to(joints)
     return figure, figure.configurations(joints, motion.head).q
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
 from posekit.errors import FigureError, nearest, refusal, shown
-from posekit.geometry import Array, cross
+from posekit.geometry import Array, cross, known_median
 from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES, segment_name
 
 #: Metres by segment name.
@@ -90,18 +90,23 @@ def check_lengths(lengths: Lengths) -> None:
             raise refusal("figure", f"lengths.{name}", f"{length:g}", expected, error=FigureError)
 
 
+def lengths_in_frames(joints: Array) -> Array:
+    """Return the lengths (17, N) of the segments of postures (N, 14, 3) or (N, 19, 3), metres."""
+    by_joint = np.ascontiguousarray(np.moveaxis(joints, 0, -1))
+    found = np.empty((len(SEGMENTS), len(joints)))
+    for k, (start, end) in enumerate(SEGMENTS):
+        x, y, z = by_joint[end] - by_joint[start]
+        np.sqrt(x * x + y * y + z * z, out=found[k])
+    return found
+
+
 def segment_lengths(joints: Array) -> dict[str, float]:
     """Return the median length of each of the 17 segments over postures (N, 14, 3) or (N, 19, 3), metres.
 
-    Segments that are never seen whole are left out.
+    Segments that are never seen whole, or have no length, are left out.
     """
-    lengths = {}
-    for name, (a, b) in zip(SEGMENT_NAMES, SEGMENTS, strict=True):
-        distance = np.linalg.norm(joints[:, a] - joints[:, b], axis=-1)
-        known = np.sort(distance[np.isfinite(distance)])
-        if known.size:  # NumPy's median would load numpy.ma
-            lengths[name] = float(known[(known.size - 1) // 2] + known[known.size // 2]) / 2
-    return lengths
+    medians = zip(SEGMENT_NAMES, map(known_median, lengths_in_frames(joints)), strict=True)
+    return {name: length for name, length in medians if length > 0}
 
 
 def shoulders_are_behind(joints: Array) -> bool | None:

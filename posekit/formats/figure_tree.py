@@ -97,15 +97,14 @@ def figure_of(motion: Motion) -> tuple[Figure, Array]:
     InputError
         If a frame has no torso: then nothing hangs together.
     """
-    from posekit.body import load_figure
-    from posekit.body.lengths import segment_lengths, shoulders_are_behind
+    from posekit.body import load_figure, scaled_to, segment_lengths
 
     figure = load_figure()
     if motion.joints is not None:
         joints = motion.figure_joints
         lengths = segment_lengths(joints)
         if any(abs(lengths.get(name, own) - own) > 1e-6 for name, own in figure.lengths.items()):
-            figure = figure.scaled(lengths, behind=shoulders_are_behind(joints))
+            figure = scaled_to(joints)
     own = motion.robot in ("figure", "stick_figure")
     if own and motion.q is not None and motion.q.shape[1] == figure.model.nq:
         q = np.array(motion.q)

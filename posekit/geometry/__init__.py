@@ -15,6 +15,7 @@ from posekit.geometry.rigid import Alignment as Alignment
 from posekit.geometry.rigid import align as align
 from posekit.geometry.rigid import best_rotation as best_rotation
 from posekit.geometry.rigid import fit_rotation as fit_rotation
+from posekit.geometry.rigid import known_median as known_median
 from posekit.geometry.rigid import mean_known as mean_known
 from posekit.geometry.rigid import mpjpe as mpjpe
 from posekit.geometry.rigid import pa_mpjpe as pa_mpjpe
@@ -38,6 +39,8 @@ from posekit.geometry.vectors import Flags as Flags
 from posekit.geometry.vectors import Ints as Ints
 from posekit.geometry.vectors import cross as cross
 from posekit.geometry.vectors import dot as dot
+from posekit.geometry.vectors import groups as groups
+from posekit.geometry.vectors import norm as norm
 from posekit.geometry.vectors import perpendicular as perpendicular
 from posekit.geometry.vectors import runs as runs
 from posekit.geometry.vectors import unit as unit

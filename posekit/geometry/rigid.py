@@ -174,3 +174,10 @@ def mean_known(values: Array) -> Array:
     count = known.sum(axis=-1)
     total = np.where(known, values, 0.0).sum(axis=-1)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def known_median(values: Array) -> float:
+    """Return the median of the known numbers of an array; NaN if there are none."""
+    known = np.sort(values[np.isfinite(values)])
+    # NumPy's median would load numpy.ma.
+    return float(known[(len(known) - 1) // 2] + known[len(known) // 2]) / 2 if len(known) else np.nan

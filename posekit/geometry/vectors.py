@@ -34,6 +34,15 @@ def perpendicular(vectors: Array, axes: Array) -> Array:
     return np.asarray(vectors - dot(vectors, axes)[..., None] * axes)
 
 
+def norm(vectors: Array) -> Array:
+    """Return the lengths of vectors (..., 3)."""
+    # Sums by component take 3/5 of the time of a sum over the last axis.
+    squared = vectors[..., 0] * vectors[..., 0]
+    squared += vectors[..., 1] * vectors[..., 1]
+    squared += vectors[..., 2] * vectors[..., 2]
+    return np.asarray(np.sqrt(squared))
+
+
 def runs(which: Flags) -> list[tuple[int, int]]:
     """List the runs of consecutive True in an array (N,) as pairs (start, stop) of slices.
 
@@ -45,3 +54,8 @@ def runs(which: Flags) -> list[tuple[int, int]]:
     """
     edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
     return [(start, stop) for start, stop in edges.reshape(-1, 2).tolist()]
+
+
+def groups(at: Ints, apart: int) -> list[Ints]:
+    """Split ascending frames (N,) where two are more than so many frames apart."""
+    return np.split(at, np.flatnonzero(np.diff(at) > apart) + 1) if len(at) else []

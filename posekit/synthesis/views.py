@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.body import Figure, load_figure, segment_lengths, shoulders_are_behind
+from posekit.body import Figure, load_figure, scaled_to
 from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCamera, View
 from posekit.cameras.head import TABLE_A2
 from posekit.errors import nearest, refusal, shown
@@ -417,14 +417,6 @@ def mocap_views(
             clip = int(np.asarray(motion.clip)[rows[0]])
             views.append(replace(view, source=(*motion.clips, motion.source)[min(clip, len(motion.clips))]))
     return tuple(views)
-
-
-def scaled_to(points: Array) -> Figure:
-    """Scale the built-in figure to the median segment lengths of postures (N, 19, 3); unseen segments keep theirs.
-
-    Lengths do not distinguish a torso from its mirror image, so the side of the shoulders is taken from the points.
-    """
-    return load_figure().scaled(segment_lengths(points), behind=shoulders_are_behind(points))
 
 
 def _clip_index(motion: Motion, name: str) -> int:

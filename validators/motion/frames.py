@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, dot, runs
+from posekit.geometry import Array, dot, groups, known_median, norm, runs
 from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, segment_name
 from posekit.validators.body import Body, once
 from posekit.validators.check import Judgement, NotAskedError, check
@@ -27,14 +27,7 @@ from posekit.validators.motion.sides import (
     exchanged_pairs,
     put_right,
 )
-from posekit.validators.motion.timeline import (
-    Timeline,
-    groups,
-    known_median,
-    median_of_five,
-    norm,
-    timeline_of,
-)
+from posekit.validators.motion.timeline import Timeline, median_of_five, timeline_of
 from posekit.validators.motion.trembling import trembling_frames, trembling_of, usual_trembling
 
 #: Part of a step by which a time stamp is early that belongs to the frame before: a quarter of one is its own slot.

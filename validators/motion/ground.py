@@ -22,11 +22,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, mean_known, runs
+from posekit.geometry import Array, known_median, mean_known, norm, runs
 from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
 from posekit.validators.body import Body, once
-from posekit.validators.motion.timeline import known_median, norm, timeline_of
+from posekit.validators.motion.timeline import timeline_of
 
 #: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
 TOE_METRES: Final = 0.02

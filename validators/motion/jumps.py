@@ -15,8 +15,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.validators.motion.timeline import centred, filtered, norm
+from posekit.geometry import Array, norm
+from posekit.validators.motion.timeline import centred, filtered
 
 #: Jump from which a frame is not judged as motion, metres.
 LEAST_JUMP: Final = 0.06

@@ -14,13 +14,13 @@ from typing import Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from posekit.geometry import Array, mean_known, perpendicular, runs
+from posekit.geometry import Array, mean_known, norm, perpendicular, runs
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import ground_of, soles, up_of
 from posekit.validators.motion.standing import beyond_support
-from posekit.validators.motion.timeline import norm, timeline_of
+from posekit.validators.motion.timeline import timeline_of
 
 #: Parts of a clip that PHUMA judges as a whole, their overlap, and their least duration, seconds.
 CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS = 4.0, 0.5, 1.0

@@ -19,13 +19,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, cross, dot, perpendicular, runs, unit
+from posekit.geometry import Array, cross, dot, known_median, norm, perpendicular, runs, unit
 from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 from posekit.validators.motion.ground import BY_CHANCE, GRAVITY_ACCELERATION, ground_of, soles, up_of
-from posekit.validators.motion.timeline import known_median, norm, timeline_of
+from posekit.validators.motion.timeline import timeline_of
 
 #: Jumping joints from which a frame is another posture, and no wrong joint.
 POSTURE_JOINTS: Final = 3

@@ -13,9 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, cross, dot, unit
+from posekit.geometry import Array, cross, dot, known_median, norm, unit
 from posekit.skeleton import JOINT, N_TRUNK_JOINTS, both
-from posekit.validators.motion.timeline import known_median, norm
 
 #: Parts with a right and a left joint.
 SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, perpendicular, runs
+from posekit.geometry import Array, norm, perpendicular, runs
 from posekit.skeleton import SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, check
 from posekit.validators.motion.frames import needs_rate
 from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of, up_of
-from posekit.validators.motion.timeline import median_of_five, norm, timeline_of
+from posekit.validators.motion.timeline import median_of_five, timeline_of
 
 #: Height above the highest level of the ground up to which a foot is down, metres: a swinging foot's toes clear 1 to 6
 #: cm, and are faster.

@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry import Array, norm
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.frames import explained
-from posekit.validators.motion.timeline import centred, filtered, norm, timeline_of
+from posekit.validators.motion.timeline import centred, filtered, timeline_of
 
 #: Least time over which differences are taken, seconds: more frames per second add noise.
 SHORTEST_SECONDS: Final = 1.0 / 60.0

@@ -95,12 +95,6 @@ def centred(values: Array, count: int, first: int) -> Array:
     return found
 
 
-def known_median(values: Array) -> float:
-    """Return the median of the known numbers of an array; NaN if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
-
-
 def median_of_five(values: Array) -> Array:
     """Return medians over five slots (S, ...), mirrored at the ends: NaN where one is not known."""
     padded = np.pad(values, ((2, 2), *[(0, 0)] * (values.ndim - 1)), mode="reflect")
@@ -109,17 +103,3 @@ def median_of_five(values: Array) -> Array:
     low = np.maximum(np.minimum(a, b), np.minimum(d, e))
     high = np.minimum(np.maximum(a, b), np.maximum(d, e))
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
-
-
-def groups(at: NDArray[np.intp], apart: int) -> list[NDArray[np.intp]]:
-    """Split ascending frames (N,) where two are more than so many frames apart."""
-    return np.split(at, np.flatnonzero(np.diff(at) > apart) + 1) if len(at) else []
-
-
-def norm(vectors: Array) -> Array:
-    """Return the lengths of vectors (..., 3)."""
-    # Sums by component take 3/5 of the time of a sum over the last axis.
-    squared = vectors[..., 0] * vectors[..., 0]
-    squared += vectors[..., 1] * vectors[..., 1]
-    squared += vectors[..., 2] * vectors[..., 2]
-    return np.asarray(np.sqrt(squared))

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, groups, known_median, norm
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.validators.motion.timeline import centred, filtered, groups, known_median, norm
+from posekit.validators.motion.timeline import centred, filtered
 
 #: Frames over which trembling is measured.
 TREMBLING_FRAMES: Final = 15

@@ -1,4 +1,4 @@
-r"""What the frames of a recording tell about the person in it, and what is allowed in the postures of one.
+r"""The person in the frames of a recording: lengths, the side of the shoulders, and the noise of measuring.
 
 Bones keep their length: what a limb's length scatters over time is the measuring. Two ends with independent errors of
 standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
@@ -19,16 +19,13 @@ from typing import Final
 
 import numpy as np
 
-from posekit.body import Figure
-from posekit.body.lengths import shoulders_are_behind
+from posekit.body.figure import Figure, load_figure
+from posekit.body.lengths import segment_lengths, shoulders_are_behind
 from posekit.errors import FigureError
 from posekit.geometry import Array, Record, cross, dot
-from posekit.skeleton import JOINT, LIMB_JOINTS, LIMB_SEGMENTS, SEGMENT_NAMES, SEGMENTS, segment_name
+from posekit.skeleton import JOINT, LIMB_JOINTS, LIMB_SEGMENTS, SEGMENT_NAMES, segment_name
 
 LIMB_NAMES: Final = tuple(map(segment_name, LIMB_SEGMENTS))
-
-#: Standard deviations of measuring noise that are allowed for: one point in 370 is beyond.
-ALLOWED_DEVIATIONS: Final = 3.0
 
 #: Standard deviation of normal numbers over their median absolute deviation.
 DEVIATION_OF_MAD: Final = 1.4826
@@ -49,20 +46,6 @@ SIZE_BOUNDS: Final = (0.25, 1.6)
 #: Lengths of limbs that are believed, in multiples of the figure's at the person's size: adults vary by 5 %, and a
 #: newborn's legs are two thirds of an adult's.
 LIMB_BOUNDS: Final = (0.6, 1.6)
-
-#: Overlap that is allowed between capsules scaled to a person, metres: their radii are the built-in figure's, and flesh
-#: gives.
-MADE_UP_METRES: Final = 0.01
-
-#: Bending of the spine to the side (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
-SIDE_BENDING_DEGREES: Final = 38.2
-
-#: Length of a clavicle, as a share of the distance from the neck's middle line to the shoulder.
-CLAVICLE_SHARE: Final = 0.8
-
-#: Rotation of a clavicle about its inner end, forward or upward with the shoulder (Inman, Saunders & Abbott 1944, J
-#: Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
-CLAVICLE_DEGREES: Final = 30.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -101,15 +84,12 @@ class Person(Record):
         return min(max(own, self.noise), WORST_OF_USUAL * self.noise)
 
 
-def person_of(joints: Array, lengths_of: Array | None = None) -> Person:
-    """Measure the person in the frames of a recording (T, 14, 3), metres; NaN is unknown.
+def person_of(joints: Array, lengths_of: Array) -> Person:
+    """Measure the person in the frames of a recording (T, 14, 3), metres, with these lengths (17, T); NaN is unknown.
 
-    The lengths (17, T) of the frames' segments are measured if not given. Numbers are rounded to 0.01 mm and whole
-    degrees, so that clips of one skeleton have the same figure.
+    Numbers are rounded to 0.01 mm and whole degrees, so that clips of one skeleton have the same figure.
     """
-    lengths = dict(
-        zip(SEGMENT_NAMES, segment_lengths(joints) if lengths_of is None else lengths_of, strict=True)
-    )
+    lengths = dict(zip(SEGMENT_NAMES, lengths_of, strict=True))
     known = {name: one[np.isfinite(one)] for name, one in lengths.items()}
     medians = {name: float(np.median(one)) for name, one in known.items() if len(one)}
     limbs = {}
@@ -125,16 +105,6 @@ def person_of(joints: Array, lengths_of: Array | None = None) -> Person:
         limb_noise=limbs,
         hips_forward=round(forward) if math.isfinite(forward) else forward,
     )
-
-
-def segment_lengths(joints: Array) -> Array:
-    """Return the length of each of `posekit.skeleton.SEGMENTS` in each frame (17, T), metres."""
-    by_joint = np.ascontiguousarray(np.moveaxis(joints, 0, -1))
-    found = np.empty((len(SEGMENTS), len(joints)))
-    for k, (start, end) in enumerate(SEGMENTS):
-        x, y, z = by_joint[end] - by_joint[start]
-        np.sqrt(x * x + y * y + z * z, out=found[k])
-    return found
 
 
 def _middle_half(noise: Mapping[str, float]) -> float:
@@ -207,25 +177,10 @@ def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool |
         return base.scaled(usual | limbs, behind=behind)
 
 
-def spine_gives(lengths: Mapping[str, float]) -> float:
-    r"""Return by how much bending to the side brings a shoulder nearer to the pelvis, metres.
+def scaled_to(joints: Array) -> Figure:
+    """Scale the built-in figure to the median segment lengths of postures (N, 14, 3) or (N, 19, 3), metres.
 
-    A spine of length h bent evenly by an angle :math:`\varphi` has a chord :math:`c = h \sin(\varphi/2) / (\varphi/2)`
-    that leans by half the angle; a shoulder at w beside the neck is then at
-    :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}` from the pelvis.
+    Unseen segments keep theirs. Lengths do not distinguish a torso from its mirror image, so the side of the shoulders
+    is taken from the points.
     """
-    half = math.radians(SIDE_BENDING_DEGREES) / 2
-    h, w = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
-    c = h * math.sin(half) / half
-    return math.hypot(h, w) - math.sqrt(c * c + w * w - 2 * c * w * math.sin(half))
-
-
-def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
-    r"""Return how much the shoulder girdle changes two distances, metres: shoulder to shoulder, and shoulder to pelvis.
-
-    A clavicle of length c turns by up to :math:`\varphi` about its inner end, forward or upward. The shoulders then
-    come nearer to each other by :math:`2 c (1 - \cos\varphi)`, and one rises by :math:`c \sin\varphi`.
-    """
-    clavicle = CLAVICLE_SHARE * lengths["right_shoulder-left_shoulder"] / 2
-    turn = math.radians(CLAVICLE_DEGREES)
-    return 2 * clavicle * (1 - math.cos(turn)), clavicle * math.sin(turn)
+    return load_figure().scaled(segment_lengths(joints), behind=shoulders_are_behind(joints))
