@@ -12,7 +12,7 @@ import pytest
 import posekit
 from posekit.motion.validation import save_clips
 from posekit.validators import Report
-from posekit.validators.report import joined
+from posekit.validators.report import joined, quantity
 
 CHECKS = {"joint-range": "deg", "collision": "m", "sliding": "m/s", "swap": "1", "own": "W"}
 PLACES = ("right_knee.flexion", "left_foot", "torso-head", "body")
@@ -156,7 +156,8 @@ def test_counts_by_check_are_those_of_the_table(report: Report) -> None:
         assert counts["clips"] == invalid["clip"].nunique()
         assert counts["undecided"] == int((mine.verdict == "undecided").sum())
         worst = invalid.loc[invalid.margin.idxmin()]
-        assert (counts["worst"], counts["value"], counts["frame"]) == (worst.place, worst.value, worst.frame)
+        place = "" if worst.place == counts["place"] else f"{worst.place} "
+        assert (counts["worst"], counts["frame"]) == (place + quantity(worst.value, worst.unit), worst.frame)
         often = invalid.place.value_counts()
         assert often[counts["place"]] == often.max()
     text = report.summary()
