@@ -10,13 +10,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import InputError, cut, refusal
+from posekit.errors import cut, refusal
 from posekit.following.detections import FARTHEST_PIXEL, FRACTIONS_UP_TO, Detections
-from posekit.formats.layout import LIMBS, Layout, by_names, by_order, layout_names, load_layout
+from posekit.formats.layout import Layout, by_names, by_order, load_layout
 from posekit.formats.options import Options
-from posekit.geometry import Array
-
-Names = tuple[str, ...]
+from posekit.geometry import Array, Ints
+from posekit.skeleton import HEAD_POINTS
 
 #: Share of the numbers of a film's pictures that a detector lists at least, in steps of their common divisor; pictures
 #: of a collection have numbers far apart.
@@ -32,23 +31,13 @@ MOST_COMPARED: Final = 200
 MOST_TRACKED: Final = 2000
 #: People that a note lists.
 MOST_LISTED: Final = 20
-#: Landmarks that a layout must place to be used for points that are a part of a body.
-LEAST_LANDMARKS: Final = 4
 #: A picture whose size is not known.
 UNKNOWN: Final = (math.nan, math.nan)
-HEAD_SHARE_COCO: Final = 0.33
-#: Size of the first five of 17 points against all: in COCO's order they are the head, in Human3.6M's a leg and more.
-HEAD_SHARE_H36M: Final = 0.45
-#: Ratio of the mean segment lengths of two readings of 25 points, from which the shorter one is right: of 3,000
-#: projected postures with 8 px of noise 0.23 % were misread, of 253 detections in photographs and videos none.
-CLEAR_LENGTH_RATIO: Final = 1.28
-#: Segments of a body by the names of OpenPose's points.
-COMPARED_SEGMENTS: Final = [
-    (side + segment.split("-")[0], side + segment.split("-")[1])
-    for side in "RL"
-    for segment in "Shoulder-Elbow Elbow-Wrist Hip-Knee Knee-Ankle Shoulder-Hip Ear-Shoulder Eye-Ear "
-    "Ankle-Heel Ankle-BigToe".split()
-] + [("Nose", "REye"), ("Nose", "LEye"), ("LShoulder", "RShoulder"), ("LHip", "RHip")]
+#: Size of nose, eyes and ears against the whole body that stands for a layout without them, as Human3.6M's: where the
+#: head's points belong it is smaller, in a wrong order larger.
+HEADLESS_SHARE: Final = 0.385
+#: Ratio of two orders' shares from which the smaller one is right.
+CLEAR_RATIO: Final = 1.17
 
 
 class Rows:
@@ -68,6 +57,8 @@ class Rows:
         Whether the numbers of people are those of the cameras that saw one person.
     pictures : dict
         By label: time (s), width and height, NaN where unknown.
+    people : list of (str, array, int)
+        Label of the picture, points, and number of the person, -1 where unknown.
     """
 
     def __init__(self, source: str) -> None:
@@ -75,55 +66,63 @@ class Rows:
         self.names: tuple[str, ...] = ()
         self.film: bool | None = True
         self.in_folder = self.by_camera = False
-        self.pictures: dict[str, tuple[float, float, float]] = {}
-        self.labels: list[str] = []
-        self.points: list[Array] = []
-        self.sure: list[Array] = []
-        self.person: list[int] = []
+        self.pictures: dict[str, tuple[float, ...]] = {}
+        self.people: list[tuple[str, Array, int]] = []
 
     def picture(self, label: Any, *, time: float = math.nan, size: tuple[float, float] = UNKNOWN) -> str:
         """Note a picture, with or without people; return its label as text."""
         name = str(label)
-        known = self.pictures.get(name, (math.nan, math.nan, math.nan))
-        stated = (float(time), *size)
-        self.pictures[name] = tuple(b if math.isnan(a) else a for a, b in zip(known, stated, strict=True))  # type: ignore[assignment]
+        known, stated = self.pictures.get(name, (math.nan,) * 3), (float(time), *size)
+        self.pictures[name] = tuple(b if math.isnan(a) else a for a, b in zip(known, stated, strict=True))
         return name
 
-    def add(self, label: Any, points: Array, sure: Array, *, person: Any = None) -> None:
+    def add(self, label: Any, points: Array, person: Any = None) -> None:
         """Note a person in a picture.
 
         Parameters
         ----------
         label : object
             The picture.
-        points : array (K, 2)
-            Pixels, or fractions of the picture.
-        sure : array (K,)
-            Confidences, NaN where there is none. A point with confidence 0 is missing wherever it lies; so is one at
-            the origin or at (-1, -1), and one that is known in part.
+        points : array (K, 3)
+            Pixels, or fractions of the picture, and confidences, NaN where there is none. A point with confidence 0 is
+            missing wherever it lies; so is one at the origin or at (-1, -1), and one that is known in part.
         person : object
             The file's number of the person; anything else is unknown.
         """
-        count = len(self.points[0]) if self.points else len(points)
-        if len(points) != count:
-            got = f"a person of {len(points)} points after one of {count}"
-            where = f"picture {cut(str(label))}"
-            raise refusal(self.source, where, got, "the same number for all", "split the file")
-        with np.errstate(invalid="ignore"):
-            nowhere = (points == 0).all(axis=-1) | (points == -1).all(axis=-1)
-            missing = np.isnan(points).any(axis=-1) | (sure == 0) | nowhere
-            beyond = ~missing & ~(np.abs(points) <= FARTHEST_PIXEL).all(axis=-1)
-        if beyond.any():
-            got, where = str(points[beyond][0].tolist()), f"picture {cut(str(label))}"
-            raise refusal(self.source, where, got, f"numbers up to {FARTHEST_PIXEL:,.0f}")
-        name = self.picture(label)
-        if missing.all():
-            return
-        self.labels.append(name)
-        self.points.append(np.where(missing[:, None], np.nan, points))
-        self.sure.append(np.where(missing, np.nan, sure))
         whole = isinstance(person, int | float) and not isinstance(person, bool) and 0 <= person < 2**31
-        self.person.append(int(person) if whole else -1)
+        self.people.append((self.picture(label), points, int(person) if whole else -1))
+
+    def seen(self) -> tuple[list[str], Array, Ints]:
+        """Return labels, points (N, K, 3) and numbers (N,) of people of whom a point is known; NaN for missing points.
+
+        Raises
+        ------
+        InputError
+            If people have different numbers of points, or a point is out of all pictures.
+        """
+        counts = [len(points) for _, points, _ in self.people]
+        odd = next((k for k, count in enumerate(counts) if count != counts[0]), None)
+        if odd is not None:
+            got = f"a person of {counts[odd]} points after one of {counts[0]}"
+            where = f"picture {cut(self.people[odd][0])}"
+            raise refusal(self.source, where, got, "the same number for all", "split the file")
+        points = np.array([points for _, points, _ in self.people]).reshape(
+            len(counts), max(counts, default=0), 3
+        )
+        xy = points[..., :2]
+        nowhere = (xy == 0).all(axis=-1) | (xy == -1).all(axis=-1) | (points[..., 2] == 0)
+        missing = np.isnan(xy).any(axis=-1) | nowhere
+        beyond = np.argwhere(~missing & ~(np.abs(xy) <= FARTHEST_PIXEL).all(axis=-1))
+        if len(beyond):
+            who, k = beyond[0]
+            where = f"picture {cut(self.people[who][0])}"
+            raise refusal(
+                self.source, where, str(xy[who, k].tolist()), f"numbers up to {FARTHEST_PIXEL:,.0f}"
+            )
+        kept = np.flatnonzero(~missing.all(axis=1))
+        points[missing] = np.nan
+        person = np.array([self.people[k][2] for k in kept], dtype=np.intp)
+        return [self.people[k][0] for k in kept], points[kept], person
 
 
 def detections_of(rows: Rows, options: Options) -> Detections:
@@ -134,38 +133,36 @@ def detections_of(rows: Rows, options: Options) -> Detections:
     InputError
         If it is not clear which points the points are, or files of several cameras are in one folder.
     """
-    points, sure = np.array(rows.points), np.array(rows.sure)
-    if rows.names and len(points) and points.shape[1] != len(rows.names):
-        got = f"{points.shape[1]} points with {len(rows.names)} names"
-        raise refusal(rows.source, "points", got, "a name for each point", "correct the names")
-    layout = _layout(rows, points, options)
-    if not len(points):
-        width = len(rows.names or layout.points)
-        points, sure = np.empty((0, width, 2)), np.empty((0, width))
+    held, values, person = rows.seen()
+    layout = _layout(rows, values[..., :2], options)
+    width = len(rows.names or layout.points)
+    if not len(values):
+        values = np.empty((0, width, 3))
+    elif (rows.names or options.layout) and values.shape[1] != width:
+        got = f"{values.shape[1]} points a person"
+        raise refusal(rows.source, "points", got, f"{width} of {layout.name}", "change it")
     notes: list[str] = []
-    points = _in_pixels(rows, points, layout, notes)
-    names, placed, derived = layout.seen(rows.names, points)
-    confidence = layout.seen(rows.names, sure[..., None])[1][..., 0]
-    labels = list(rows.pictures)
-    film, place = _places(rows, labels, placed, notes)
-    frame = np.array([place[label] for label in rows.labels], dtype=np.intp)
+    names, placed, derived = layout.seen(rows.names, _in_pixels(rows, held, values[..., :2], notes))
+    confidence = layout.seen(rows.names, values[..., 2:])[1][..., 0]
+    sizes = {size[1:] for size in rows.pictures.values()}
+    size = sizes.pop() if len(sizes) == 1 else UNKNOWN
+    film, place = _places(rows, held, placed, notes)
+    frame = np.array([place[label] for label in held], dtype=np.intp)
     order = np.argsort(frame, kind="stable")
-    count = max(place.values(), default=-1) + 1
-    pictures, described = [""] * count, np.full((count, 3), np.nan)
+    pictures = [""] * (max(place.values(), default=-1) + 1)
+    stamps = np.full(len(pictures), np.nan)
     for label, index in place.items():
-        pictures[index], described[index] = label, rows.pictures[label]
-    sizes = {tuple(size) for size in described[[place[label] for label in labels], 1:].tolist()}
-    size = sizes.pop() if len(sizes) == 1 else (np.nan, np.nan)
-    time, warnings = _times(described[:, 0], film, options, notes)
-    notes.append(f"{len(placed)} detections in {len(labels)} pictures, {rows.kind}, {layout.name}")
+        pictures[index], stamps[index] = label, rows.pictures[label][0]
+    time, warnings = _times(stamps, film, options, notes)
+    notes.append(f"{len(placed)} detections in {len(place)} pictures, {rows.kind}, {layout.name}")
     found = Detections(
         points=placed[order],
         confidence=confidence[order],
         names=names,
         frame=frame[order],
-        person=np.array(rows.person, dtype=np.intp)[order],
+        person=person[order],
         pictures=tuple(pictures),
-        size=None if np.isnan(size).any() else (int(size[0]), int(size[1])),
+        size=None if math.isnan(size[0]) else (int(size[0]), int(size[1])),
         time=time,
         rate=options.rate if time is None else None,
         film=film,
@@ -184,112 +181,77 @@ def detections_of(rows: Rows, options: Options) -> Detections:
 
 
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:
-    """Find the layout: the user's, by the names in the file, or by the number of points."""
+    """Find the layout: the user's, by the names in the file, or by the number of points and the head's size."""
     if options.layout:
         given = load_layout(options.layout)
-        if rows.names:
-            return given.over(rows.names)
-        if len(points) and points.shape[1] != len(given.points):
-            got = f"{points.shape[1]} points a person"
-            raise refusal(rows.source, "points", got, f"{len(given.points)} of {given.name}", "change it")
-        return given
+        return given.over(rows.names) if rows.names else given
     if rows.names:
-        try:
-            return by_names(rows.names, rows.source)
-        except InputError:
-            return _in_part(rows)
+        return by_names(rows.names, rows.source)
     if not len(points):
         return load_layout("coco_17")
-    count = points.shape[1]
-    if count == 17:
-        return load_layout(_of_17(rows, points))
-    if count == 25:
-        return load_layout(_of_25(rows, points))
-    found = [one for one in by_order(count) if one.kind == "points"]
-    if len(found) == 1:
+    found = [one for one in by_order(points.shape[1]) if one.kind == "points"]
+    share = {one.name: _head_share(points, one) for one in found}
+    found.sort(key=lambda one: share[one.name])
+    clear = len(found) == 1 or (found and share[found[1].name] >= CLEAR_RATIO * share[found[0].name])
+    if clear:
         return found[0]
-    known = ", ".join(one.name for one in found) or "17, 18, 25, 26, 33, 133 or 136 points"
-    raise refusal(rows.source, "points", f"{count} points without names", known, "give it with --layout")
+    if found and rows.kind in ("coco", "results"):  # COCO's own formats
+        return load_layout("coco_17")
+    known = " or ".join(one.name for one in found) or "17, 18, 25, 26, 33, 133 or 136 points"
+    got = f"{points.shape[1]} points without names"
+    raise refusal(rows.source, "points", got, known, "give it with --layout")
 
 
-def _in_part(rows: Rows) -> Layout:
-    """Find the layout that places most of the landmarks of a part of a body: legs alone, or one side."""
-    fitting = [load_layout(name).over(rows.names) for name in layout_names()]
-    best = max(fitting, key=lambda one: len(one.landmarks))
-    if len(set(best.landmarks) & set(LIMBS)) < LEAST_LANDMARKS:
-        return by_names(rows.names, rows.source)  # raises the error that names the nearest layout
-    return best
-
-
-def _of_17(rows: Rows, points: Array) -> str:
-    """Tell COCO's order of 17 points from Human3.6M's by what is at the places of the head."""
+def _head_share(points: Array, layout: Layout) -> float:
+    """Return the size of nose, eyes and ears against the whole body by a layout, median over people (N, K, 2)."""
+    head = [
+        layout.points.index(layout.landmarks[name][0]) for name in HEAD_POINTS if name in layout.landmarks
+    ]
     known = ~np.isnan(points[..., 0])
-    enough = (known[:, :5].sum(axis=1) >= 2) & (known[:, 5:].sum(axis=1) >= 2)
-    if rows.kind == "coco" or not enough.any():
-        return "coco_17"
-    first, whole = (_diagonal(points[enough][:, part]) for part in (slice(0, 5), slice(None)))
-    share = float(np.median(first / np.maximum(whole, 1e-9)))
-    if HEAD_SHARE_COCO < share < HEAD_SHARE_H36M and rows.kind == "mmpose":
-        remedy = "give --layout coco_17 or --layout h36m_17"
-        raise refusal(rows.source, "points", "17 points without names", "points of one layout", remedy)
-    return "h36m_17" if share >= HEAD_SHARE_H36M else "coco_17"
+    seen = known[:, head].sum(axis=1)
+    enough = (seen >= 2) & (known.sum(axis=1) >= seen + 2)
+    if not enough.any():
+        return HEADLESS_SHARE
+    small, whole = (
+        np.linalg.norm(np.nanmax(part, axis=1) - np.nanmin(part, axis=1), axis=-1)
+        for part in (points[enough][:, head], points[enough])
+    )
+    return float(np.median(small / np.maximum(whole, 1e-9)))
 
 
-def _diagonal(points: Array) -> Array:
-    spans = np.nanmax(points, axis=1) - np.nanmin(points, axis=1)
-    return np.asarray(np.hypot(spans[:, 0], spans[:, 1]))
-
-
-def _of_25(rows: Rows, points: Array) -> str:
-    """Tell OpenPose's BODY_25 from BODY_25B: in the right order the segments of a body are short."""
-    names = ("body_25", "body_25b")
-    lengths = []
-    for name in names:
-        place = {point: k for k, point in enumerate(load_layout(name).points)}
-        ends = np.array([[place[one] for one in segment] for segment in COMPARED_SEGMENTS])
-        lengths.append(np.linalg.norm(points[:, ends[:, 0]] - points[:, ends[:, 1]], axis=-1))
-    enough = np.min([(~np.isnan(one)).sum(axis=1) for one in lengths], axis=0) >= 6
-    if enough.any():
-        means = [np.maximum(np.nanmean(one[enough], axis=1), 1e-9) for one in lengths]
-        ratio = float(np.median(np.log(means[0] / means[1])))
-        if abs(ratio) > math.log(CLEAR_LENGTH_RATIO):
-            return names[0] if ratio < 0 else names[1]
-    remedy = "give --layout body_25 or --layout body_25b"
-    raise refusal(rows.source, "points", "25 points that fit both orders", " or ".join(names), remedy)
-
-
-def _in_pixels(rows: Rows, points: Array, layout: Layout, notes: list[str]) -> Array:
+def _in_pixels(rows: Rows, held: list[str], points: Array, notes: list[str]) -> Array:
     """Turn fractions of the picture into pixels where its size is known; leave them where it is not."""
     known = points[~np.isnan(points[..., 0])]
     if rows.kind == "openpose" and len(known) and np.abs(known).max() <= 1 and known.min() < 0:
         points, known = (points + 1) / 2, (known + 1) / 2  # --keypoint_scale 4: from -1 to 1
     if not len(known) or float(np.median(np.abs(known))) > FRACTIONS_UP_TO:
         return points
-    if rows.kind == "mediapipe":
-        middle = np.nanmean(layout.gather(points).get("mid_hips", points), axis=0)
-        if float(np.abs(middle).max()) < 0.02:
-            got = "landmarks around the middle of the hips: world landmarks, metres"
-            raise refusal(rows.source, "", got, "landmarks in the picture", "save pose_landmarks")
-    sizes = np.array([rows.pictures[label][1:] for label in rows.labels])
+    sizes = np.array([rows.pictures[label][1:] for label in held])
     if np.isnan(sizes).any():
         notes.append("points are fractions of the picture, whose size the file does not have")
         return points
     return np.asarray(points * sizes[:, None])
 
 
-def _places(rows: Rows, labels: list[str], points: Array, notes: list[str]) -> tuple[bool, dict[str, int]]:
+def _places(rows: Rows, held: list[str], points: Array, notes: list[str]) -> tuple[bool, dict[str, int]]:
     """Tell whether the pictures are of a film, and give each its frame; left-out pictures keep their place."""
+    labels = list(rows.pictures)
     numbers = _numbers(rows, labels)
     if numbers is None:
         film = bool(rows.film) or (rows.film is None and len(labels) == 1)
-        ordered = labels if rows.film is not None and not rows.in_folder else sorted(labels, key=str)
+        ordered = labels if rows.film is not None and not rows.in_folder else sorted(labels)
         return film, {label: k for k, label in enumerate(ordered)}
     first = int(numbers.min())
     step = int(np.gcd.reduce(numbers - first)) or 1
     place = (numbers - first) // step
+    frame_of = dict(zip(labels, place.tolist(), strict=True))
     dense = len(labels) >= DENSE * (int(place.max()) + 1)
+    sizes = {size[1:] for size in rows.pictures.values() if not math.isnan(size[1])}
     film = rows.film is True or (
-        dense and len(labels) > 1 and _one_size(rows) and _moves_little(rows, labels, place, points)
+        dense
+        and len(labels) > 1
+        and len(sizes) <= 1
+        and _moves_little(np.array([frame_of[label] for label in held]), points)
     )
     if not film or int(place.max()) + 1 > MOST_SPREAD * len(labels):
         place = np.argsort(np.argsort(numbers, kind="stable"))
@@ -315,14 +277,8 @@ def _numbers(rows: Rows, labels: list[str]) -> NDArray[np.int64] | None:
     return None
 
 
-def _one_size(rows: Rows) -> bool:
-    return len({size[1:] for size in rows.pictures.values() if not math.isnan(size[1])}) <= 1
-
-
-def _moves_little(rows: Rows, labels: list[str], place: NDArray[np.int64], points: Array) -> bool:
+def _moves_little(frame: Ints, points: Array) -> bool:
     """Tell whether somebody is about where somebody was in the picture before, in the median over pictures."""
-    frame_of = dict(zip(labels, place.tolist(), strict=True))
-    frame = np.array([frame_of[label] for label in rows.labels])
     moved = []
     for number in np.unique(frame)[1 : MOST_COMPARED + 1]:
         before, now = points[frame == number - 1], points[frame == number]

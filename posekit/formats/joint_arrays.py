@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options
 from posekit.formats.robot_tables import RATES, TIMES
-from posekit.formats.tables import Table, csv_text
+from posekit.formats.tables import Table, by_row, columns_of_points, csv_text
 from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -42,8 +41,6 @@ CALISCOPE_COLUMNS: Final = ("point_id", "x_coord", "y_coord", "z_coord")
 #: Columns of the recording or person of a row.
 PEOPLE: Final = ("clip", "person", "person_id", "track_id", "subject")
 FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
-MAX_VALUES: Final = 100_000_000
-_COORDINATE: Final = re.compile(r"(.+)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
 
 
 def looks_like(document: Any) -> bool:
@@ -169,11 +166,8 @@ def _long_columns(table: Table) -> tuple[str, ...] | None:
 
 def _wide_columns(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the points whose three coordinates are among the columns of a table, and their columns."""
-    found: dict[str, dict[str, str]] = {}
-    for column in names:
-        if match := _COORDINATE.fullmatch(column):
-            found.setdefault(match[1], {}).setdefault(match[2].lower(), column)
-    return {name: [axes[axis] for axis in "xyz"] for name, axes in found.items() if set(axes) == set("xyz")}
+    found = columns_of_points(names).items()
+    return {name: [axes[axis] for axis in "xyz"] for name, axes in found if set("xyz") <= set(axes)}
 
 
 def _read_table(table: Table, path: str, options: Options) -> Motion:
@@ -238,18 +232,11 @@ def _long(
     person = np.array([order[one] for one in who]) if who else np.zeros(len(frame))
     if not used.any():
         raise refusal(path, "", "no point of the body", "rows of points", "check how it was written")
-    pairs = np.stack([person, frame], axis=1)[used]
-    keys, first, row = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
-    if len(keys) * len(labels) * 3 > MAX_VALUES:
-        got = f"{len(keys):,} frames of {len(labels):,} points"
-        raise refusal(path, "", got, f"at most {MAX_VALUES:,} numbers", "cut it into clips")
-    cells, counts = np.unique(row.reshape(-1) * len(labels) + point[used], return_counts=True)
-    if (counts > 1).any():
-        frame_index, k = divmod(int(cells[np.argmax(counts > 1)]), len(labels))
-        where = f"frame {keys[frame_index, 1]:g}"
-        raise refusal(path, where, f"{shown(labels[k])} twice", "each point once a frame", "remove one")
-    points = np.full((len(keys), len(labels), 3), np.nan)
-    points[row.reshape(-1), point[used]] = np.stack([table.checked(one) for one in columns[1:]], axis=1)[used]
+    pairs = np.stack([person, frame], axis=1)
+    if len(np.unique(np.column_stack([pairs, point])[used], axis=0)) < used.sum():
+        raise refusal(path, "", "a point twice in a frame", "each point once a frame", "remove one")
+    places = np.stack([table.checked(one) for one in columns[1:]], axis=1)
+    _, first, points = by_row(pairs[used], point[used], places[used], len(labels))
     return points, labels, np.flatnonzero(used)[first]
 
 

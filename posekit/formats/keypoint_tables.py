@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from posekit.errors import refusal, shown
+from posekit.errors import refusal
 from posekit.following.detections import Detections
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.layout import load_layout, plain
 from posekit.formats.options import Options
-from posekit.formats.tables import Table, numbers
+from posekit.formats.tables import Table, by_row, columns_of_points, numbers
 from posekit.geometry import Array
 
 DEEPLABCUT_LEVELS: Final = ("scorer", "individuals", "bodyparts", "coords")
@@ -26,9 +26,8 @@ CALISCOPE: Final = {
 PICTURE: Final = "frame frameidx frameid frameindex framenumber image imageid filename".split()
 TIME: Final = ("time", "timestamp", "seconds", "times")
 PERSON: Final = ("person", "personid", "track", "trackid", "individual")
-#: Names of columns, as `plain` reduces them.
-SURE: Final = ("visibility", "likelihood", "confidence", "score", "presence", "conf", "c")
-_WIDE: Final = re.compile(rf"(?P<name>.+?)[\s._-]+(?P<part>x|y|{'|'.join(SURE)})\Z", re.IGNORECASE)
+#: Parts of a point, in their order in arrays.
+COORDS: Final = ("x", "y", "sure")
 #: Named points that a row a picture has at least.
 LEAST_POINTS: Final = 4
 
@@ -37,13 +36,20 @@ def looks_like(table: Table) -> bool:
     """Tell whether a table holds key points in pictures; points in space have a z and no confidence."""
     if table.head and table.head[0][:1] == ["scorer"]:
         return True
-    names = table.names
-    if set(CALISCOPE) <= set(names):
+    if set(CALISCOPE) <= set(table.names):
         return True
-    parts = _wide(names)
-    deep = any(re.search(r"[\s._-]z\Z", name, re.IGNORECASE) for name in names)
-    sure = any("sure" in columns for columns in parts.values())
-    return len(parts) >= LEAST_POINTS and (sure or not deep)
+    points = _in_pictures(table.names)
+    deep = any("z" in parts for parts in columns_of_points(table.names).values())
+    sure = any("sure" in parts for parts in points.values())
+    return len(points) >= LEAST_POINTS and (sure or not deep)
+
+
+def _in_pictures(names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return the columns of each point by part, of names such as ``nose_x``, ``nose.score``."""
+    found = columns_of_points(names).items()
+    return {
+        name: parts for name, parts in found if {"x", "y"} <= set(parts) and "world" not in name.casefold()
+    }
 
 
 def read(table: Table, path: str | Path, options: Options) -> Detections:
@@ -80,29 +86,26 @@ def _deeplabcut(table: Table, rows: Rows) -> None:
     columns: dict[str, dict[str, dict[str, int]]] = {}
     for k in range(lead, len(coords)):
         part = columns.setdefault(individuals[k], {}).setdefault(levels["bodyparts"][k], {})
-        if coords[k] in part:
-            got = f"{shown(levels['bodyparts'][k])}: {coords[k]} twice"
-            raise refusal(rows.source, "bodyparts", got, "each once", "write one scorer's table alone")
-        part[coords[k]] = k - lead
+        part.setdefault("sure" if coords[k] == "likelihood" else coords[k], k - lead)
     # Unique points of a project have another set of names than the individuals: they are nobody.
     most = max(columns.values(), key=len)
     rows.names = tuple(most)
     labels = [rows.picture("/".join(row[:lead])) for row in body]
     people = [parts for parts in columns.values() if list(parts) == list(most)]
     for person, parts in enumerate(people):
-        points, sure = _columns(values, parts)
-        for label, one, confidence in zip(labels, points, sure, strict=True):
-            rows.add(label, one, confidence, person=person if len(people) > 1 else None)
+        points = _stacked(parts, lambda k: values[:, k], len(labels))
+        for label, one in zip(labels, points, strict=True):
+            rows.add(label, one, person if len(people) > 1 else None)
 
 
-def _columns(values: Array, parts: dict[str, dict[str, int]]) -> tuple[Array, Array]:
-    """Return points (T, P, 2) and confidences (T, P) of columns by point and part; NaN where there is none."""
-    padded = np.concatenate([values, np.full((len(values), 1), np.nan)], axis=1)
-    x, y, sure = (
-        padded[:, [next((part[name] for name in names if name in part), -1) for part in parts.values()]]
-        for names in (("x",), ("y",), ("sure", "likelihood"))
-    )
-    return np.stack([x, y], axis=-1), sure
+def _stacked(parts: Mapping[str, Mapping[str, Any]], column: Callable[[Any], Array], count: int) -> Array:
+    """Return points and confidences (T, P, 3) of columns by point and part; NaN where there is none."""
+    points = np.full((count, len(parts), len(COORDS)), np.nan)
+    for k, part in enumerate(parts.values()):
+        for axis, name in enumerate(COORDS):
+            if name in part:
+                points[:, k, axis] = column(part[name])
+    return points
 
 
 def _caliscope(table: Table, rows: Rows) -> None:
@@ -116,26 +119,14 @@ def _caliscope(table: Table, rows: Rows) -> None:
     pictures, first = np.unique(whole[:, 0], return_index=True)
     for number, time in zip(pictures.tolist(), data["time"][first].tolist(), strict=True):
         rows.picture(number, time=time)
-    found, row = np.unique(whole[body, :2], axis=0, return_inverse=True)
-    points = np.full((len(found), len(rows.names), 2), np.nan)
-    points[row.ravel(), whole[body, 2]] = np.stack([data["x"], data["y"]], axis=1)[body]
+    places = np.stack([data["x"], data["y"], np.full(len(whole), np.nan)], axis=1)[body]
+    found, _, points = by_row(whole[body, :2], whole[body, 2], places, len(rows.names))
     for (frame, port), one in zip(found.tolist(), points, strict=True):
-        rows.add(frame, one, np.full(len(one), np.nan), person=port)
-
-
-def _wide(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
-    """Return the columns of each point by part, of names such as ``nose_x``, ``nose.score``."""
-    found: dict[str, dict[str, int]] = {}
-    for column, name in enumerate(names):
-        match = _WIDE.match(name)
-        if match is not None and "world" not in name.casefold():
-            part = match["part"].lower()
-            found.setdefault(match["name"], {}).setdefault(part if part in ("x", "y") else "sure", column)
-    return {name: parts for name, parts in found.items() if {"x", "y"} <= set(parts)}
+        rows.add(frame, one, port)
 
 
 def _row_a_picture(table: Table, rows: Rows) -> None:
-    parts = _wide(table.names)
+    parts = _in_pictures(table.names)
     rows.kind = "a row a picture"
     numbered = [re.fullmatch(r"(?:landmark|point|kp|lm)?[\s._-]*(\d+)", one, re.IGNORECASE) for one in parts]
     rows.names = tuple(parts)
@@ -143,18 +134,13 @@ def _row_a_picture(table: Table, rows: Rows) -> None:
         order = sorted(parts, key=lambda name: int(re.findall(r"\d+", name)[0]))
         parts, rows.names = {name: parts[name] for name in order}, ()
     picture, time, person = (_column(table, wanted) for wanted in (PICTURE, TIME, PERSON))
-    columns = list(dict.fromkeys(k for columns in parts.values() for k in columns.values()))
-    values = np.full((len(table.cells), len(table.names)), np.nan)
-    for k in columns:
-        values[:, k] = table.checked(table.names[k])
-    points, sure = _columns(values, parts)
-    times = table.column(time) if time else np.full(len(values), np.nan)
+    points = _stacked(parts, table.checked, len(table.cells))
+    times = table.column(time) if time else np.full(len(points), np.nan)
     texts = [re.findall(r"\d+", text) for text in table.texts(person)] if person else []
-    who = [int(one[0]) if one else None for one in texts]
-    labels = table.texts(picture) if picture else [str(k) for k in range(len(values))]
+    labels = table.texts(picture) if picture else [str(k) for k in range(len(points))]
     for k, label in enumerate(labels):
         rows.picture(label, time=float(times[k]))
-        rows.add(label, points[k], sure[k], person=who[k] if who else None)
+        rows.add(label, points[k], int(texts[k][0]) if texts and texts[k] else None)
 
 
 def _column(table: Table, wanted: Sequence[str]) -> Any:

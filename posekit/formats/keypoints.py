@@ -35,7 +35,6 @@ WHOLEBODY_PARTS: Final = (
 OPENPOSE_POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
 #: Fields of a person's landmarks in MediaPipe's frames.
 LANDMARKS: Final = ("pose_landmarks", "poseLandmarks", "landmarks")
-WORLD_LANDMARKS: Final = ("pose_world_landmarks", "poseWorldLandmarks", "world_landmarks")
 N_LANDMARKS: Final = 33
 #: Pixels that a picture may have a side.
 LARGEST_SIDE: Final = 10**6
@@ -105,23 +104,20 @@ def _kind(document: Any) -> str:
         if isinstance(people, list) and all(_has(one, OPENPOSE_POINTS) for one in people):
             return "openpose"
         frames = document.get("frames")
-        return "mediapipe" if _is_landmarks(frames if isinstance(frames, list) else [document]) else ""
-    first = next(_dicts(document), None) if isinstance(document, list) else None
-    if first is None:
-        return "mmpose" if document == [] else ""
+        held = frames if isinstance(frames, list) else [document]
+        return "mediapipe" if any(_has(frame, LANDMARKS) for frame in held) else ""
+    if document == []:
+        return "mmpose"
+    first = next(_dicts(document), {})
     if "keypoint_scores" in first or ("instances" in first and "frame_id" in first):
         return "mmpose"
     if "image_id" in first and _has(first, [name for name, *_ in WHOLEBODY_PARTS]):
         return "results"
-    return "mediapipe" if _is_landmarks(document) else ""
+    return "mediapipe" if any(_has(frame, LANDMARKS) for frame in _dicts(document)) else ""
 
 
 def _dicts(value: Any) -> Iterator[dict[str, Any]]:
     return (one for one in value if isinstance(one, dict)) if isinstance(value, list) else iter(())
-
-
-def _is_landmarks(frames: list[Any]) -> bool:
-    return any(_has(frame, (*LANDMARKS, *WORLD_LANDMARKS)) for frame in frames)
 
 
 def _has(entry: Any, names: Sequence[str]) -> bool:
@@ -170,8 +166,9 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
         identity = one.at("image_id").value
         if listed and (type(identity) not in (int, str) or identity not in named):
             raise one.at("image_id").refused(f"the id of one of the {len(named)} images", "add the image")
-        sure = np.where(values[:, 2] > 0, np.nan, 0.0) if flags else values[:, 2]
-        rows.add(named.get(identity, identity), values[:, :2], sure, person=one.value.get("track_id"))
+        if flags:
+            values[:, 2] = np.where(values[:, 2] > 0, np.nan, 0.0)
+        rows.add(named.get(identity, identity), values, one.value.get("track_id"))
 
 
 def _of_bodies(root: Node, people: list[Node], names: dict[str, tuple[str, ...]], rows: Rows) -> list[Node]:
@@ -199,21 +196,21 @@ def _results(root: Node, rows: Rows, label: str) -> None:
         person = one.value.get("track_id", one.value.get("idx"))
         while isinstance(person, list):  # AlphaPose lists the detections that it merged
             person = person[0] if person else None
-        rows.add(identity, values[:, :2], np.where(values[:, 2] == 2, np.nan, values[:, 2]), person=person)
+        values[values[:, 2] == 2, 2] = np.nan
+        rows.add(identity, values, person)
 
 
 def _triples(person: Node) -> Array:
     """Return a person's points (K, 3) of x, y and flag or confidence: one list, or COCO-WholeBody's parts joined."""
-    parts, given = [], person.value.get("keypoints")
+    given = person.value.get("keypoints")
     whole = not _has(person.value, [name for name, *_ in WHOLEBODY_PARTS[1:]])
-    whole |= isinstance(given, list) and len(given) > 3 * WHOLEBODY_PARTS[0][1]
-    for name, count, flag in () if whole else WHOLEBODY_PARTS:
+    if whole or (isinstance(given, list) and len(given) > 3 * WHOLEBODY_PARTS[0][1]):
+        return _by_three(person.at("keypoints"))
+    parts = []
+    for name, count, flag in WHOLEBODY_PARTS:
         absent = not person.value.get(name) or (flag and not person.value.get(flag, True))
-        parts.append(np.zeros(3 * count) if absent else person.at(name).array(3 * count, unknown=True))
-    flat = np.concatenate(parts) if parts else person.at("keypoints").array(None, unknown=True)
-    if not len(flat) or len(flat) % 3:
-        raise person.at("keypoints").refused("a list [x, y, v, x, y, v, …]", got=f"{len(flat)} numbers")
-    return flat.reshape(-1, 3)
+        parts.append(np.zeros((count, 3)) if absent else person.at(name).array(3 * count, unknown=True))
+    return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
 def _mmpose(root: Node, rows: Rows, label: str) -> None:
@@ -244,7 +241,8 @@ def _instance(one: Node, rows: Rows, label: str) -> None:
         raise one.at("keypoints").refused("two, pixels", "save the predictions of a 2D model", got)
     sure = one.at("keypoint_scores").array(len(points), unknown=True)
     # MMPose puts a point without a positive score at -1 of the crop (mmpose/codecs/utils/post_processing.py).
-    rows.add(label, points, np.where(sure <= 0, 0.0, sure), person=one.value.get("track_id"))
+    values = np.column_stack([points, np.where(sure <= 0, 0.0, sure)])
+    rows.add(label, values, one.value.get("track_id"))
 
 
 def _openpose(root: Node, rows: Rows, label: str) -> None:
@@ -254,57 +252,46 @@ def _openpose(root: Node, rows: Rows, label: str) -> None:
         field = next(name for name in OPENPOSE_POINTS if name in one.object())
         if one.at(field).value == []:
             continue
-        flat = one.at(field).array(None, unknown=True)
-        if len(flat) % 3:
-            raise one.at(field).refused("a list [x, y, c, x, y, c, …]", got=f"{len(flat)} numbers")
-        values = flat.reshape(-1, 3)
         person = one.value.get("person_id")
         person = person[0] if isinstance(person, list) and len(person) == 1 else person
-        rows.add(label, values[:, :2], values[:, 2], person=person)
+        rows.add(label, _by_three(one.at(field)), person)
+
+
+def _by_three(node: Node) -> Array:
+    """Return a list of x, y and flag or confidence of each point as rows (K, 3)."""
+    flat = node.array(None, unknown=True)
+    if not len(flat) or len(flat) % 3:
+        raise node.refused("a list [x, y, v, x, y, v, …]", got=f"{len(flat)} numbers")
+    return flat.reshape(-1, 3)
 
 
 def _mediapipe(root: Node, rows: Rows, label: str) -> None:
     """Read frames ``{frame, pose_landmarks: [{x, y, z, visibility} * 33]}``, or of several people each."""
-    document, world = root.value, 0
+    document = root.value
     listed = root if isinstance(document, list) else root.at("frames", None)
     frames = list(listed.list()) if listed.value is not None else [root]
     size = _size(document)
     for number, frame in enumerate(frames):
-        if frame.value in (None, {}, []):
-            rows.picture(number)
-            continue
         entry = frame.object()
         own = next((entry[name] for name in ("frame", "frame_id", "image") if name in entry), None)
         named = own if isinstance(own, int | str) else label if frame is root else number
         picture = rows.picture(named, time=_time(frame), size=_size(entry, size))
         field = next((name for name in LANDMARKS if entry.get(name)), None)
-        if field is None:
-            world += _has(entry, WORLD_LANDMARKS) and not _has(entry, LANDMARKS)
+        if field is None:  # nobody was found
             continue
         held = list(frame.at(field).list())
-        several = isinstance(held[0].value, list) and isinstance((held[0].value or [0])[0], dict | list)
-        for person in held if several else [frame.at(field)]:
+        for person in held if isinstance(held[0].value, list) else [frame.at(field)]:
             points = list(person.list())
             if len(points) != N_LANDMARKS:
                 got = f"{len(points)} landmarks"
                 raise person.refused(f"{N_LANDMARKS} landmarks", "save all of them", got)
-            table = np.array([_landmark(one) for one in points])
-            rows.add(picture, table[:, :2], table[:, 2])
-    if world == len(frames):
-        got = "world landmarks alone: metres around the hips"
-        raise root.refused("landmarks in the picture", "save pose_landmarks, too", got)
+            rows.add(picture, np.array([_landmark(one) for one in points]))
 
 
 def _landmark(one: Node) -> tuple[float, float, float]:
-    """Return x, y and visibility of ``{x, y, z, visibility}`` or ``[x, y, z, visibility]``."""
-    if isinstance(one.value, list):
-        values = one.array(None, unknown=True)
-        if len(values) < 2:
-            raise one.refused("[x, y, z, visibility]")
-        return float(values[0]), float(values[1]), float(values[3]) if len(values) > 3 else np.nan
-    entry = one.object()
-    x, y = (one.at(axis).number() if entry.get(axis) is not None else np.nan for axis in "xy")
-    name = next((name for name in ("visibility", "presence", "score") if entry.get(name) is not None), None)
+    """Return x, y and visibility of ``{x, y, z, visibility}``."""
+    x, y = (one.at(axis).number() for axis in "xy")
+    name = next((name for name in ("visibility", "presence") if one.has(name)), None)
     return x, y, one.at(name).number() if name else np.nan
 
 

@@ -10,14 +10,22 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.errors import refusal, shown
 from posekit.files import text
-from posekit.geometry import Array
+from posekit.geometry import Array, Ints
 
 #: Rows of names before the numbers: DeepLabCut has 4.
 MAX_HEAD_ROWS: Final = 10
+#: Points in all frames of a table with a row a point.
+MAX_POINTS: Final = 30_000_000
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+#: Columns of a point by its name and a coordinate or confidence: ``nose_x``, ``nose.score``.
+_OF_POINT: Final = re.compile(
+    r"(.+?)[\s._-]+(?:([xyz])|visibility|likelihood|confidence|score|presence|conf|c)",
+    re.IGNORECASE | re.DOTALL,
+)
 #: Cells that hold no value, in lower case.
 MISSING: Final = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"})
 
@@ -173,6 +181,44 @@ def _is_number(cell: str) -> bool:
 def _floats(column: Any) -> Array:
     values = np.asarray(column)
     return values.astype(np.float64) if values.dtype.kind in "iufb" else numbers([str(one) for one in values])
+
+
+def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return the columns of each point by ``x``, ``y``, ``z`` and ``sure``, its confidence."""
+    found: dict[str, dict[str, str]] = {}
+    for column in names:
+        if match := _OF_POINT.fullmatch(column):
+            found.setdefault(match[1], {}).setdefault((match[2] or "sure").lower(), column)
+    return found
+
+
+def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[NDArray[Any], Ints, Array]:
+    """Gather a table with a row a point into one with a row a frame.
+
+    Parameters
+    ----------
+    keys : array (N, K)
+        Numbers of a row's frame, such as the person and the picture.
+    point : int array (N,)
+        The row's point, below `count`.
+    values : array (N, D)
+        Its coordinates.
+
+    Returns
+    -------
+    keys : array (T, K)
+        Different keys, ascending.
+    first : int array (T,)
+        Their first rows.
+    points : array (T, count, D)
+        NaN where a frame has no row of a point.
+    """
+    found, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    if len(found) * count > MAX_POINTS:
+        raise ValueError(f"{len(found):,} frames of {count:,} points")
+    points = np.full((len(found), count, values.shape[1]), np.nan)
+    points[row.reshape(-1), point] = values
+    return found, first, points
 
 
 def csv_text(columns: dict[str, Any], delimiter: str = ",") -> str:
