@@ -282,25 +282,21 @@ def _named(fields: Fields, aliases: tuple[str, ...], suffix: str) -> Any:
     return None
 
 
-def write(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
-    """Write cameras: ``.toml`` as Pose2Sim reads them, or ``.json`` with an object a camera; metres.
+def write_json(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
+    """Write cameras as an object each; metres."""
+    json_file.write(path, {name: camera.fields() for name, camera in cameras.items()})
+
+
+def write_toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
+    """Write cameras as Pose2Sim reads them; metres.
 
     The cause and the deviation of a guessed focal length go along in ``how`` and ``deviation``.
 
     Raises
     ------
     InputError
-        If the name ends otherwise, or the worlds of cameras in one TOML file point up differently.
+        If the worlds of the cameras point up differently.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".json", ".toml"):
-        raise refusal(path, "", f"cameras for {shown(suffix)}", "a .toml or a .json file", "rename it")
-    if suffix == ".json":
-        return json_file.write(path, {name: camera.fields() for name, camera in cameras.items()})
-    write_bytes(path, _toml(path, cameras).encode())
-
-
-def _toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> str:
     ups = {camera.up for camera in cameras.values()}
     if len(ups) > 1:
         got = f"worlds that point up along {', '.join(map(shown, sorted(ups)))}"
@@ -327,4 +323,4 @@ def _toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> str:
         # TOML spells these values as JSON does.
         entries = (f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in table.items())
         lines.append(f"[{title}]\n{''.join(entries)}")
-    return "\n".join(lines)
+    write_bytes(path, "\n".join(lines).encode())

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from posekit.errors import refusal, shown
 from posekit.files import write_bytes
 from posekit.formats import json_file
 from posekit.formats.json_file import nullable
@@ -84,41 +83,41 @@ def _typed(node: Node, kind: Any, *shape: int) -> Any:
     return Node(values, node.source, node.place).array(*shape, unknown=kind is np.float64).astype(kind)
 
 
-def write(path: str | Path, report: Report) -> None:
-    """Write a report: ``.json``, ``.npz``, ``.csv``, ``.parquet`` or ``.md``, whole or not at all.
+def write_json(path: str | Path, report: Report) -> None:
+    """Write a report as JSON, with its decision and its clips."""
+    from posekit.validators.report import clip_rows
 
-    Raises
-    ------
-    InputError
-        If the name ends otherwise, or the file cannot be written.
-    """
-    name = Path(path).name.lower().removesuffix(".gz")
-    if name.endswith(".json"):
-        from posekit.validators.report import clip_rows
+    document = {**_about(report), "decision": report.decision, "clips": plain(clip_rows(report))}
+    json_file.write(path, document | {key: nullable(values) for key, values in _arrays(report).items()})
 
-        document = {**_about(report), "decision": report.decision, "clips": plain(clip_rows(report))}
-        arrays = {key: nullable(values) for key, values in _arrays(report).items()}
-        json_file.write(path, {**document, **arrays})
-    elif name.endswith(".npz"):
-        from posekit.formats.npz_file import packed
 
-        about = json.dumps(_about(report), allow_nan=False)
-        arrays = {"schema": np.array(REPORT_SCHEMA), "about": np.array(about), **_arrays(report)}
-        write_bytes(path, packed(arrays))
-    elif name.endswith(".csv"):
-        write_bytes(path, csv_text(report.table()).encode())
-    elif name.endswith(".parquet"):
-        from posekit.formats.parquet import packed_table
+def write_npz(path: str | Path, report: Report) -> None:
+    """Write a report as arrays by name."""
+    from posekit.formats.npz_file import packed
 
-        held = {**_about(report), **{key: nullable(values) for key, values in _arrays(report).items()}}
-        table = report.table().items()
-        columns = {key: one.astype(np.str_) if one.dtype == object else one for key, one in table}
-        write_bytes(path, packed_table(columns, {"posekit": json.dumps(held, allow_nan=False)}))
-    elif name.endswith(".md"):
-        write_bytes(path, f"# {report.decision}\n\n```\n{report.summary()}\n```\n".encode())
-    else:
-        got = f"the ending {shown(Path(path).suffix)}"
-        raise refusal(path, "", got, ".json, .npz, .csv, .parquet or .md", "rename it")
+    about = json.dumps(_about(report), allow_nan=False)
+    arrays = {"schema": np.array(REPORT_SCHEMA), "about": np.array(about), **_arrays(report)}
+    write_bytes(path, packed(arrays))
+
+
+def write_csv(path: str | Path, report: Report) -> None:
+    """Write the table of findings as CSV."""
+    write_bytes(path, csv_text(report.table()).encode())
+
+
+def write_parquet(path: str | Path, report: Report) -> None:
+    """Write the table of findings, everything else in its metadata."""
+    from posekit.formats.parquet import packed_table
+
+    held = _about(report) | {key: nullable(values) for key, values in _arrays(report).items()}
+    table = report.table().items()
+    columns = {key: one.astype(np.str_) if one.dtype == object else one for key, one in table}
+    write_bytes(path, packed_table(columns, {"posekit": json.dumps(held, allow_nan=False)}))
+
+
+def write_md(path: str | Path, report: Report) -> None:
+    """Write the summary as Markdown."""
+    write_bytes(path, f"# {report.decision}\n\n```\n{report.summary()}\n```\n".encode())
 
 
 def _about(report: Report) -> dict[str, Any]:

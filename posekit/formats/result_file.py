@@ -108,36 +108,31 @@ def read(document: Any, path: str | Path, options: Options) -> Recovery:
         return _of_json(root)
 
 
-def write(path: str | Path, recovery: Recovery) -> None:
-    """Write a result: ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``, whole or not at all.
+def write_json(path: str | Path, recovery: Recovery) -> None:
+    """Write a result as JSON, an object a posture."""
+    head = {"schema": RESULT_SCHEMA, **plain({field: getattr(recovery, field) for field in ABOUT})}
+    head["lengths"] = {name: value * PER_METRE[recovery.unit] for name, value in recovery.lengths.items()}
+    if recovery.path is not None:
+        head["paths"] = _paths_fields(recovery)
+    json_file.write(path, head, "frames", _frame_fields(recovery))
 
-    Raises
-    ------
-    InputError
-        If the name ends otherwise, or the file cannot be written.
-    """
-    name = Path(path).name.lower()
-    if name.endswith((".json", ".json.gz")):
-        head = {"schema": RESULT_SCHEMA, **plain({field: getattr(recovery, field) for field in ABOUT})}
-        head["lengths"] = {name: value * PER_METRE[recovery.unit] for name, value in recovery.lengths.items()}
-        if recovery.path is not None:
-            head["paths"] = _paths_fields(recovery)
-        json_file.write(path, head, "frames", _frame_fields(recovery))
-    elif name.endswith(".npz"):
-        from posekit.formats.npz_file import packed
 
-        about = json.dumps(_about(recovery), allow_nan=False)
-        arrays = {"schema": np.array(RESULT_SCHEMA), "about": np.array(about), **_arrays(recovery)}
-        write_bytes(path, packed(arrays))
-    elif name.endswith(".parquet"):
-        from posekit.formats.parquet import packed_table
+def write_npz(path: str | Path, recovery: Recovery) -> None:
+    """Write a result as arrays by name."""
+    from posekit.formats.npz_file import packed
 
-        tables = {name: nullable(values) for name, values in _other_arrays(recovery).items()}
-        about = json.dumps({**_about(recovery), "arrays": tables}, allow_nan=False)
-        write_bytes(path, packed_table(_flat(recovery), {"posekit": about}))
-    else:
-        got = f"the ending {shown(Path(path).suffix)}"
-        raise refusal(path, "", got, ".json, .json.gz, .npz or .parquet", "rename it")
+    about = json.dumps(_about(recovery), allow_nan=False)
+    arrays = {"schema": np.array(RESULT_SCHEMA), "about": np.array(about), **_arrays(recovery)}
+    write_bytes(path, packed(arrays))
+
+
+def write_parquet(path: str | Path, recovery: Recovery) -> None:
+    """Write a result as a table of the survivors, everything else in its metadata."""
+    from posekit.formats.parquet import packed_table
+
+    tables = {name: nullable(values) for name, values in _other_arrays(recovery).items()}
+    about = json.dumps({**_about(recovery), "arrays": tables}, allow_nan=False)
+    write_bytes(path, packed_table(_flat(recovery), {"posekit": about}))
 
 
 def plain(value: Any) -> Any:
@@ -166,46 +161,35 @@ def _columns(recovery: Recovery) -> dict[str, NDArray[Any]]:
 
 
 def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
-    """Go through the frames as JSON has them, in the file's unit."""
-    per = PER_METRE[recovery.unit]
-    lists = {
+    """Go through the frames as JSON has them, in the file's unit; survivors are counted within each frame."""
+    per, frames, tables = PER_METRE[recovery.unit], recovery.frames, _other_arrays(recovery)
+    columns = {
         name: nullable(values * per**power if (power := COLUMNS[name].power) else values)
-        for name, values in _columns(recovery).items()
+        for name, values in (_columns(recovery) | tables).items()
     }
+    of_survivors, of_frames, of_answer = (
+        {name.rpartition(".")[2]: one for name, one in columns.items() if name.rpartition(".")[0] == table}
+        for table in ("", "frames", "answer")
+    )
     checks = list(recovery.survivors.margins)
-    margins = list(zip(*(nullable(values) for values in recovery.survivors.margins.values()), strict=True))
-    names, frames, answer = list(lists), recovery.frames, recovery.answer
-    joints = nullable(answer.joints * per)
+    margins = list(zip(*map(nullable, recovery.survivors.margins.values()), strict=True))
     for k in range(len(recovery)):
         rows = recovery.rows(k)
-        held = zip(*(lists[name][rows] for name in names), strict=True)
-        postures = [dict(zip(names, row, strict=True)) for row in held]
+        held = zip(*(values[rows] for values in of_survivors.values()), strict=True)
+        postures = [dict(zip(of_survivors, row, strict=True)) for row in held]
         for posture, one in zip(postures, margins[rows], strict=False):
             posture["margins"] = dict(zip(checks, one, strict=True))
-        fields: dict[str, Any] = {"time": nullable(frames.time[k])}
-        if frames.pictures:
-            fields["picture"] = frames.pictures[k]
-        start = rows.start
+        answer = {name: values[k] for name, values in of_answer.items()}
+        answer |= {name: plain(getattr(recovery.answer, name)[k]) for name in ANSWER_LISTS}
+        answer["survivor"] = answer["survivor"] - rows.start if answer["survivor"] >= 0 else None
+        answer["representatives"] = [row - rows.start for row in answer["representatives"]]
         yield {
-            **fields,
+            **{name: values[k] for name, values in of_frames.items()},
+            **({"picture": frames.pictures[k]} if frames.pictures else {}),
+            **{name: plain(getattr(frames, name)[k]) for name in FRAME_FILL},
             "camera": plain(_scaled(frames.camera[k], CAMERA_LENGTHS, per)),
-            "rejected": plain(frames.rejected[k]),
-            "levels": plain(frames.levels[k]),
-            "unlisted": int(frames.unlisted[k]),
-            "unlisted_probability": float(frames.unlisted_probability[k]),
-            "reason": frames.reason[k],
             "root": plain(_scaled(frames.root[k], ROOT_LENGTHS, per)),
-            "judged": frames.judged[k],
-            "answer": {
-                "joints": joints[k],
-                "sure": nullable(answer.sure[k]),
-                "sure_of": answer.sure_of[k],
-                "survivor": int(answer.survivor[k]) - start if answer.survivor[k] >= 0 else None,
-                "representatives": (np.asarray(answer.representatives[k]) - start).tolist(),
-                "represented": plain(np.asarray(answer.represented[k])),
-                "nearer": answer.nearer[k].tolist(),
-                "nearer_sure": nullable(answer.nearer_sure[k]),
-            },
+            "answer": answer,
             "postures": postures,
         }
 

@@ -27,9 +27,9 @@ WRITERS: Final[dict[str, dict[str, str]]] = {
         ".json": "postures_file:write",
     },
     "View": {".json": "view_file:write"},
-    "Recovery": dict.fromkeys((".json", ".npz", ".parquet"), "result_file:write"),
-    "Report": dict.fromkeys((".json", ".csv", ".npz", ".parquet", ".md"), "report_file:write"),
-    "dict": dict.fromkeys((".toml", ".json"), "cameras_file:write"),
+    "Recovery": {f".{kind}": f"result_file:write_{kind}" for kind in ("json", "npz", "parquet")},
+    "Report": {f".{kind}": f"report_file:write_{kind}" for kind in ("json", "csv", "npz", "parquet", "md")},
+    "dict": {f".{kind}": f"cameras_file:write_{kind}" for kind in ("toml", "json")},
 }
 #: Formats of points or of the figure: a robot's joints are placed first.
 POINT_FORMATS: Final = (".trc", ".c3d", ".bvh", ".glb")
