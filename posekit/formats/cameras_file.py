@@ -8,6 +8,7 @@ unit is that of its calibration board, mostly millimetres; Caliscope's ``rotatio
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,6 +21,7 @@ from posekit.cameras import PinholeCamera
 from posekit.errors import CameraError, InputError, cut, one_line, refusal, shown
 from posekit.files import write_bytes
 from posekit.formats import json_file
+from posekit.formats.layout import plain
 from posekit.formats.node import Node, as_numbers
 from posekit.formats.options import Options
 from posekit.geometry import UP_AXES, Array, rotation_from_vector, vector_from_rotation
@@ -29,10 +31,12 @@ Fields = Mapping[str, Any]
 
 #: Names of each field in use, upper or lower case, with or without underscores.
 FIELDS: Final = {
+    "words for K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix",
     "K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix mtx k m",
     "distortion": "distortion_coefficients distortion_coeffs distortion distortions dist_coeffs dist_coefs dist_coef "
     "distcoef dist d",
-    "rotation": "rotation_matrix rotation_vector rotation rmat rot rvec r",
+    "matrix of rotation": "rotation_matrix rmat",
+    "rotation": "rotation_vector rotation rot rvec r",
     "translation": "translation_vector translation tvec t",
     "size": "image_size img_size image_resolution resolution size",
     "width": "image_width width w",
@@ -41,6 +45,10 @@ FIELDS: Final = {
     "model": "distortion_model camera_model model",
     "name": "camera_name name id",
 }
+#: Intrinsics of one camera, or of one of several: ``K_left``, ``M1``.
+INTRINSICS: Final = re.compile(
+    rf"(?:{'|'.join(FIELDS['K'].replace('_', '_?').split())})(?:[_-]+(.+)|(\d+))?", re.IGNORECASE
+)
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
 MAX_CAMERAS: Final = 100_000
@@ -59,9 +67,8 @@ def looks_like(document: Any) -> bool:
     if not isinstance(document, Mapping):
         return False
     below = [one for value in document.values() for one in (value if isinstance(value, list) else [value])]
-    called = [name for name in FIELDS["K"].split() if len(name) > len("mtx")]
     held = [one for one in [document, *below] if isinstance(one, Mapping)]
-    return any(_suffixes(one) or isinstance(_named(one, tuple(called), ""), list | Mapping) for one in held)
+    return any(_suffixes(one) or isinstance(_value(one, "words for K"), list | Mapping) for one in held)
 
 
 def read(document: Any, path: str | Path, options: Options) -> dict[str, PinholeCamera]:
@@ -91,8 +98,8 @@ def read(document: Any, path: str | Path, options: Options) -> dict[str, Pinhole
     stem = Path(path).name.partition(".")[0]
     held: list[tuple[str, Mapping[str, Any], str]] = []
     if suffixes := _suffixes(fields):
-        plain = str(_value(fields, "name") or stem)
-        held = [(suffix or plain, fields, suffix) for suffix in suffixes]
+        name = str(_value(fields, "name") or stem)
+        held = [(suffix or name, fields, suffix) for suffix in suffixes]
     else:
         for key, entry in fields.items():
             many = enumerate(entry[:MAX_CAMERAS]) if isinstance(entry, list) else [(key, entry)]
@@ -175,41 +182,31 @@ def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
 
 def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Array | None, Array | None]:
     """Return R and t; neither if one is missing: ROS calls its rectification R."""
-    given = _value(fields, "translation", suffix)
-    rotations = [
-        array
-        for alias in FIELDS["rotation"].split()
-        if (value := _named(fields, (alias,), suffix)) is not None
-        and (array := _numbers(value, path, f"{place}R")).size in (3, 9)
-    ]
-    if given is None or not rotations:
+    t = _value(fields, "translation", suffix)
+    given = [_value(fields, name, suffix) for name in ("matrix of rotation", "rotation")]
+    arrays = [_numbers(one, path, f"{place}R") for one in given if one is not None]
+    R = next((array for array in arrays if array.size in (3, 9)), None)
+    if t is None or R is None:
         return None, None
-    t = _numbers(given, path, f"{place}t", 3)
-    R = max(rotations, key=lambda array: array.size)  # a matrix cannot be misread
-    return R.reshape(3, 3) if R.size == 9 else rotation_from_vector(R), t
+    return R.reshape(3, 3) if R.size == 9 else rotation_from_vector(R), _numbers(t, path, f"{place}t", 3)
 
 
 def _size(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[int, int] | None:
     """Return width and height; None if the file has neither, or zero, as ROS writes an unknown size."""
-    for end in (suffix, ""):
-        sides = [_value(fields, name, end) for name in ("width", "height")]
-        if (pair := _value(fields, "size", end)) is not None:
-            pair = pair.get("data") if isinstance(pair, Mapping) else pair
-            sides = np.ravel(np.asarray(pair, dtype=object)).tolist()
-        if all(side is None for side in sides):
-            continue
-        pixels = as_numbers(sides)
-        if pixels is None or len(pixels) != 2 or (pixels % 1 != 0).any() or (pixels < 0).any():
-            raise refusal(path, f"{place}size", shown(sides), "width and height in pixels")
-        return (int(pixels[0]), int(pixels[1])) if pixels.all() else None
-    return None
+    sides = [_value(fields, name, suffix, "") for name in ("width", "height")]
+    if (pair := _value(fields, "size", suffix, "")) is not None:
+        pair = pair.get("data") if isinstance(pair, Mapping) else pair
+        sides = np.ravel(np.asarray(pair, dtype=object)).tolist()
+    if sides == [None, None]:
+        return None
+    pixels = as_numbers(sides)
+    if pixels is None or len(pixels) != 2 or (pixels % 1 != 0).any() or (pixels < 0).any():
+        raise refusal(path, f"{place}size", shown(sides), "width and height in pixels")
+    return (int(pixels[0]), int(pixels[1])) if pixels.all() else None
 
 
 def _is_fisheye(fields: Fields, path: str | Path, place: str, suffix: str) -> bool:
-    flag, model = (
-        next((one for end in (suffix, "") if (one := _value(fields, name, end)) is not None), None)
-        for name in ("fisheye", "model")
-    )
+    flag, model = (_value(fields, name, suffix, "") for name in ("fisheye", "model"))
     if flag is not None and str(flag).casefold() not in ("0", "1", "true", "false"):
         raise refusal(path, f"{place}fisheye", shown(flag), "true or false")
     word = model.casefold() if isinstance(model, str) else ""
@@ -248,13 +245,9 @@ def _suffixes(fields: Fields) -> list[str]:
     """List the camera suffixes of fields that are 3x3 intrinsics: nothing, a number, or a word after an underscore."""
     found = []
     for key, value in fields.items():
-        low = str(key).casefold()
-        for alias in FIELDS["K"].split():
-            for spelling in (alias, alias.replace("_", "")):
-                rest = low.removeprefix(spelling)
-                part_of_name = rest == low or (rest and rest[0] not in "_-" and not rest.isdecimal())
-                if (low == spelling or not part_of_name) and _is_intrinsic(value):
-                    found.append(str(key)[len(spelling) :].lstrip("_-"))
+        match = INTRINSICS.fullmatch(str(key))
+        if match is not None and _is_intrinsic(value):
+            found.append(match[1] or match[2] or "")
     return list(dict.fromkeys(found))
 
 
@@ -264,22 +257,12 @@ def _is_intrinsic(value: Any) -> bool:
     return array is not None and array.size == 9 and bool((array.ravel()[6:] == [0, 0, 1]).all())
 
 
-def _value(fields: Fields, field: str, suffix: str = "") -> Any:
-    return _named(fields, tuple(FIELDS[field].split()), suffix)
-
-
-def _named(fields: Fields, aliases: tuple[str, ...], suffix: str) -> Any:
-    """Return the first field of some names with a suffix; None if there is none."""
-    by_key = {str(key).casefold(): value for key, value in fields.items()}
-    end = suffix.casefold()
-    for alias in aliases:
-        for spelling in (alias, alias.replace("_", "")):
-            for key in (spelling,) if not suffix else (f"{spelling}_{end}", f"{spelling}{end}"):
-                if key in by_key:
-                    value = by_key[key]
-                    one = isinstance(value, np.ndarray) and value.size == 1
-                    return value.item() if one else value
-    return None
+def _value(fields: Fields, field: str, *suffixes: str) -> Any:
+    """Return the first field of the names in use with the first suffix that is there; None if there is none."""
+    by_key = {plain(str(key)): value for key, value in fields.items()}
+    named = (plain(alias + suffix) for suffix in suffixes or ("",) for alias in FIELDS[field].split())
+    value = next((by_key[name] for name in named if name in by_key), None)
+    return value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
 
 
 def write_json(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
