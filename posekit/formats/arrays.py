@@ -54,9 +54,10 @@ def key_points_of(values: Any, options: Options) -> Detections:
         raise refusal("array", "", f"shape {points.shape}", expected, "give one picture a row")
     rows = Rows("array")
     rows.kind = "an array"
+    if several.shape[-1] == 2:
+        several = np.concatenate([several, np.full_like(several[..., :1], np.nan)], axis=-1)
     for label, people in enumerate(several):
         rows.picture(label)
         for person, one in enumerate(people):
-            sure = one[:, 2] if one.shape[1] == 3 else np.full(len(one), np.nan)
-            rows.add(label, one[:, :2], sure, person=person)
+            rows.add(label, one, person)
     return detections_of(rows, options)
