@@ -239,8 +239,6 @@ class RecoverSettings(Settings):
         Group survivors that are within this distance, metres.
     follow : int
         Number of paths through the frames to follow; 0 for none.
-    clip_lengths : bool
-        Estimate one set of lengths from all frames.
 
     Examples
     --------
@@ -261,7 +259,6 @@ class RecoverSettings(Settings):
     coverage: float = 0.99
     group: float | None = None
     follow: int = 0
-    clip_lengths: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -259,16 +259,6 @@ def test_settings_that_say_nothing_are_refused(exact, changes, message):
         recover(exact[0], **changes)
 
 
-def test_one_set_of_lengths_for_a_clip(random_frames):
-    scaled = FIGURE.scaled({name: 1.06 * length for name, length in FIGURE.lengths.items()})
-    view = random_views(6, np.random.default_rng(8), figure=scaled)
-    view = replace(view, root=view.truth[:, 0], head_image=np.empty(0), lengths={}, deviation=1.0)
-    recovery = recover(view, clip_lengths=True)
-    ratio = np.array([recovery.lengths[name] / length for name, length in FIGURE.lengths.items()])
-    assert 1.03 < np.median(ratio) < 1.09
-    assert set(recovery.lengths) == set(FIGURE.lengths)
-
-
 def test_likely_scale_is_near_the_true_one():
     truth = random_views(40, np.random.default_rng(2), figure=FIGURE).truth
     scale, deviation = likely_scale(truth[..., :2] * 150.0, FIGURE)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,10 +13,10 @@ import pinocchio
 from numpy.typing import NDArray
 
 import posekit
-from posekit.body import Figure, LengthUncertainty, segment_lengths, with_head
+from posekit.body import Figure, LengthUncertainty, with_head
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
-from posekit.geometry import Array, Flags, Ints
+from posekit.geometry import Array, Flags, Ints, up_vector
 from posekit.progress import watched
 from posekit.ranking import Up, deviation_of_tolerance, log_terms
 from posekit.recovery.certify import certified, noisy_judge, solver_limits
@@ -31,11 +31,11 @@ from posekit.solver import Modes, Problem, solve
 from posekit.tree import grow
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
 
+#: Packages that decide a result.
+VERSIONED: Final = {"posekit": posekit, "pin": pinocchio, "numpy": np}
+
 #: Frames that are recovered together: enough to spread NumPy's overhead. The result does not depend on them.
 FRAMES_AT_ONCE: Final = 64
-
-#: Relative deviation of lengths that were estimated from the frames of a clip.
-CLIP_DEVIATION: Final = 0.02
 
 #: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
 MANY: Final = 3000
@@ -52,16 +52,11 @@ NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
 
 
 def recover(
-    view: View,
-    settings: RecoverSettings | None = None,
-    *,
-    figure: Figure | None = None,
-    **changes: Any,
+    view: View, settings: RecoverSettings | None = None, *, figure: Figure | None = None, **changes: Any
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
 
-    The result of a frame depends on that frame alone, unless `RecoverSettings.clip_lengths` asks for one set of lengths
-    from all frames.
+    The result of a frame depends on that frame alone.
 
     Parameters
     ----------
@@ -93,15 +88,7 @@ def recover(
         starts = range(0, len(left), FRAMES_AT_ONCE)
         for start in watched(starts, "recovering") if starts else ():
             stage(left[start : start + FRAMES_AT_ONCE])
-    recovery = conductor.found.recovery(conductor.margins, conductor.document(), conductor.tolerances())
-    if settings.clip_lengths and len(recovery.survivors):
-        # Of one person in all frames: medians over the survivors nearest to the answers.
-        nearest = recovery.answer.survivor
-        measured = segment_lengths(recovery.survivors.joints[nearest[nearest >= 0]])
-        whole = replace(view, lengths=measured, stature=None, length_deviation=CLIP_DEVIATION)
-        again = settings.changed(clip_lengths=False, stature=None, length_deviation=None, follow=0)
-        recovery = recover(whole, again, figure=figure)
-        recovery = replace(recovery, settings={**recovery.settings, "clip_lengths": True})
+    recovery = conductor.found.recovery(conductor.margins, **conductor.about())
     if settings.follow:
         from importlib import import_module
 
@@ -175,7 +162,7 @@ class _Conductor:
         if self.judged == "exact":
             lost = {k: lost[k] for k in self._closing(frame, trees.joints, lost)}
         own = np.flatnonzero(np.isin(frame, list(lost)))
-        row, joints = trees.frame[own], trees.joints[own]
+        row, joints, short = trees.frame[own], trees.joints[own], trees.length_residual[own]
         columns = {
             "frame": frame[own],
             "joints": joints,
@@ -183,13 +170,8 @@ class _Conductor:
             "branch": trees.branches[own],
             "scale": sight.scale[row],
         }
-        terms = log_terms(
-            joints,
-            deviation=deviation_of_tolerance(tolerance.rigid),
-            lengths=lengths,
-            length_residual=trees.length_residual[own],
-            up=self.up,
-        )
+        deviation = deviation_of_tolerance(tolerance.rigid)
+        terms = log_terms(joints, deviation=deviation, lengths=lengths, length_residual=short, up=self.up)
         # The tree asked checks about the points that they name; what has parts has named all that it reads.
         late = [check for check in self.checks if not hasattr(check, "parts")]
         reason, _ = certified(self.exact, late, with_head(joints, sight.head[row]))
@@ -213,12 +195,11 @@ class _Conductor:
         sight = self.sight.take(np.flatnonzero(np.isin(self.sight.frame, part)))
         problem = self._problem(sight, sharp=sharp)
         pulling = [check.residuals for check in self.checks if hasattr(check, "residuals")]
-        modes = solve(problem, most=MANY, pull=partial(_pulled, pulling) if pulling else None)
+        pull = (lambda joints: np.concatenate([one(joints) for one in pulling], axis=1)) if pulling else None
+        modes = solve(problem, most=MANY, pull=pull)
         if sharp:
-            least = np.full(len(problem), np.inf)
-            np.minimum.at(least, modes.frame, modes.chi2)
-            closed = np.asarray((least < EXACT_CHI2) & (problem.freedom > 0))
-            modes = modes.take(closed[modes.frame])
+            best = modes.chi2[np.searchsorted(modes.frame, modes.frame)]
+            modes = modes.take((best < EXACT_CHI2) & (problem.freedom > 0)[modes.frame])
         frame, joints, scale = sight.frame[modes.frame], modes.joints, sight.scale[modes.frame]
         if self.photograph:
             joints, scale = from_near(joints, sight.middle[modes.frame], scale)
@@ -289,9 +270,18 @@ class _Conductor:
                     found.setdefault(name, np.full(len(points), np.nan))[rows] = values
         return found
 
-    def document(self) -> dict[str, Any]:
-        """Return everything that decided the result, as JSON values."""
-        return {
+    def about(self) -> dict[str, Any]:
+        """Return settings and tolerances as a result states them: everything that decided it."""
+        tolerances: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
+        if "noisy" in vars(self):
+            tolerances["noisy"] = {
+                "deviation": float(np.nanmedian(self.sight.deviation)),
+                "size": self.lengths.common,
+                "by_segment": dict(self.lengths.own),
+                "certified": vars(self.noisy.tolerance),
+                "contact_margin": self.noisy.settings.contact_margin,
+            }
+        settings = {
             **self.settings.to_json(),
             "checks": [check.name for check in self.checks],
             "figure": self.person.hash,
@@ -300,21 +290,9 @@ class _Conductor:
             "up": self.up.source,
             "prior": "people",
             "derived": list(self.view.derived),
-            "versions": versions(),
+            "versions": {name: module.__version__ for name, module in VERSIONED.items()},
         }
-
-    def tolerances(self) -> dict[str, Any]:
-        """Return the tolerances of exact and tolerated frames, and the noise of the others where there are any."""
-        found: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
-        if "noisy" in vars(self):
-            found["noisy"] = {
-                "deviation": float(np.nanmedian(self.sight.deviation)),
-                "size": self.lengths.common,
-                "by_segment": dict(self.lengths.own),
-                "certified": vars(self.noisy.tolerance),
-                "contact_margin": self.noisy.settings.contact_margin,
-            }
-        return found
+        return {"settings": settings, "tolerances": tolerances}
 
 
 def _by_hand(view: View, settings: RecoverSettings, person: Figure) -> NDArray[np.int8]:
@@ -344,21 +322,9 @@ def _why(nearest: Modes) -> str:
     return f"no posture fits: the nearest misses {words}"
 
 
-def _pulled(residuals: Sequence[Callable[[Array], Array]], joints: Array) -> Array:
-    """Return the residuals of checks together."""
-    return np.concatenate([one(joints) for one in residuals], axis=1)
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Return the versions of the packages that decide a result."""
-    return {"posekit": posekit.__version__, "pin": pinocchio.__version__, "numpy": np.__version__}
-
-
 def _up_of(view: View) -> Up:
     """Return the direction against gravity: as the calibration states it, else as if the camera were level."""
     camera = view.camera
     if isinstance(camera, PinholeCamera) and camera.R is not None and camera.up:
-        axis = np.eye(3)["xyz".index(camera.up[1])] * (-1.0 if camera.up[0] == "-" else 1.0)
-        return Up(direction=camera.R @ axis, source=f"{camera.up}, as the calibration source")
+        return Up(direction=camera.R @ up_vector(camera.up), source=f"{camera.up}, as the calibration source")
     return Up.level()

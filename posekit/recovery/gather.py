@@ -47,8 +47,6 @@ class Gathering:
     ) -> None:
         self.view, self.sight, self.person, self.settings, self.nearer = view, sight, person, settings, nearer
         self.lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
-        self.given = np.ones(len(view), dtype=np.bool_)
-        self.given[sight.frame[~sight.given]] = False
         self.open = {k for k, reason in enumerate(sight.reasons) if not reason}
         frames = Frames(
             time=view.time,
@@ -132,9 +130,13 @@ class Gathering:
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
+        perspective = self.sight.camera.perspective
+        relative = np.full(len(found), not perspective)
         if covariance is not None:
             block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
-            if not self.sight.camera.perspective:
+            if perspective:
+                relative = ~self.sight.given[found]
+            else:
                 # There is no place in space: radii are about the middle of the joints.
                 block = block - block.mean(axis=1, keepdims=True)
                 block = block - block.mean(axis=3, keepdims=True)
@@ -144,14 +146,13 @@ class Gathering:
             mean = np.add.reduceat(weight * depth, starts)
             spread = np.sqrt(np.add.reduceat(weight * ((depth - mean[frame]) ** 2 + own**2), starts))
             for row, k in enumerate(found.tolist()):
-                if self.sight.camera.perspective and not self.given[k] and not self.frames["root"][k]:
+                if perspective and relative[row] and not self.frames["root"][k]:
                     estimate = {"estimate": float(mean[row]), "deviation": float(spread[row])}
                     self.frames["root"][k] = {"method": "solver", **estimate}
         if self.settings.group is not None:
             each = np.split(joints, starts[1:])
             table["group"] = np.concatenate([group_of(one, self.settings.group) for one in each])
         self.survivors.append(Survivors(**table))
-        relative = ~(self.sight.camera.perspective & ((covariance is None) | self.given[found]))
         answers: Callable[[], dict[str, Any]] = partial(
             answers_of, joints, frame, probability, covariance, self.lengths, relative, unlisted
         )
@@ -170,10 +171,7 @@ class Gathering:
         return Answer(**columns)
 
     def recovery(
-        self,
-        margins: Callable[[Array, Flags], Mapping[str, Array]],
-        settings: Mapping[str, Any],
-        tolerances: Mapping[str, Any],
+        self, margins: Callable[[Array, Flags], Mapping[str, Array]], **about: Mapping[str, Any]
     ) -> Recovery:
         """Put the frames together.
 
@@ -181,8 +179,8 @@ class Gathering:
         ----------
         margins : callable
             Returns those of postures (N, 19, 3) that were found under noise, or exactly.
-        settings, tolerances : mapping
-            What decided the result, as JSON values.
+        **about
+            ``settings`` and ``tolerances`` of the result.
         """
         view, parts = self.view, [one.columns() for one in self.survivors]
         table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -198,23 +196,20 @@ class Gathering:
             ),
             frames=Frames(pictures=view.pictures, **self.frames),
             answer=partial(self.answer, starts),
-            settings=settings,
-            tolerances=tolerances,
             lengths=dict(self.person.lengths),
             configuration_names=self.person.configuration_names,
             unit=view.unit,
             camera=view.camera.fields("m"),
             source=view.source,
+            **about,  # type: ignore[arg-type]
         )
 
 
 def group_of(joints: Array, within: float) -> Ints:
     """Group postures (N, 14, 3), the likeliest first: each joins the first leader no joint of which is farther away."""
-    group, leaders = np.empty(len(joints), dtype=np.intp), np.empty(0, dtype=np.intp)
-    for k, one in enumerate(joints):
-        apart = np.fmax.reduce(np.linalg.norm(joints[leaders] - one, axis=2), axis=1, initial=0.0)
-        near = np.flatnonzero(apart <= within)
-        if not len(near):
-            leaders = np.append(leaders, k)
-        group[k] = near[0] if len(near) else len(leaders) - 1
+    group = np.full(len(joints), -1, dtype=np.intp)
+    for k, leader in enumerate(joints):
+        if group[k] < 0:
+            apart = np.fmax.reduce(np.linalg.norm(joints - leader, axis=2), axis=1)
+            group[(apart <= within) & (group < 0)] = group.max() + 1
     return group

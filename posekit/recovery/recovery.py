@@ -15,6 +15,7 @@ from posekit.errors import InputError, refusal, shown
 from posekit.geometry import Array, Record, read_only
 from posekit.motion import Motion
 from posekit.skeleton import HEAD_POINTS, JOINTS, TREE_SEGMENTS
+from posekit.validators.report import plural
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -263,7 +264,7 @@ class Frame(Survivors):
     nearer_sure: Array
 
     def _facts(self) -> list[str]:
-        return [f"frame {self.number}", f"{len(self)} {'posture' if len(self) == 1 else 'postures'}"]
+        return [f"frame {self.number}", plural(len(self), "posture")]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -313,10 +314,6 @@ class Recovery(Record):
     camera: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
 
-    def __post_init__(self) -> None:
-        self._set("joint_names", tuple(self.joint_names))
-        self._set("configuration_names", tuple(self.configuration_names))
-
     def __len__(self) -> int:
         """Count the frames."""
         return len(self.frames)
@@ -349,9 +346,8 @@ class Recovery(Record):
         return np.searchsorted(self.survivors.frame, np.arange(len(self) + 1))
 
     def _facts(self) -> list[str]:
-        found, empty = len(self.survivors), int((np.diff(self._starts) == 0).sum())
-        names = [f"{len(self)} {'frame' if len(self) == 1 else 'frames'}"]
-        names.append(f"{found} {'posture' if found == 1 else 'postures'}")
+        empty = int((np.diff(self._starts) == 0).sum())
+        names = [plural(len(self), "frame"), plural(len(self.survivors), "posture")]
         return names + ([f"none in {empty}"] if empty else [])
 
     def motion(self, which: Literal["answer", "path", "all", "first"] = "answer") -> Motion:

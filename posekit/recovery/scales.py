@@ -96,7 +96,7 @@ def scales_of(
     from posekit.recovery.objects import LinkageFamily, search
 
     family = LinkageFamily(linkage=linkage, image=points)
-    bound = family.minimum_scale
+    bound, segment = family.minimum_scale, family.bounding_segment
     chosen = [bound if how == "min" else stated]
     if how == "constraints":
         found = search(family, weights)
@@ -106,15 +106,9 @@ def scales_of(
         raise refusal("", "scale", "no scale", "two ends of some segment in the image", "add image points")
     lost = (bound / min(chosen) - 1) * float(linkage.lengths.max())
     if strict and lost > LONGEST_TOO_SHORT:
-        needs = f"at least {bound:.6g} px/m, which {family.bounding_segment} needs"
+        needs = f"at least {bound:.6g} px/m, which {segment} needs"
         raise refusal("", "scale", f"{min(chosen):.6g}", needs, "give a larger scale, or min")
-    about = {
-        "scale": chosen,
-        "how": "+".join(weights) or how,
-        "bound": bound,
-        "segment": family.bounding_segment,
-    }
-    return chosen, about
+    return chosen, {"scale": chosen, "how": "+".join(weights) or how, "bound": bound, "segment": segment}
 
 
 def figure_linkage(person: Figure) -> Linkage:

@@ -92,10 +92,10 @@ class Sight(Record):
 
     def take(self, rows: NDArray[np.intp]) -> Sight:
         """Return some rows."""
-        names = ("frame", "image", "deviation", "root", "given", "head", "size_deviation")
-        return replace(
-            self, camera=self.camera.take(rows), **{name: getattr(self, name)[rows] for name in names}
-        )
+        taken: dict[str, Any] = {
+            name: held[rows] for name, held in vars(self).items() if isinstance(held, np.ndarray)
+        }
+        return replace(self, camera=self.camera.take(rows), **taken)
 
     @property
     def scale(self) -> Array:
@@ -136,14 +136,12 @@ def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
 def _unseen(view: View) -> list[str]:
     """Say of each frame why nothing can be sought in it; empty if it can."""
     seen = np.isfinite(view.image[:, :, 0])
-    neck = "the neck, from which the posture grows, is not seen"
+    trunk, neck = seen[:, 1:4].any(axis=1), "the neck, from which the posture grows, is not seen"
     if "neck" in view.derived:
         neck += ": a shoulder is not, and it is between the shoulders"
     reasons = {
         "the person is not seen: none of the joints is": ~seen.any(axis=1),
-        "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover": ~(
-            seen[:, 1:4].any(axis=1)
-        ),
+        "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover": ~trunk,
         neck: ~seen[:, 0] & view.camera.perspective,
     }
     return [str(reason) for reason in np.select(list(reasons.values()), list(reasons), "")]
@@ -220,9 +218,9 @@ def _head_pose(
     own = dict(zip(("neck", *HEAD_POINTS), origin + person.head_points, strict=True))
     points = HeadPoints.from_mapping({**own, **stated})
     image = np.where(enough[:, None, None], image, np.nan)
-    if isinstance(model, LeeChenCamera):
-        pose = calibrate(points, image, f=model.f)
-        return (LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)) if unknown else model), pose
+    if unknown:
+        pose = calibrate(points, image)
+        return LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)), pose
     return model, solve_pose(points, image, model)
 
 
@@ -272,21 +270,20 @@ def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: 
     strict = may_be_exact and how in ("value", "stature")
     rows: list[int] = []
     scales: list[float] = []
+    errors: list[PosekitError] = []
     cameras: list[dict[str, Any]] = [{} for _ in reasons]
+    linkage = figure_linkage(person)
     for k in [k for k, reason in enumerate(reasons) if not reason]:
         try:
-            chosen, about = scales_of(
-                square[k], figure_linkage(person), how, weights, float(of_frame[k]), strict
-            )
+            chosen, cameras[k] = scales_of(square[k], linkage, how, weights, float(of_frame[k]), strict)
         except PosekitError as error:
             reasons[k] = str(error)
+            errors.append(error)
             continue
-        cameras[k] = about
         rows += [k] * len(chosen)
         scales += chosen
-    if not rows:
-        first = next(reason for reason in reasons if reason)
-        raise refusal(view.source, "frames[0]", first, "a frame with a posture", "correct the image points")
+    if errors and not rows:
+        raise errors[0]
     frame, scale = np.array(rows, dtype=np.intp), np.array(scales)
     confidence = np.clip(np.nan_to_num(view.confidence[frame, : len(JOINTS)], nan=1.0), LEAST_CONFIDENCE, 1.0)
     image = view.image[frame]
