@@ -6,8 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from posekit.body.lengths import hips_points, torso_points
 from posekit.geometry import Array, Flags, Ints, best_rotation, cross, dot, unit
-from posekit.skeleton import PARENTS, SEGMENTS
+from posekit.skeleton import PARENTS, SEGMENT_NAMES, SEGMENTS
 from posekit.solver.limits import ENDS, MIDDLES, STARTS
 from posekit.solver.problem import Problem
 
@@ -81,68 +82,56 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
 
 
 def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
-    """Return frames (S,) and trunks (S, 6, 3): near and far of five joints from every neck."""
+    """Return frames (S,), ascending, and trunks (S, 6, 3): near and far of each seen joint from every neck."""
     frame, neck = necks(problem)
-    lengths = np.exp(problem.records["log_length"])
-    signs = (np.arange(32)[:, None] >> np.arange(5)[::-1]) & 1
-    own = np.repeat(frame, 32)
-    far = np.tile(signs, (len(frame), 1)).astype(np.bool_)
-    trunk = np.empty((len(own), TRUNK, 3))
-    trunk[:, 0] = np.repeat(neck, 32, axis=0)
+    trunk = np.zeros((len(frame), TRUNK, 3))
+    trunk[:, 0] = neck
     for joint in range(1, TRUNK):
-        length = lengths[own, LIFTED[joint]]
-        trunk[:, joint] = lift(problem, own, joint, trunk[:, PARENTS[joint]], length, far[:, joint - 1])
-    hidden = ~problem.seen_joints[:, :TRUNK]
-    if not hidden.any():
-        return own, trunk
-    # Signs of hidden joints say nothing: one of each is kept, and the hidden joints follow from the others.
-    once = ~(far & hidden[own, 1:]).any(axis=1)
-    own, trunk = own[once], trunk[once]
-    plain = ~hidden[own].any(axis=1)
-    frames, trunks = [own[plain]], [trunk[plain]]
-    for pattern in np.unique(hidden[own[~plain]], axis=0):
-        rows = np.flatnonzero((hidden[own] == pattern).all(axis=1))
-        for turned in _filled(trunk[rows], ~pattern, lengths[own[rows]]):
-            frames.append(own[rows])
-            trunks.append(turned)
+        row = np.repeat(np.arange(len(frame)), 1 + problem.seen_joints[frame, joint])
+        frame, trunk = frame[row], trunk[row]
+        length = np.exp(problem.records["log_length"][frame, LIFTED[joint]])
+        far = np.diff(row, prepend=-1) == 0
+        trunk[:, joint] = lift(problem, frame, joint, trunk[:, PARENTS[joint]], length, far)
+        if joint in (3, 5):  # hips hang on the pelvis, which is placed before
+            frame, trunk = _filled(problem, frame, trunk, slice(0 if joint == 3 else 4, joint + 1))
+    return frame, trunk
+
+
+def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
+    """Place hidden joints of torso or hips by laying a trunk of the person's lengths onto the others, in several turns.
+
+    Fewer than three joints leave a turn open: a point beside the trunk then ties it to one direction.
+    """
+    seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
+    seen[:, part] = problem.seen_joints[frame, part]
+    whole = seen[:, : part.stop].all(axis=1)
+    frames, trunks = [frame[whole]], [trunk[whole]]
+    for pattern in np.unique(seen[~whole], axis=0):
+        rows = np.flatnonzero((seen == pattern).all(axis=1))
+        body = np.stack([_template(one) for one in np.exp(problem.records["log_length"][frame[rows]])])
+        given = trunk[rows][:, pattern]
+        source, target = body[:, pattern], given
+        for turn in sphere(DIRECTIONS) if pattern.sum() < 3 else np.zeros((1, 3)):
+            if turn.any():
+                centre = (given if pattern.any() else trunk[rows, :1]).mean(axis=1, keepdims=True)
+                source = np.concatenate([body[:, pattern], body[:, :1] + [0.3, 0.1, 0.2]], axis=1)
+                target = np.concatenate([given, centre + 0.3 * turn], axis=1)
+            a, b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
+            R, _ = best_rotation(np.einsum("rki,rkj->rij", target - b, source - a))
+            laid = np.einsum("rij,rkj->rki", R, body - a) + b
+            laid[:, pattern] = given
+            frames.append(frame[rows])
+            trunks.append(laid)
     frame = np.concatenate(frames)
     order = np.argsort(frame, kind="stable")
     return frame[order], np.concatenate(trunks)[order]
 
 
-def _filled(trunk: Array, seen: Flags, lengths: Array) -> list[Array]:
-    """Lay a trunk of these lengths onto the seen joints (R, 6, 3) to place the hidden ones, in several turns.
-
-    Fewer than three joints leave a turn open: a point beside the trunk then ties it to one direction.
-    """
-    body = np.stack([_template(one) for one in lengths])
-    source, target = body[:, seen], trunk[:, seen]
-    out = []
-    for turn in sphere(DIRECTIONS) if seen.sum() < 3 else np.zeros((1, 3)):
-        if turn.any():
-            centre = trunk[:, seen if seen.any() else ~seen].mean(axis=1, keepdims=True)
-            source = np.concatenate([body[:, seen], body[:, :1] + [0.3, 0.1, 0.2]], axis=1)
-            target = np.concatenate([trunk[:, seen], centre + 0.3 * turn], axis=1)
-        a, b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
-        R, _ = best_rotation(np.einsum("rki,rkj->rij", target - b, source - a))
-        laid = np.einsum("rij,rkj->rki", R, body - a) + b
-        laid[:, seen] = trunk[:, seen]
-        out.append(laid)
-    return out
-
-
 def _template(lengths: Array) -> Array:
-    """Return a trunk (6, 3) that stands, of 17 lengths."""
-    by = {tuple(sorted(pair)): lengths[k] for k, pair in enumerate(SEGMENTS)}
-    out = np.zeros((TRUNK, 3))
-    down, right, left = by[0, 3], by[0, 1], by[0, 2]
-    out[3] = 0.0, down, 0.0
-    half = by[1, 2] / (right + left)
-    out[1], out[2] = [-half * right, 0.0, 0.0], [half * left, 0.0, 0.0]
-    wide = by[4, 5] / 2
-    low = np.sqrt(max(((by[3, 4] + by[3, 5]) / 2) ** 2 - wide**2, 0.0))
-    out[4], out[5] = [-wide, down + low, 0.0], [wide, down + low, 0.0]
-    return out
+    """Return a trunk (6, 3) of 17 lengths that stands straight."""
+    named = dict(zip(SEGMENT_NAMES, lengths.tolist(), strict=True))
+    torso, hips = torso_points(named), hips_points(named)
+    return np.concatenate([torso, torso[3] + hips[1:]])
 
 
 def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
