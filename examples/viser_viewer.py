@@ -9,7 +9,6 @@ import sys
 import time
 
 import numpy as np
-import pinocchio as pin
 from pinocchio.visualize import ViserVisualizer
 
 import posekit
@@ -19,7 +18,7 @@ def main(urdf: str, path: str) -> None:
     """Show the frames of a file, one after the other."""
     robot = posekit.load_robot(urdf)
     motion = posekit.open(path, urdf=urdf)
-    viewer = ViserVisualizer(robot.model, robot.geometry or pin.GeometryModel(), robot.visuals)
+    viewer = ViserVisualizer(robot.model, robot.geometry, robot.visuals)
     viewer.initViewer(open=True)
     viewer.loadViewerModel()
     rate = motion.rate or 10.0

@@ -108,7 +108,7 @@ def robot_collision(body: Body) -> Judgement:
     made_up = robot.bodies == "capsules" and not body.settings.strict
     margin = body.settings.contact_margin - (MADE_UP_METRES if made_up else 0.0)
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
-    shapes = [] if robot.geometry is None else robot.geometry.geometryObjects
+    shapes = robot.geometry.geometryObjects
     cheap = len(known) <= MEASURED_FRAMES or all("BV" not in type(one.geometry).__name__ for one in shapes)
     found = robot.collisions(q[known], margin=max(margin, NEAR_METRES if cheap else 0.0))
     pairs, column = np.unique(found.pair[found.distance < margin], return_inverse=True)
@@ -140,8 +140,6 @@ def reach(body: Body) -> Judgement:
 @lru_cache(maxsize=4)
 def _soles(robot: Robot) -> tuple[list[int], Array] | None:
     """Return the joints and places (4, 3) of toes and heels: front and back corners of the boxes around the feet."""
-    if robot.geometry is None:
-        return None
     import pinocchio as pin
 
     data = robot.model.createData()

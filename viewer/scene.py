@@ -135,9 +135,7 @@ class Stage:
         """Load the bodies of one subject under a node of its own."""
         robot = subject.robot
         bodies = robot.visuals if robot.visuals.ngeoms else robot.geometry
-        coloured = pin.GeometryModel(bodies) if bodies is not None else pin.GeometryModel()
-        if isinstance(robot, Figure):
-            coloured = _coloured(robot)
+        coloured = _coloured(robot) if isinstance(robot, Figure) else pin.GeometryModel(bodies)
         visualizer = MeshcatVisualizer(robot.model, pin.GeometryModel(), coloured)
         visualizer.initViewer(viewer=self._viewer)
         first = next(j for j, one in enumerate(self.subjects) if one.robot is robot)

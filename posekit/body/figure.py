@@ -362,7 +362,6 @@ class Figure(Robot):
         head: Array | None = None,
         *,
         start: ArrayLike | None = None,
-        in_time: bool = False,
     ) -> Configurations:
         """Turn postures into configurations, in closed form.
 
@@ -377,8 +376,8 @@ class Figure(Robot):
             Joints, and the head's five points if they are known, metres, any right-handed frame.
         head : array (N, 5, 3), optional
             The head's points, NaN if unknown.
-        start, in_time
-            Have no effect: the closed form needs no start, and depends on no other frame.
+        start
+            Has no effect: the closed form needs no start.
         """
         points = with_head(joints, head)
         q = self.inverse_kinematics(points)

@@ -155,12 +155,11 @@ def _check_mesh_file(path: Path) -> int:
         longest = max(map(len, re.split(rb"[\r\n]+", data)))
         check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
     # The native reader goes by the content: any file may name a material library, which it would open.
-    for line in re.findall(rb"^[ \t]*mtllib([^\r\n]*)", data, re.MULTILINE):
-        library = line.strip().decode("utf-8", "replace").removeprefix("./")
-        plain = library.isprintable() and not set("/\\") & set(library) and library not in ("", "..")
-        beside = path.parent / library if plain else path.parent
-        ok = plain and not beside.is_symlink() and (beside.is_file() or not beside.exists())
-        check(ok, "", f"mtllib {shown(library)}", "the name of a file beside the mesh", "remove the line")
+    for library in re.findall(rb"^[ \t]*mtllib[ \t]*(.*?)\s*$", data, re.MULTILINE):
+        plain = (
+            re.fullmatch(rb"(\./)?\w[\w. -]*", library) and not (path.parent / library.decode()).is_symlink()
+        )
+        check(plain, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")
     return size
 
 

@@ -94,8 +94,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
 
 def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
     """Return the figure's capsules: start and end of the axis, and radius, in shares of their part's length."""
-    model, place, found = figure.model, _neutral_points(figure), {}
-    geometry: pin.GeometryModel = figure.geometry
+    model, geometry, place, found = figure.model, figure.geometry, _neutral_points(figure), {}
     data, geometry_data = model.createData(), pin.GeometryData(geometry)
     pin.updateGeometryPlacements(model, data, geometry, geometry_data, pin.neutral(model))
     for body, M in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):

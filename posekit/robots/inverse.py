@@ -22,8 +22,6 @@ PULL: Final = 1e-10
 STEPS: Final = 40
 #: Relative decrease of the cost below which a search ends.
 PRECISION: Final = 1e-4
-#: Ratio of costs up to which a solution near the frame before is preferred.
-SAME_COST: Final = 1.05
 #: m^2: a smaller decrease ends the search in any case; distances are then below a nanometre.
 LEAST: Final = 1e-19
 #: Postures searched side by side, whose Jacobians have about 15 MB.
@@ -36,29 +34,28 @@ FLOOR: Final = 1e-6
 CLAMPINGS: Final = 3
 #: Other starts that are tried: the middles of the limits, and random configurations.
 SEEDS: Final = 4
-#: Times that unmet frames are started from the frames beside them.
-SWEEPS: Final = 3
 
 
 class _Problem:
-    """Least squares of one robot: targets of its points, limits, and the entries of v that move."""
+    """Least squares of one robot: targets (N, P, 3) of its points, limits, and the entries of v that move."""
 
-    def __init__(self, robot: Robot, targets: Array) -> None:
+    def __init__(self, robot: Robot, targets: Array, columns: list[int]) -> None:
         model = robot.model
         self.robot, self.model, self.kinematics, self.targets = robot, model, robot.kinematics, targets
         self.known = np.asarray(np.isfinite(targets).all(axis=2))
-        self.pull = np.full(model.nv, PULL)
+        trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
+        self.trunk = trunk if len(trunk) > 2 else list(range(len(columns)))
         # Entries of q and v of the joints that have limits: hinges and slides.
         single = [j for j in range(1, model.njoints) if model.nqs[j] == 1]
         self.at_q = np.array([model.idx_qs[j] for j in single], dtype=np.intp)
         self.at_v = np.array([model.idx_vs[j] for j in single], dtype=np.intp)
-        if robot.free_flyer:
-            self.pull[:6] = 0.0
         # A mimicking joint moves with its target: v = S u, u the entries of the other joints.
         follow = np.eye(model.nv)
         for mimic in robot.mimics:
             one, other = (model.idx_vs[model.getJointId(name)] for name in (mimic.joint, mimic.target))
             follow[one] = mimic.multiplier * follow[other]
+        self.free = np.flatnonzero(follow.any(axis=0))
+        self.follow = follow[:, self.free]
         # Limits of a mimicking joint bound its target.
         self.lower, self.upper = np.array(robot.lower), np.array(robot.upper)
         for mimic in reversed(robot.mimics):
@@ -67,33 +64,37 @@ class _Problem:
                 at, to = model.idx_qs[one], model.idx_qs[other]
                 ends = sorted((end[at] - mimic.offset) / mimic.multiplier for end in (self.lower, self.upper))
                 self.lower[to], self.upper[to] = max(self.lower[to], ends[0]), min(self.upper[to], ends[1])
-        self.free = np.flatnonzero(follow.any(axis=0))
-        self.follow = follow[:, self.free]
+
+    def gaps(self, positions: Array, rows: Ints) -> Array:
+        """Return the offsets (n, P, 3) of points from their targets, zero where unknown."""
+        return np.where(self.known[rows, :, None], positions - self.targets[rows], 0.0)
+
+    def away(self, q: Array, start: Array) -> Array:
+        """Return how far hinges and slides are from the start, as entries of v (n, nv)."""
+        out = np.zeros((len(q), self.model.nv))
+        out[:, self.at_v] = q[:, self.at_q] - start[:, self.at_q]
+        return out
 
     def cost(self, q: Array, start: Array, rows: Ints) -> Array:
         """Return half the sum of squared distances, and of the pull toward the start (n,)."""
-        gap = np.where(self.known[rows, :, None], self.kinematics.positions(q) - self.targets[rows], 0.0)
-        away = self.difference(start, q)
-        return np.asarray(0.5 * (gap**2).sum(axis=(1, 2)) + 0.5 * (away**2 @ self.pull))
+        gap = self.gaps(self.kinematics.positions(q), rows)
+        return np.asarray((gap**2).sum(axis=(1, 2)) + PULL * (self.away(q, start) ** 2).sum(axis=1)) / 2
 
     def step(self, q: Array, start: Array, rows: Ints, damping: Array) -> Array:
         """Return damped Gauss-Newton steps (n, nv) inside the limits."""
         positions, jacobian = self.kinematics.jacobians(q)
-        known = self.known[rows, :, None]
-        gap = np.where(known, positions - self.targets[rows], 0.0).reshape(len(q), -1)
-        J = (jacobian * known[..., None]).reshape(len(q), gap.shape[1], -1)
-        away = self.difference(start, q)
-        gradient = (gap[:, None] @ J)[:, 0] + away * self.pull
-        H = J.transpose(0, 2, 1) @ J + np.diag(self.pull)
+        gap = self.gaps(positions, rows).reshape(len(q), -1)
+        J = (jacobian * self.known[rows, :, None, None]).reshape(len(q), gap.shape[1], -1)
+        S, away = self.follow, self.away(q, start)
+        gradient = ((gap[:, None] @ J)[:, 0] + PULL * away) @ S
+        J = J @ S
+        H = J.transpose(0, 2, 1) @ J + PULL * S.T @ S
         lowest, highest = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
         lowest[:, self.at_v] = self.lower[self.at_q] - q[:, self.at_q]
         highest[:, self.at_v] = self.upper[self.at_q] - q[:, self.at_q]
-        S = self.follow
-        gradient, H = gradient @ S, S.T @ H @ S
-        lowest, highest = lowest[:, self.free], highest[:, self.free]
         diagonal = np.arange(len(self.free))
         H[:, diagonal, diagonal] += damping[:, None] * (H[:, diagonal, diagonal] + FLOOR)
-        return limited_step(H, gradient, lowest, highest) @ S.T
+        return limited_step(H, gradient, lowest[:, self.free], highest[:, self.free]) @ S.T
 
     def moved(self, q: Array, step: Array) -> Array:
         """Take steps (n, nv); rounding does not pass a limit."""
@@ -101,45 +102,36 @@ class _Problem:
         out = out.reshape(len(q), self.model.nq)
         return self.robot.with_mimics(np.clip(out, self.lower, self.upper))
 
-    def difference(self, start: Array, q: Array) -> Array:
-        """Return the steps (n, nv) from configurations to others."""
-        steps = [pin.difference(self.model, a, b) for a, b in zip(start, q, strict=True)]
-        return np.array(steps, dtype=np.float64).reshape(len(q), self.model.nv)
-
     def worst(self, q: Array) -> Array:
         """Return the largest distance of a known point from its target (N,), metres."""
-        gap = np.linalg.norm(self.kinematics.positions(q) - self.targets, axis=2)
-        return np.asarray(np.where(self.known, gap, 0.0).max(axis=1, initial=0.0))
+        gaps = self.gaps(self.kinematics.positions(q), np.arange(len(q)))
+        return np.asarray(np.linalg.norm(gaps, axis=2).max(axis=1, initial=0.0))
 
     def laid(self, q: Array) -> Array:
-        """Move the floating root so that the trunk lies best on its targets (Kabsch 1976)."""
+        """Repeat a configuration (nq,), its floating root moved so that the trunk lies best on its targets."""
+        out = np.tile(q, (len(self.targets), 1))
         if not self.robot.free_flyer:
-            return q
-        columns = [POINTS.index(name) for name in self.robot.joint_map]
-        trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
-        chosen = trunk if len(trunk) > 2 else list(range(len(columns)))
-        points = self.kinematics.positions(q)[:, chosen]
-        found = align(points, self.targets[:, chosen], scale=False)
-        lost = np.asarray(np.isnan(found.rotation).any(axis=(1, 2)))
+            return out
+        points, targets = self.kinematics.positions(q[None])[:, self.trunk], self.targets[:, self.trunk]
+        found = align(points, targets, scale=False)
+        lost = np.asarray(np.isnan(found.rotation).any(axis=(1, 2)))  # too few points are known to turn it
+        gap = np.nan_to_num(targets - points).sum(axis=1)
+        off = gap / np.maximum(self.known[:, self.trunk].sum(axis=1), 1)[:, None]
         R = np.where(lost[:, None, None], np.eye(3), found.rotation)
-        gap = np.nan_to_num(self.targets[:, chosen] - points)  # if too few points are known to turn it
-        off = gap.sum(axis=1) / np.maximum(self.known[:, chosen].sum(axis=1), 1)[:, None]
         t = np.where(lost[:, None], off, found.translation)
-        fixed, q = self.model.jointPlacements[1], q.copy()
-        world = q[:, :3] @ fixed.rotation.T + fixed.translation
-        q[:, :3] = (np.einsum("nij,nj->ni", R, world) + t - fixed.translation) @ fixed.rotation
-        turn = fixed.rotation.T @ R @ fixed.rotation @ rotation_from_quaternion(q[:, 3:7])
-        q[:, 3:7] = quaternion_from_rotation(turn)
-        return q
+        fixed = self.model.jointPlacements[1]
+        world = fixed.act(q[:3])
+        out[:, :3] = (R @ world + t - fixed.translation) @ fixed.rotation
+        turn = fixed.rotation.T @ R @ fixed.rotation @ rotation_from_quaternion(q[3:7])
+        out[:, 3:7] = quaternion_from_rotation(turn)
+        return out
 
 
-def solve(
-    robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None, in_time: bool = False
-) -> tuple[Array, Array]:
+def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
     r"""Find configurations that place the mapped joints, inside the limits.
 
     Minimises :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, all
-    postures side by side. Postures that are not met are tried from other starts and from the frames beside them.
+    postures side by side. Postures that are not met are tried from other starts.
 
     Parameters
     ----------
@@ -149,9 +141,6 @@ def solve(
     start : array (N, nq), optional
         Configurations near the solution. What the points do not determine stays near them, by default near the
         neutral configuration.
-    in_time : bool
-        The postures are frames in order: each is solved again from the one before, so that joints that the points do
-        not determine do not jump.
 
     Returns
     -------
@@ -172,28 +161,22 @@ def solve(
         raise refusal("", "joints", f"shape {given.shape}", expected, "give them in the order of JOINTS")
     padded = np.full((len(given), len(POINTS), 3), np.nan)
     padded[:, : given.shape[1]] = given
-    problem = _Problem(robot, padded[:, [POINTS.index(name) for name in robot.joint_map]])
-    every = np.arange(len(given))
+    columns = [POINTS.index(name) for name in robot.joint_map]
+    problem = _Problem(robot, padded[:, columns], columns)
     if start is None:
-        first = problem.laid(np.tile(robot.neutral, (len(given), 1)))
+        first = problem.laid(robot.neutral)
     else:
         first = robot.with_mimics(np.clip(robot.checked(start, "start"), problem.lower, problem.upper))
-    q, cost = _descend(problem, first, first, every)
+    q, cost = _descend(problem, first, first, np.arange(len(given)))
     worst = problem.worst(q)
-    for seed in range(SEEDS if len(given) else 0):
+    for seed in range(SEEDS):
         unmet = np.flatnonzero(worst > MET)
-        other = problem.laid(np.tile(_seed(robot, seed), (len(given), 1)))[unmet]
-        _improve(problem, q, cost, worst, first, unmet, other)
-    for sweep in range(SWEEPS):
-        beside = every + (1 if sweep % 2 else -1)
-        beside = np.clip(beside, 0, len(every) - 1)
-        unmet = np.flatnonzero((worst > MET) & (worst[beside] < worst / 2))
-        _improve(problem, q, cost, worst, first, unmet, q[beside[unmet]])
-    for n in range(1, len(q) if in_time else 0):
-        found, new = _descend(problem, q[n - 1 : n], q[n - 1 : n], every[n : n + 1])
-        if new[0] <= SAME_COST * cost[n] + MET**2 / 2:
-            q[n], cost[n] = found[0], new[0]
-    worst = problem.worst(q)
+        if not unmet.size:
+            break
+        found, new = _descend(problem, problem.laid(_seed(robot, seed))[unmet], first[unmet], unmet)
+        better = new < cost[unmet]
+        q[unmet[better]], cost[unmet[better]] = found[better], new[better]
+        worst = problem.worst(q)
     return q, np.where(problem.known.any(axis=1), worst, np.nan)
 
 
@@ -248,18 +231,6 @@ def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Arr
             if not active.size:
                 break
     return q, cost
-
-
-def _improve(
-    problem: _Problem, q: Array, cost: Array, worst: Array, start: Array, rows: Ints, other: Array
-) -> None:
-    """Search again from other configurations, and keep in place what is better."""
-    if not rows.size:
-        return
-    found, new = _descend(problem, other, start[rows], rows)
-    better = rows[new < cost[rows]]
-    q[better], cost[better] = found[new < cost[rows]], new[new < cost[rows]]
-    worst[better] = problem.worst(q)[better]
 
 
 def _seed(robot: Robot, seed: int) -> Array:

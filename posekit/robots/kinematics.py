@@ -153,7 +153,19 @@ def _local(entries: Array) -> tuple[Array, Array]:
     return np.array([[cos, -sin, none], [sin, cos, none], [none, none, none + 1]]), np.array([x, y, none])
 
 
-def entries_of(model: pin.Model) -> list[tuple[int, str]]:
-    """List the entries of q: index of the joint, and its suffix (x, qx, cos, …); none for joints of one entry."""
-    kinds = [(joint, model.joints[joint].shortname()) for joint in range(1, model.njoints)]
-    return [(joint, suffix) for joint, kind in kinds for suffix in SUFFIXES.get(kind, ("",))]
+class Entry(NamedTuple):
+    """An entry of q: its name, the joint's index, and its suffix (x, qx, cos, …) if the joint has several."""
+
+    name: str
+    joint: int
+    suffix: str
+
+
+def entries_of(model: pin.Model) -> list[Entry]:
+    """List the entries of q. The seven of a floating root have no prefix: x, y, z, qx, qy, qz, qw."""
+    entries = []
+    for joint in range(1, model.njoints):
+        suffixes, name = SUFFIXES.get(model.joints[joint].shortname(), ("",)), str(model.names[joint])
+        root = joint == 1 and len(suffixes) == 7
+        entries += [Entry(end if root else f"{name}.{end}" if end else name, joint, end) for end in suffixes]
+    return entries

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
-from operator import itemgetter
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 from xml.etree import ElementTree
@@ -18,11 +17,11 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import cut, one_line, refusal, shown
 from posekit.files import read_bytes, text
-from posekit.geometry import Array, Record, read_only
+from posekit.geometry import Array, Flags, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
 from posekit.robots.capsules import capsule_bodies
 from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of, set_joint
-from posekit.robots.find import FIGURE, directory, find
+from posekit.robots.find import FIGURE, find
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics, entries_of
 from posekit.robots.pairs import Pairs, disabled_pairs, neutral_inside, set_pairs
@@ -73,7 +72,7 @@ class Robot(Record):
     --------
     >>> from posekit.robots import load_robot
     >>> panda = load_robot("panda", bodies="none")
-    >>> panda.joint_names[1]
+    >>> panda.configuration_names[7]
     'panda_joint1'
     """
 
@@ -102,12 +101,13 @@ class Robot(Record):
     @cached_property
     def model(self) -> pin.Model:
         """Pinocchio's model. Mimicking joints have entries of q of their own: see `mimics`."""
-        moving = [str(one.get("name")) for one in self.tree.findall("joint") if one.get("type") != "fixed"]
         urdf = text_with(self.tree)
-        root = next(name for name in ROOT_NAMES if name not in moving)
-        added = () if self.fixed_base or _floats(self.tree) else (pin.JointModelFreeFlyer(), root)
         try:
-            return pin.buildModelFromXML(urdf, *added)
+            model = pin.buildModelFromXML(urdf)
+            if self.fixed_base or _floats(model):
+                return model
+            root = next(name for name in ROOT_NAMES if not model.existFrame(name))
+            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), root)
         except (ValueError, RuntimeError) as error:
             got = f"a URDF that Pinocchio cannot read ({cut(one_line(str(error).splitlines()[0]))})"
             raise refusal(self.source, "", got, "a URDF", "correct it") from None
@@ -115,26 +115,25 @@ class Robot(Record):
     @cached_property
     def free_flyer(self) -> bool:
         """Whether the root moves freely."""
-        return bool(self.model.njoints > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer")
+        return _floats(self.model)
 
     @cached_property
-    def geometry(self) -> pin.GeometryModel | None:
-        """Pinocchio's collision bodies and the pairs to check; None without bodies."""
+    def geometry(self) -> pin.GeometryModel:
+        """Pinocchio's collision bodies and the pairs to check."""
         if self.bodies == "none":
-            return None
+            return pin.GeometryModel()
+        parts = set[frozenset[str]]()
         if self.bodies == "meshes":
             geometry = build_bodies(self.model, self.tree, self.package_dirs, self.source, "collision")
-            parts = set[frozenset[str]]()
         else:
             figure = load_robot(FIGURE[0])
-            links = dict(zip(figure.body_names, figure.body_links, strict=True))
             geometry = capsule_bodies(self, figure)
+            links = dict(zip(figure.body_names, figure.body_links, strict=True))
             parts = {frozenset(links[name] for name in pair) for pair in figure.collision_pairs}
         disabled: Pairs = ()
         if self.srdf is not None:
             names = [link.get("name", "") for link in self.tree.findall("link")]
-            source = f"{self.source}, SRDF"
-            disabled = disabled_pairs(self.srdf, source, names, strict=not self.shared_srdf)
+            disabled = disabled_pairs(self.srdf, f"{self.source}, SRDF", names, strict=not self.shared_srdf)
         set_pairs(self.model, geometry, disabled, parts)
         return geometry
 
@@ -146,12 +145,12 @@ class Robot(Record):
     @cached_property
     def lower(self) -> Array:
         """Lower limits of q (nq,), rad and m; -inf if there are none."""
-        return self._limits(self.model.lowerPositionLimit, -np.inf)
+        return read_only(np.where(self._single, self.model.lowerPositionLimit, -np.inf))
 
     @cached_property
     def upper(self) -> Array:
         """Upper limits of q (nq,), rad and m; inf if there are none."""
-        return self._limits(self.model.upperPositionLimit, np.inf)
+        return read_only(np.where(self._single, self.model.upperPositionLimit, np.inf))
 
     @cached_property
     def neutral(self) -> Array:
@@ -161,26 +160,15 @@ class Robot(Record):
     @cached_property
     def configuration_names(self) -> tuple[str, ...]:
         """Name of each entry of q: the joint's; x, y, z, qx, qy, qz, qw of the root; ``.cos``, ``.sin``."""
-        names = self.model.names
-        entries = [
-            (joint, suffix, joint == 1 and self.free_flyer) for joint, suffix in entries_of(self.model)
-        ]
-        return tuple(
-            end if root else f"{names[joint]}.{end}" if end else names[joint] for joint, end, root in entries
-        )
+        return tuple(entry.name for entry in entries_of(self.model))
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Unit of each entry of q: ``rad``, ``m``, or empty for quaternions, cosines and sines."""
-        slides = {one.get("name") for one in self.tree.findall("joint") if one.get("type") == "prismatic"}
-        names, units = self.model.names, {"": "rad", "x": "m", "y": "m", "z": "m"}
-        entries = entries_of(self.model)
-        return tuple("m" if names[joint] in slides else units.get(end, "") for joint, end in entries)
-
-    @cached_property
-    def joint_names(self) -> tuple[str, ...]:
-        """The moving joints in Pinocchio's order, the floating root first."""
-        return tuple(self.model.names)[1:]
+        sliding = {one.get("name") for one in self.tree.findall("joint") if one.get("type") == "prismatic"}
+        units = {"": "rad", "x": "m", "y": "m", "z": "m"}
+        names, entries = self.model.names, entries_of(self.model)
+        return tuple("m" if names[one.joint] in sliding else units.get(one.suffix, "") for one in entries)
 
     @cached_property
     def mimics(self) -> tuple[Mimic, ...]:
@@ -190,17 +178,17 @@ class Robot(Record):
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """The collision bodies, as Pinocchio names them: link and number."""
-        return tuple(body.name for body in self._objects)
+        return tuple(body.name for body in self.geometry.geometryObjects)
 
     @cached_property
     def body_links(self) -> tuple[str, ...]:
         """The link of each collision body."""
-        return tuple(link_of(self.model, body) for body in self._objects)
+        return tuple(link_of(self.model, body) for body in self.geometry.geometryObjects)
 
     @cached_property
     def collision_pairs(self) -> tuple[tuple[str, str], ...]:
         """The pairs of bodies that are checked, by name."""
-        pairs = () if self.geometry is None else self.geometry.collisionPairs
+        pairs = self.geometry.collisionPairs
         return tuple((self.body_names[pair.first], self.body_names[pair.second]) for pair in pairs)
 
     @cached_property
@@ -251,9 +239,11 @@ class Robot(Record):
         for row, column in np.argwhere(~np.isfinite(q))[:1]:
             place = f"row {row}: {self.configuration_names[column]}"
             check(False, place, shown(float(q[row, column])), "a finite number", "leave the row out")
-        turning = [(joint, k) for k, (joint, end) in enumerate(entries_of(self.model)) if len(end) > 1]
-        for joint, group in itertools.groupby(turning, key=itemgetter(0)):
-            columns = [k for _, k in group]
+        turning: dict[int, list[int]] = {}
+        for k, entry in enumerate(entries_of(self.model)):
+            if len(entry.suffix) > 1:
+                turning.setdefault(entry.joint, []).append(k)
+        for joint, columns in turning.items():
             length = np.linalg.norm(q[:, columns], axis=1)
             for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
                 what = "a quaternion" if len(columns) == 4 else "a cosine and sine"
@@ -321,7 +311,7 @@ class Robot(Record):
 
         The difference is `pinocchio.difference`: the twist of a floating root in its own frame, linear first.
         """
-        steps = [pin.difference(self.model, a, b) for a, b in itertools.pairwise(q)]
+        steps = [pin.difference(self.model, a, b) for a, b in pairwise(q)]
         return np.array(steps).reshape(-1, self.model.nv) / np.diff(time)[:, None]
 
     def collisions(self, q: ArrayLike, *, margin: float = 0.0) -> Contacts:
@@ -347,9 +337,7 @@ class Robot(Record):
         """
         return self._collision.contacts(self.checked(q), margin)
 
-    def configurations(
-        self, joints: ArrayLike, *, start: ArrayLike | None = None, in_time: bool = False
-    ) -> tuple[Array, Array]:
+    def configurations(self, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return configurations that place the joints, inside the limits: see `posekit.robots.inverse.solve`.
 
         Parameters
@@ -358,8 +346,6 @@ class Robot(Record):
             Metres, world; NaN is unknown.
         start : array (N, nq), optional
             Configurations near the solution.
-        in_time : bool
-            The postures are frames in order; each is solved from the one before.
 
         Returns
         -------
@@ -369,7 +355,7 @@ class Robot(Record):
         """
         from posekit.robots.inverse import solve
 
-        return solve(self, joints, start=start, in_time=in_time)
+        return solve(self, joints, start=start)
 
     def scaled(self, joints: ArrayLike) -> Robot:
         """Return the robot with the segment lengths of a person: see `posekit.robots.scaling`."""
@@ -377,22 +363,16 @@ class Robot(Record):
 
         return scaled(self, joints)
 
-    @property
-    def _objects(self) -> list[pin.GeometryObject]:
-        return [] if self.geometry is None else list(self.geometry.geometryObjects)
-
     @cached_property
     def _collision(self) -> SelfCollision:
         from posekit.robots.collision import SelfCollision
 
-        return SelfCollision(self.model, self.geometry or pin.GeometryModel())
+        return SelfCollision(self.model, self.geometry)
 
-    def _limits(self, limits: Array, none: float) -> Array:
-        """Return limits (nq,) with none for joints of several entries."""
-        single = [self.model.idx_qs[j] for j in range(1, self.model.njoints) if self.model.nqs[j] == 1]
-        out = np.full(self.model.nq, none)
-        out[single] = limits[single]
-        return read_only(out)
+    @cached_property
+    def _single(self) -> Flags:
+        """Whether each entry of q is a joint of its own, with limits."""
+        return np.array([not entry.suffix for entry in entries_of(self.model)], dtype=np.bool_)
 
 
 def load_robot(
@@ -439,11 +419,11 @@ def load_robot(
         srdf=None if own_srdf is None else read_text(own_srdf),
         name=files.name,
         source=str(files.urdf),
-        package_dirs=(*map(directory, package_dirs), *files.package_dirs),
+        package_dirs=(*(Path(folder).resolve() for folder in package_dirs), *files.package_dirs),
         fixed_base=fixed_base,
         bodies=bodies,
         joint_map_file=str(joint_map),
-        shared_srdf=files.built_in and srdf is None,
+        shared_srdf=files.published and srdf is None,
     )
 
 
@@ -452,11 +432,6 @@ def read_text(path: str | Path) -> str:
     return text(read_bytes(path), str(path))
 
 
-def _floats(tree: ElementTree.Element) -> bool:
-    """Return whether the URDF's root link carries a floating joint."""
-    children = {child.get("link") for child in tree.findall("joint/child")}
-    return any(
-        joint.get("type") == "floating" and parent.get("link") not in children
-        for joint in tree.findall("joint")
-        for parent in joint.findall("parent")
-    )
+def _floats(model: pin.Model) -> bool:
+    """Return whether the root moves freely."""
+    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")

@@ -216,8 +216,6 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
     for name, joint in joints.items():
         place, kind = f"joint {name!r}", joint.get("type", "")
         check(kind in FREEDOM, place, f"the type {shown(kind)}", f"one of {', '.join(FREEDOM)}", "correct it")
-        for tag in _KEPT["joint"]:
-            check(len(joint.findall(tag)) < 2, place, f"two <{tag}>", "one", "remove one: readers differ")
         largest = _check_limit(joint, kind, place, check)
         if kind == "revolute" and DEGREES[0] < largest < DEGREES[1]:
             large[name] = largest
@@ -258,7 +256,6 @@ def _check_limit(joint: Element, kind: str, place: str, check: Need) -> float:
 
 
 def _check_link(link: Element, place: str, check: Need) -> None:
-    check(len(link.findall("inertial")) < 2, place, "two <inertial>", "one", "remove the other")
     for inertial in link.findall("inertial"):
         held = {name: value for part in inertial for name, value in part.items()}
         expected = f"<mass value=…> and <inertia> with {', '.join(MOMENTS)}"
@@ -270,7 +267,6 @@ def _check_link(link: Element, place: str, check: Need) -> None:
         got = f"{', '.join(cut(one.tag) for one in found[:4]) or 'no shape'}"
         ok = len(found) == 1 == len(body.findall("geometry")) and found[0].tag in SIZES
         check(ok, where, got, f"one of {', '.join(SIZES)}", "give each shape a body of its own")
-        check(len(body.findall("origin")) < 2, where, "two <origin>", "one", "remove the other")
         shape = found[0]
         for attribute in SIZES[shape.tag]:
             got = f"a {shape.tag} with {attribute} {shown(shape.get(attribute))}"
