@@ -128,7 +128,10 @@ class LinkageFamily(Record):
         A loop that does not close is averaged: its segments then have lengths a little off.
         """
         signed = np.where(self.seen, np.asarray(flips, dtype=np.float64) * self.foreshortening(s), 0.0)
-        depth = np.where(self.incidence.placed, signed @ self.incidence.depth.T, np.nan)
+        return self.placed(s, np.where(self.incidence.placed, signed @ self.incidence.depth.T, np.nan))
+
+    def placed(self, s: ArrayLike, depth: Array) -> Array:
+        """Return the points (..., P, 3), units of length, at scales (...) and depths of the nodes (..., N)."""
         place = self.place / np.asarray(s, dtype=np.float64)[..., None, None]
         nodes = np.concatenate([np.broadcast_to(place, (*depth.shape, 2)), depth[..., None]], axis=-1)
         return np.asarray(nodes[..., : len(self.linkage.points), :])
@@ -151,12 +154,16 @@ class Incidence(Record):
 
     The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
     where a row of A has -1 and 1 at a segment's ends (halves for a midpoint). Then :math:`Z = B (\sigma dZ)`, and loops
-    close where :math:`C (\sigma dZ) = 0`.
+    close where :math:`C (\sigma dZ) = 0`. The segments of a basis determine all depths: :math:`Z = T (\sigma dZ)`.
 
     Parameters
     ----------
     depth : array (N, S)
-        B by node, relative to the first node of its piece.
+        B by node, relative to the first node of its piece; loops that do not close are averaged.
+    tree : array (N, S)
+        T, the same by the segments of the basis alone.
+    basis : int array (K,)
+        Segments that depend on none before them; each of the others closes a loop.
     loops : array (L, S)
         C: one row a loop, its largest coefficient 1.
     part : int array (N,)
@@ -166,6 +173,8 @@ class Incidence(Record):
     """
 
     depth: Array
+    tree: Array
+    basis: NDArray[np.intp]
     loops: Array
     part: NDArray[np.intp]
     placed: NDArray[np.bool_]
@@ -185,14 +194,35 @@ class Incidence(Record):
             graph[end, middle] = seen[whole]
         _, part = connected_components(graph, directed=False)
         largest = int(np.bincount(part[ends[kept, 0]], minlength=part.max() + 1).argmax())
-        B = np.zeros((len(linkage.points), len(linkage.segments)))
-        B[:, kept] = np.linalg.pinv(A[kept])
-        depth = weights @ B
-        for piece in range(part.max() + 1):
-            nodes = np.flatnonzero(part == piece)
-            depth[nodes] -= depth[nodes[0]]
-        depth[np.abs(depth) < ZERO_COEFFICIENT] = 0.0
-        return Incidence(depth=depth, loops=_loops(A, kept), part=part, placed=part == largest)
+        basis: list[int] = []
+        for number in kept.tolist():
+            if np.linalg.matrix_rank(A[[*basis, number]], tol=ZERO_COEFFICIENT) > len(basis):
+                basis.append(number)
+        chords = np.setdiff1d(kept, basis)
+
+        def depths(segments: Sequence[int] | NDArray[np.intp]) -> Array:
+            found = np.zeros((len(weights), len(A)))
+            found[:, segments] = weights @ np.linalg.pinv(A[segments])
+            for piece in range(part.max() + 1):
+                nodes = np.flatnonzero(part == piece)
+                found[nodes] -= found[nodes[0]]
+            found[np.abs(found) < ZERO_COEFFICIENT] = 0.0
+            return found
+
+        tree = depths(basis)
+        # Coefficients are sums of halves.
+        loops = (
+            np.eye(len(A))[chords] - np.round(4096 * (tree[ends[chords, 1]] - tree[ends[chords, 0]])) / 4096
+        )
+        loops /= np.abs(loops).max(axis=1, keepdims=True)
+        return Incidence(
+            depth=depths(kept),
+            tree=tree,
+            basis=np.array(basis),
+            loops=loops,
+            part=part,
+            placed=part == largest,
+        )
 
     def spread(self, nodes: Sequence[int]) -> Array:
         """Return the rows of B for some nodes of one piece, less their mean."""
@@ -200,19 +230,3 @@ class Incidence(Record):
         centred = rows - rows.mean(axis=0)
         centred[np.abs(centred) < ZERO_COEFFICIENT] = 0.0
         return np.asarray(centred)
-
-
-def _loops(A: Array, kept: NDArray[np.intp]) -> Array:
-    """Write each segment that depends on those before it by them: the left null space of A, loop by loop."""
-    basis: list[int] = []
-    chords: list[int] = []
-    for number in kept.tolist():
-        independent = np.linalg.matrix_rank(A[[*basis, number]], tol=ZERO_COEFFICIENT) > len(basis)
-        (basis if independent else chords).append(number)
-    loops = np.zeros((len(chords), len(A)))
-    if chords:
-        loops[:, basis] = -np.linalg.lstsq(A[basis].T, A[chords].T, rcond=None)[0].T
-        loops[np.arange(len(chords)), chords] = 1.0
-        loops = np.round(loops * 4096) / 4096  # coefficients are sums of halves
-        loops /= np.abs(loops).max(axis=1, keepdims=True)
-    return loops

@@ -14,7 +14,7 @@ from posekit.errors import InputError, PosekitError, refusal, shown
 from posekit.geometry import Array, Record
 from posekit.recovery.objects.configurations import configurations_of
 from posekit.recovery.objects.family import LinkageFamily
-from posekit.recovery.objects.growth import CLOSED_RESIDUAL, EXACT, MEASURED, Growth
+from posekit.recovery.objects.growth import CLOSED_RESIDUAL, EXACT, MEASURED, Tolerance, grow_best
 from posekit.recovery.objects.linkage import Linkage, name_nearer, read_nearer
 from posekit.recovery.objects.scale import CONSTRAINT_KINDS, search
 
@@ -191,7 +191,7 @@ def recover_object(
         read_nearer(linkage, hand)
     times = np.arange(len(images)) if time is None else np.asarray(time, dtype=np.float64)
     longest = float(linkage.lengths.max())
-    given = None if tolerance is None else (*tolerance, tolerance[1] / 2)
+    given = None if tolerance is None else Tolerance(*tolerance, tolerance[1] / 2)
     tables: list[tuple[Array, Array, Array]] = []
     frames: list[dict[str, Any]] = []
     for picture, hand, at in zip(images, hands, times.tolist(), strict=True):
@@ -200,7 +200,7 @@ def recover_object(
         try:
             family = LinkageFamily(linkage=linkage, image=picture, aspect=aspect)
             about["family"], chosen = _scales(family, scale, hand, given)
-            grown = Growth(family, hand).best(chosen, given, about)
+            grown = grow_best(family, chosen, hand, given, about)
         except PosekitError as error:
             about["reason"] = str(error)
         tables.append(grown)
@@ -212,7 +212,9 @@ def recover_object(
     frame = np.repeat(np.arange(len(tables)), [len(part[0]) for part in tables])
     found: dict[str, Any] = {}
     if robot is not None:
-        allowed = [2 * EXACT[0] if frames[k]["judged"] == "exact" else MEASURED[1] for k in frame.tolist()]
+        allowed = [
+            2 * EXACT.rigid if frames[k]["judged"] == "exact" else MEASURED.tangent for k in frame.tolist()
+        ]
         within = np.array(allowed) * longest * (linkage.unit or 1.0)
         found = configurations_of(robot, linkage, points, frame, within)
         order = np.lexsort((~found["certified"], frame))
@@ -236,7 +238,7 @@ def _scales(
     family: LinkageFamily,
     scale: str | float | None,
     nearer: Mapping[str, str],
-    given: tuple[float, float, float] | None,
+    given: Tolerance | None,
 ) -> tuple[dict[str, Any], Array]:
     """Find the scales (K,) of one frame, and describe them for the result."""
     linkage = family.linkage
@@ -262,7 +264,7 @@ def _scales(
             raise refusal("", "scale", "stature", "a linkage with a height", remedy)
         s = value * factor if how == "value" else value / float(linkage.height or 1.0)
         lost = (bound / s - 1) * longest
-        if lost > (given[1] if given is not None else EXACT[1] * longest):
+        if lost > (given.tangent if given else EXACT.tangent * longest):
             needs = f"at least {bound / factor:.6g}, which {family.bounding_segment} needs"
             raise refusal("", "scale", f"{value:.6g}", needs, "give more, or --scale min")
         chosen = np.array([max(s, bound)])
