@@ -147,7 +147,7 @@ def _checks(
     off = np.nan_to_num(np.maximum(most - depth, depth - least))
     across = tree[ends[:, 1]] - tree[ends[:, 0]]
     between = np.abs(across) @ off  # error of the depth between the ends of each segment
-    for k in np.flatnonzero(family.seen & ~np.isin(np.arange(len(names)), family.incidence.basis)):
+    for k in np.setdiff1d(np.flatnonzero(family.seen), family.incidence.basis).tolist():
 
         def open_loop(depths: Array, k: int = k) -> Flags:
             far = np.hypot(extent[k] + 2 * beside, np.abs(depths[:, 0]) + between[k])
@@ -157,9 +157,13 @@ def _checks(
 
         yield Check(f"closure/{names[k]}", across[[k]], open_loop)
     hand = read_nearer(linkage, nearer)
-    for k in np.flatnonzero(hand & family.seen):
-        slack = 1e-6 + between[k] * (k not in family.incidence.basis)
-        yield Check(f"nearer/{names[k]}", hand[k] * across[[k]], lambda d, slack=slack: d[:, 0] < -slack)
+    for k in np.flatnonzero(hand & family.seen).tolist():
+        slack = 1e-6 + float(between[k]) * (k not in family.incidence.basis)
+
+        def other_way(depths: Array, slack: float = slack) -> Flags:
+            return np.asarray(depths[:, 0] < -slack)
+
+        yield Check(f"nearer/{names[k]}", hand[k] * across[[k]], other_way)
     groups = [("coplanar", group, 2) for group in linkage.coplanar]
     groups += [("collinear", group, 1) for group in linkage.collinear]
     for kind, group, rank in groups:

@@ -12,7 +12,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -25,11 +24,9 @@ from posekit.recovery.objects.linkage import read_nearer
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
 
-#: Assignments of flips that are tried one by one; of more, independent blocks are searched together.
-MAX_FLIPS: Final = 1 << 15
-
-#: Assignments of one block of segments that share constraints.
-MAX_BLOCK_FLIPS: Final = 1 << 20
+#: Largest number of assignments of flips that are tried. Of independent blocks of constraints the smallest determine
+#: the scale, as many as can be; one block alone may have more assignments.
+MAX_FLIPS, MAX_BLOCK_FLIPS = 1 << 15, 1 << 20
 
 #: Distance (rad) from the right angle at which the search ends: a thousand times the bound.
 RIGHT_ANGLE: Final = 1e-3
@@ -93,7 +90,7 @@ class Minima(Record):
 
 
 class Constraints:
-    """The weighted residuals of one image, block by block of segments that share them.
+    """The weighted residuals of one image, and the assignments of flips that are tried.
 
     Parameters
     ----------
@@ -102,6 +99,17 @@ class Constraints:
         ``closure``, ``coplanar``, ``perpendicular``, ``collinear`` to a weight.
     nearer : mapping
         Flips given by hand: segment to its nearer end.
+
+    Attributes
+    ----------
+    given : int array (S,)
+        Flips given by hand; 0 where none is.
+    bounding : bool array (S,)
+        Segments that set the bound of the scale.
+    matter : list of int
+        Segments on whose flips the residual depends.
+    signs : array (K, S)
+        Assignments of flips, mirror images once.
     """
 
     def __init__(
@@ -117,7 +125,7 @@ class Constraints:
         rest = np.maximum(lengths - self.at_scale, 0.0)
         self.bounding = (rest <= AT_BOUND * lengths) & family.seen
         self.rest = np.where(self.bounding, 0.0, rest * (lengths + self.at_scale))
-        self.terms: list[tuple[float, NDArray[np.intp], Residual]] = []
+        every: list[tuple[float, NDArray[np.intp], Residual]] = []
         for kind, weight in weights.items():
             if kind not in CONSTRAINT_KINDS:
                 raise refusal("", "scale", kind, "a known constraint", nearest(kind, CONSTRAINT_KINDS))
@@ -125,8 +133,13 @@ class Constraints:
             if not found:
                 got, remedy = f"nothing of {linkage.name} to search by {kind}", "fix the scale another way"
                 raise refusal("", "scale", got, "a constraint whose points are seen", remedy)
-            self.terms += [(weight, segments, term) for segments, term in found]
-        self.blocks = self._blocks()
+            every += [(weight, segments, term) for segments, term in found]
+        self.matter: list[int] = []
+        self.signs = np.where(self.given == 0, 1.0, self.given)[None]
+        for block in sorted(_blocks([segments for _, segments, _ in every], len(lengths)), key=len):
+            if not self._add(block):
+                break
+        self.terms = [(weight, term) for weight, segments, term in every if segments[0] in self.matter]
 
     def _terms(self, kind: str, unit: float) -> list[tuple[NDArray[np.intp], Residual]]:
         """Make the residuals of one kind, each with the segments that it depends on."""
@@ -152,49 +165,29 @@ class Constraints:
                 found.append((np.flatnonzero(np.abs(spread).max(axis=0)), _flatness(spread, centred, rank)))
         return found
 
-    def _blocks(self) -> list[tuple[list[int], list[tuple[float, Residual]]]]:
-        """Group terms that share segments: the segments of each block, and its terms."""
-        from scipy.sparse.csgraph import connected_components
-
-        count = len(self.family.linkage.segments)
-        graph = np.zeros((count, count))
-        for _, segments, _ in self.terms:
-            for a, b in pairwise(segments.tolist()):
-                graph[a, b] = 1
-        _, label = connected_components(graph, directed=False)
-        matter = np.unique(np.concatenate([segments for _, segments, _ in self.terms]))
-        return [
-            (
-                [int(k) for k in matter if label[k] == block],
-                [(weight, term) for weight, segments, term in self.terms if label[segments[0]] == block],
-            )
-            for block in dict.fromkeys(label[matter].tolist())
-        ]
-
-    def assignments(self, segments: Sequence[int]) -> Array:
-        """Return the flips (K, S) of one block's segments: mirror images once, flips given by hand kept.
+    def _add(self, block: list[int]) -> bool:
+        """Add the flips of a block of segments that share constraints; tell whether they are not too many.
 
         Without flips given by hand all signs of the block can be turned round, which mirrors the posture in depth and
         changes no residual: one sign is held, of a segment that does not set the bound.
         """
-        free = [k for k in segments if self.given[k] == 0]
-        if len(free) == len(segments):
-            held = next((k for k in free if not self.bounding[k]), free[0])
-            free.remove(held)
-        if 1 << len(free) > MAX_BLOCK_FLIPS:
+        free = [k for k in block if self.given[k] == 0]
+        if len(free) == len(block):
+            free.remove(next((k for k in free if not self.bounding[k]), free[0]))
+        if len(self.signs) << len(free) > (MAX_FLIPS if self.matter else MAX_BLOCK_FLIPS):
+            if self.matter:
+                return False
             names = [self.family.linkage.segment_names[k] for k in free[:4]]
             got = f"2^{len(free)} flips of segments that share constraints"
             remedy = f"say which end is nearer for some of {', '.join(names)}, …"
             raise refusal("", "scale", got, f"at most {MAX_BLOCK_FLIPS}", remedy)
-        signs = np.tile(np.where(self.given == 0, 1.0, self.given), (1 << len(free), 1))
-        codes = np.arange(1 << len(free))
-        for bit, segment in enumerate(free):
-            signs[:, segment] = 1.0 - 2.0 * ((codes >> bit) & 1)
-        return signs
+        for k in reversed(free):
+            self.signs = np.repeat(self.signs, 2, axis=0)
+            self.signs[1::2, k] = -1.0
+        self.matter += block
+        return True
 
-    def evaluate(
-        self, signs: Array, psi: Array, terms: Sequence[tuple[float, Residual]] | None = None
-    ) -> tuple[Array, Array]:
+    def evaluate(self, signs: Array, psi: Array) -> tuple[Array, Array]:
         """Return residual and derivative of flips (..., S) at angles that broadcast to (...)."""
         sine, cosine = np.sin(psi)[..., None], np.cos(psi)[..., None]
         reach = self.at_scale * sine
@@ -203,7 +196,7 @@ class Constraints:
         slope = np.divide(reach, dZ, out=np.ones_like(dZ), where=dZ > 0) * self.at_scale * cosine
         parts = [
             (weight, term(signs * dZ, signs * slope, np.cos(psi), -np.sin(psi)))
-            for weight, term in terms or [(weight, term) for weight, _, term in self.terms]
+            for weight, term in self.terms
         ]
         return (
             np.asarray(sum(weight * value for weight, (value, _) in parts)),
@@ -244,20 +237,11 @@ def search(
         got = "all segments seen end on"
         raise refusal("", "scale", got, "an image that fixes a scale", "give the scale")
     constraints = Constraints(family, weights, nearer or {})
-    tables = [(constraints.assignments(segments), terms) for segments, terms in constraints.blocks]
-    if math.prod(len(signs) for signs, _ in tables) > MAX_FLIPS and len(tables) > 1:
-        signs, psi, envelope = _together(constraints, tables)
-    else:
-        every = tables[0][0]
-        for (segments, _), (more, _) in zip(constraints.blocks[1:], tables[1:], strict=True):
-            every = np.repeat(every, len(more), axis=0)
-            every[:, segments] = np.tile(more[:, segments], (len(every) // len(more), 1))
-        signs, psi, envelope = _one_by_one(constraints, every)
-    matter = sorted(k for segments, _ in constraints.blocks for k in segments)
+    signs, psi, envelope = _minima(constraints)
     residual, _ = constraints.evaluate(signs, psi)
     at_bound = psi <= VANISHED_ANGLE
     flips = np.zeros(signs.shape, dtype=np.int8)
-    flips[:, matter] = signs[:, matter]
+    flips[:, constraints.matter] = signs[:, constraints.matter]
     flips[np.ix_(at_bound, constraints.bounding)] = 0
     s = family.minimum_scale / np.cos(np.where(at_bound, 0.0, psi))
     exact = np.where(residual <= ZERO_RESIDUAL, 0.0, residual)
@@ -276,13 +260,21 @@ def search(
     )
 
 
-def _one_by_one(constraints: Constraints, signs: Array) -> tuple[Array, Array, Array]:
-    """Find the minima of every assignment of flips (K, S): roots of the derivative, and minima at the bound.
+def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
+    """Find the minima of every assignment of flips: roots of the derivative, and minima at the bound.
 
     Flips whose residual is zero at every scale fix none.
+
+    Returns
+    -------
+    signs, psi : array (M, S), (M,)
+        Assignment and angle of each minimum.
+    envelope : array (G,)
+        Least residual over all assignments at the angles of `GRID`.
     """
     from scipy.optimize import elementwise
 
+    signs = constraints.signs
     envelope, rows, cells, starts = np.full(len(GRID), np.inf), [], [], []
     step = max(1, CHUNK // (len(GRID) * max(1, signs.shape[1])))
     for start in range(0, len(signs), step):
@@ -313,33 +305,16 @@ def _one_by_one(constraints: Constraints, signs: Array) -> tuple[Array, Array, A
     return signs[np.concatenate([bound, row])], np.concatenate([np.zeros(len(bound)), psi]), envelope
 
 
-def _together(
-    constraints: Constraints, tables: Sequence[tuple[Array, Sequence[tuple[float, Residual]]]]
-) -> tuple[Array, Array, Array]:
-    """Find minima of the sum of the least residuals of independent blocks, where flips are too many to list."""
-    from scipy.optimize import minimize_scalar
+def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
+    """Group the segments of terms: those of different blocks share none."""
+    from scipy.sparse.csgraph import connected_components
 
-    psi = np.unique(np.concatenate([GRID, np.linspace(0.0, GRID[-1], 4000)]))
-
-    def least(at: Array) -> Array:
-        total = np.zeros(len(at))
-        for signs, terms in tables:
-            total += np.min([constraints.evaluate(one, at, terms)[0] for one in signs], axis=0)
-        return total
-
-    values = least(psi)
-    inside = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
-    found = [0.0] if values[0] < values[1] else []
-    for k in inside.tolist():
-        bounds = (psi[k - 1], psi[k + 1])
-        best = minimize_scalar(lambda x: least(np.array([x]))[0], bounds=bounds, options={"xatol": 1e-13})
-        found.append(float(best.x))
-    angles = np.array(found)
-    signs = np.tile(np.where(constraints.given == 0, 1.0, constraints.given), (len(angles), 1))
-    for (segments, _), (options, terms) in zip(constraints.blocks, tables, strict=True):
-        at = np.array([constraints.evaluate(one, angles, terms)[0] for one in options]).argmin(axis=0)
-        signs[:, segments] = options[at][:, segments]
-    return signs, angles, np.interp(GRID, psi, values)
+    graph = np.zeros((count, count))
+    for segments in terms:
+        graph[segments[0], segments] = 1
+    _, label = connected_components(graph, directed=False)
+    matter = np.unique(np.concatenate(terms))
+    return [matter[label[matter] == block].tolist() for block in dict.fromkeys(label[matter].tolist())]
 
 
 def _closure(loop: Array) -> Residual:
