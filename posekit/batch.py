@@ -37,7 +37,7 @@ Entry = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class BatchRun(Record):
-    """What a run did.
+    """Outcome of a run.
 
     Parameters
     ----------

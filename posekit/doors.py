@@ -1,4 +1,4 @@
-"""What users call with a path, an array or an object: each door opens what it is given and hands it down."""
+"""Functions that take a path, an array or an object: each opens its argument and hands it down."""
 
 from __future__ import annotations
 
@@ -304,7 +304,7 @@ def render(
     layout, urdf, rate
         As in `posekit.open`.
     view : path or View, optional
-        What a result was recovered from: its image is drawn, too.
+        View of a result: its image is drawn, too.
     frame : int or (int, int), optional
         Frame, or first and last frame, from 0.
     which : {"", "answer", "path", "all", "first"} or str

@@ -46,7 +46,7 @@ def number(
     name : str
         Name of the argument, for the error.
     expected, remedy : str
-        What the error says was expected, and what to do.
+        Words of the error: the expected value, and the remedy.
 
     Raises
     ------
@@ -108,7 +108,7 @@ PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.05, angle=10.0)
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Settings(Record):
-    """What recoveries and validations have in common.
+    """Settings that recoveries and validations share.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class Settings(Record):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RecoverSettings(Settings):
-    """What a recovery is asked: the fields of `Settings`, and these.
+    """Settings of a recovery: the fields of `Settings`, and these.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ class RecoverSettings(Settings):
     stature : float, optional
         Height of the person, metres.
     root : {"auto", "given", "head", "torso", "search"}
-        How the neck is placed: as the view gives it, from six head points, or from the body. ``search`` is ``auto``.
+        Source of the neck's place: the view, six head points, or the body. ``search`` is ``auto``.
     proportions : {"auto", "figure", "people", "taylor"}
         Relative lengths of a person whose lengths are not given: the figure's; those between the joints of people, by
         default behind key points and photographs; or, without a camera, Taylor's Table 1.
@@ -291,7 +291,7 @@ class RecoverSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ValidateSettings(Settings):
-    """What a validation is asked: the fields of `Settings`, and these.
+    """Settings of a validation: the fields of `Settings`, and these.
 
     Parameters
     ----------

@@ -14,8 +14,9 @@ A check is any object with the four members of `Check`: postures, configurations
             return Judgement(("right_ankle", "left_ankle"), height, lower=0.0, tolerance=0.01)
 
 Its docstring is the message of its findings. It may also have `points`, the names of the few points that it reads:
-the interpretation tree asks it as soon as these are placed. It may have `residuals(joints)`, numbers (N, K) of postures
-(N, 14, 3) in standard deviations, zero where nothing pulls: noisy postures are drawn toward its bounds.
+the interpretation tree asks it as soon as these are placed. It may have `residuals(joints)`: for postures
+(N, 14, 3) it returns the excess over its bounds (N, K) in standard deviations, 0 inside them. The solver then draws
+noisy postures toward the bounds.
 """
 
 from __future__ import annotations
@@ -64,12 +65,12 @@ class NotAskedError(PosekitError):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judgement(Record):
-    """What a check found in T frames at K places.
+    """Result of a check in T frames at K places.
 
     Parameters
     ----------
     places : sequence of K str
-        What was judged: an angle, a segment, a pair of bodies.
+        Judged things: an angle, a segment, a pair of bodies.
     value : array (T, K)
         The judged quantity in the check's unit; NaN where it is undecided.
     lower, upper : array broadcastable to (T, K)
@@ -77,7 +78,7 @@ class Judgement(Record):
     tolerance : array broadcastable to (T, K)
         Distance beyond a bound that is no violation.
     scale : array broadcastable to (T, K), optional
-        What one whole share of margin is, in the check's unit. By default half the range or, where it has one end, the
+        Size of one whole share of margin, in the check's unit. By default half the range or, where it has one end, the
         size of that bound.
 
     Examples

@@ -1,7 +1,7 @@
 """Joint ranges: the angles of neck, pelvis and limbs, in any of the ways in which they can be written.
 
-Limbs and pelvis are read by `posekit.solver.Limits`, the same numbers that the solver keeps to. A limb is legal if
-every angle of one way to write it is within its range and couplings.
+Limbs and pelvis are read by `posekit.solver.Limits`, the same numbers that the solver keeps to. A limb's
+orientation has several sets of Euler angles. It is legal if all angles of one set are within ranges and couplings.
 """
 
 from __future__ import annotations

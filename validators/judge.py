@@ -61,7 +61,7 @@ KNOWN: Final[dict[str, Check]] = {**POSTURE_CHECKS, **ROBOT_CHECKS, **MOTION_CHE
 
 
 class InvalidError(PosekitError, AssertionError):
-    """What was asserted to be valid is not; the message has the first reasons."""
+    """A posture that was asserted to be valid is not; the message has the first reasons."""
 
 
 def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[Check]:

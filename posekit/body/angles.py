@@ -105,7 +105,7 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Of all 22 angles. They choose among the branches; a free angle is turned into them.
+        Limits of all 22 angles. They choose among the branches; a free angle is turned into them.
     head_offsets : array (5, 3)
         From the neck to the head's points, head link's frame, metres.
     middle_pelvis : bool
@@ -240,7 +240,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     upper, lower : array (N, 3)
         Unit directions of the two segments in the parent's frame.
     limits : Limits
-        Of the four revolutes of each limb (N, 4): ball joint, then hinge.
+        Limits of the four revolutes of each limb (N, 4): ball joint, then hinge.
 
     Returns
     -------

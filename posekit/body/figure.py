@@ -253,7 +253,7 @@ class Figure(Robot):
             Whether the shoulders lie behind the line from neck to pelvis, if positions tell it
             (`shoulders_are_behind`).
         known : LengthUncertainty
-            How well the lengths are known: uncertain ones are changed more if the lengths do not close.
+            Uncertainty of the lengths: uncertain ones are changed more if the lengths do not close.
 
         Raises
         ------

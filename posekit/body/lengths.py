@@ -184,7 +184,7 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
     lengths : mapping
         Metres, by segment name.
     known : LengthUncertainty
-        How well they are known.
+        Their uncertainty.
     deviations : float
         Standard deviations of f by which it must differ from zero.
     """
@@ -213,7 +213,7 @@ def closed_lengths(
     lengths : mapping
         All 17, metres, by segment name.
     known : LengthUncertainty
-        How well each is known beside their common size. If some lengths of a part are exact, all of them count alike.
+        Uncertainty of each beside their common size. If some lengths of a part are exact, all of them count alike.
 
     Returns
     -------

@@ -5,11 +5,11 @@ The squared reprojection error is minimised over the head's pose. With the point
 
 .. math:: u = \frac{a + s\,q_{xy}}{1 + d\,q_z}, \qquad s = f \sigma / z, \quad d = \sigma / z,
 
-where :math:`a` is the image of the centre. Written so, the unknowns :math:`R, a, s, d` are each seen in the
-image and the limit of a far camera, :math:`d = 0`, is an ordinary place (the scaled orthographic projection),
-while depth and f alone would run to infinity together. With f free there are seven unknowns; with a known camera
-:math:`u` is the normalised image (f = 1), :math:`d = s`, and six; residuals are then multiplied by the camera's
-derivatives at the image points, which makes them pixels.
+where :math:`a` is the image of the centre. With the unknowns :math:`R, a, s, d` each
+can be seen in the image, and a camera at infinity is the regular point :math:`d = 0`, the scaled orthographic
+projection. With depth and f as unknowns both would run to infinity together. With f free there are seven
+unknowns. With a known camera :math:`u` is the normalised image (f = 1), :math:`d = s`, and there are six; residuals
+are then multiplied by the camera's derivatives at the image points, which makes them pixels.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ def calibrate(head: HeadPoints, image: ArrayLike, f: ArrayLike | None = None) ->
     Returns
     -------
     HeadPose
-        Of one frame, if the image is (P, 2).
+        It has no axis of frames if the image is (P, 2).
 
     Raises
     ------

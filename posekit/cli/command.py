@@ -1,4 +1,4 @@
-"""What the commands share: options made from settings, panels in the help, suggestions, and one-line messages."""
+"""Common parts of commands: options made from settings, panels in the help, suggestions, and one-line messages."""
 
 from __future__ import annotations
 

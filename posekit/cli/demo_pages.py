@@ -31,7 +31,7 @@ def write_demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     Parameters
     ----------
     folder : Path
-        Where to write; made if it is not there.
+        Folder to write to; it is made if it does not exist.
     pictures : bool
         Draw pictures and pages, which need a browser and Pillow.
 

@@ -1,4 +1,4 @@
-"""What contradicts a calibration: pictures of another size, and people who do not stand by it."""
+"""Contradictions to a calibration: pictures of another size, and people who do not stand by it."""
 
 from __future__ import annotations
 

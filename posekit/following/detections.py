@@ -227,8 +227,8 @@ class Detections(Record):
         Returns
         -------
         View
-            Of all pictures of a film, also of those without the person: frames are pictures, in number and in
-            time. Of unrelated photographs, those that show any joint of the person.
+            Of a film it has a frame for every picture, also for pictures without the person, so that numbers and
+            times are the film's. Of unrelated photographs, those that show any joint of the person.
 
         Raises
         ------

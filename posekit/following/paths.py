@@ -101,7 +101,7 @@ class Stage(NamedTuple):
     parent : int array (S,)
         End before, on the cheapest way.
     cost : array (P, S)
-        Of every step, with the survivor's own; infinite where there is none.
+        Cost of every step, with the survivor's own; infinite where there is no step.
     forward : array (S,)
         Logarithm of the sum of the likelihoods of all paths to each, but for a constant.
     """

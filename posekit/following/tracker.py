@@ -53,7 +53,7 @@ class PathPosture(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TrackedPosture(Record):
-    """What is known once a picture was seen.
+    """The answer about a picture, given the pictures so far.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def points_motion(
     source : str
         The file.
     options : Options
-        What the user states; it goes before what the file says.
+        Facts that the user states; they win over the file's.
     layout : Layout, optional
         Meaning of the names, if the reader knows it.
     time : array (T,), optional
@@ -97,7 +97,7 @@ def points_motion(
     up_by_custom : str
         Axis that points up by the format's custom.
     notes, warnings : sequence of str
-        Of the reader.
+        Notes and warnings of the reader, to which more are added.
     partial : bool
         Whether files of this format are of markers, of which some sets have no joints: these are read without joints,
         with a warning.
@@ -436,7 +436,7 @@ def times(
 
 
 def _unrounded(time: Array, stated: float | None, notes: list[str]) -> Array:
-    """Return even times (T,) if a file's are even but for rounding to at most 3 decimals, as 0.017, 0.033, 0.05."""
+    """Return even times (T,) if only rounding to at most 3 decimals makes a file's uneven: 0.017, 0.033, 0.05."""
     digits = next((d for d in range(4) if np.array_equal(np.round(time, d), time)), None)
     if digits is None or len(time) < 3 or not time[-1] > time[0]:
         return time

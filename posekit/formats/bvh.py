@@ -318,9 +318,9 @@ def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) 
 def positions_are_absolute(document: Bvh) -> bool:
     """Tell whether position channels stand in place of the offsets, or are added to them.
 
-    The notes on the format add the two; MotionBuilder, Blender and the data sets made with them (LAFAN1, Bandai-Namco)
-    write the joint's whole place into its position channels, beside the same offset. Joints below the root decide:
-    their channels stay near the offset or near zero, while a root may be anywhere.
+    The format's notes add a joint's position channels to its offset. MotionBuilder, Blender and data sets made with
+    them (LAFAN1, Bandai-Namco) write the whole position into the channels, beside the same offset. Joints below
+    the root decide: their channels stay near the offset or near zero, while a root may be anywhere.
     """
     small = SMALL_OFFSET_SHARE * float(np.abs(document.offsets).max(initial=0.0))
     votes: dict[bool, list[bool]] = {True: [], False: []}

@@ -56,7 +56,7 @@ class Rows:
     by_camera : bool
         Whether the numbers of people are those of the cameras that saw one person.
     pictures : dict
-        By label: time (s), width and height, NaN where unknown.
+        For each label: time (s), width and height, NaN where unknown.
     people : list of (str, array, int)
         Label of the picture, points, and number of the person, -1 where unknown.
     """

@@ -146,7 +146,7 @@ def placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
     root : array (T, 3)
         The pelvis in the world, y up, metres.
     angles : array (T, 21, 3)
-        Of each node against its parent (the first against the world), about x, z and y, radians.
+        Angles of each node against its parent (the first against the world), about x, z and y, radians.
     """
     W = up_turn(up or "+z")
     R_torso = W @ rotation_from_quaternion(q[:, 3:7]) @ TO_Y_UP.T

@@ -94,7 +94,7 @@ class Layout:
         Returns
         -------
         dict of array (..., D)
-            By landmark or foot point; NaN where one of the points of a mean is missing. Absent ones are left out.
+            Positions by landmark or foot point; NaN if a point of a mean is missing. Absent landmarks are left out.
         """
         column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
         found = {

@@ -170,7 +170,7 @@ def points_by_name(
     axes : int
         Coordinates of a point; 0 for a single number.
     kind : str
-        What the names are of, for errors: ``joint``.
+        Kind of thing that the names name, for errors: ``joint``.
     """
     place = {name: column for column, name in enumerate(names)}
     found = np.full((len(nodes), len(names), *([axes] if axes else [])), np.nan)
@@ -197,7 +197,7 @@ def known_points(points: Array, names: Sequence[str]) -> dict[str, Any]:
 
 @contextmanager
 def undamaged(source: str | Path, schema: str) -> Iterator[None]:
-    """Refuse a file that only programs write, if its parts do not fit together: it was cut or changed."""
+    """Refuse a file whose parts do not fit together: programs alone write it, so it was cut or changed."""
     try:
         yield
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:

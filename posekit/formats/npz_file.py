@@ -38,7 +38,7 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        By name; an unnamed array under ``""``. A pickle of one clip by its name gives the clip.
+        Arrays by name; an unnamed array is under ``""``. A pickle of one clip by its name gives the clip.
 
     Raises
     ------

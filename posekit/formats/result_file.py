@@ -32,7 +32,7 @@ EARLIER_SCHEMA: Final = "posekit.result/2"
 
 
 class Column(NamedTuple):
-    """Shape of one row's value (None for the number of frames, or of q), what says nothing, and power of length."""
+    """Shape of a row's value (None: number of frames, or size of q), its empty value, and its power of length."""
 
     shape: tuple[int | None, ...] = ()
     empty: Any = np.nan

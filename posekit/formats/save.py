@@ -46,7 +46,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
     which : {"", "answer", "path", "all", "first"}
         Postures of a recovery that files of motion get; the followed path if there is one, else the answer.
     **options
-        Of the format, such as ``unit="m"`` for BVH.
+        Options of the format, such as ``unit="m"`` for BVH.
 
     Raises
     ------

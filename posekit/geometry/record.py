@@ -13,7 +13,7 @@ from posekit.geometry.vectors import Array
 
 MAX_REPR_CHARACTERS: Final = 240
 MAX_TEXT_CHARACTERS: Final = 40
-#: Members of a sequence that a repr lists; of a longer one it gives the number.
+#: Longest sequence whose members a repr lists; a longer one is shown by its length.
 MAX_LISTED: Final = 4
 
 
@@ -39,7 +39,7 @@ class Record:
         object.__setattr__(self, name, value)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a pickle; those that are computed when they are read are computed."""
+        """Return the fields for a pickle; fields that are computed on reading are computed now."""
         return {name: getattr(self, name) for name in vars(self)}
 
 

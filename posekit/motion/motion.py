@@ -58,7 +58,7 @@ class Motion(Record):
     layout : str
         Name of the layout that gave the file's names their meaning.
     notes : sequence of str
-        What was understood of the file, one sentence each.
+        Facts that were found out about the file, one sentence each.
     warnings : sequence of str
         Contradictions in the file that a person must see, one sentence each.
     document : object, optional

@@ -78,7 +78,7 @@ def validate(
         metres, NaN where unknown; configurations (T, nq) of `urdf`; or what `posekit.open` returns. Frames in time are
         judged by the checks over time too; an array is motion if its `rate` is given.
     settings : ValidateSettings, optional
-        What decides the verdicts; of a result its own.
+        Settings that decide the verdicts; by default a result's own.
     urdf : str, path, Figure or Robot
         The body that judges, as `posekit.Validator` takes it. By default the robot that a file names, else the figure.
     layout, unit, up, rate, person
@@ -185,7 +185,7 @@ class Judge:
     Parameters
     ----------
     settings : ValidateSettings or None
-        What decides the verdicts.
+        Settings that decide the verdicts.
     urdf : str, path, Figure or Robot
         The body that judges; empty for the robot that a file names, else the figure.
     changes : mapping
@@ -392,7 +392,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     Parameters
     ----------
     report : Report
-        Of files.
+        Report about files.
     folder : path
         New or empty.
     spans : float, optional
@@ -401,7 +401,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     Returns
     -------
     str
-        How many clips were kept, in a sentence.
+        Number of clips that were kept, in a sentence.
 
     Raises
     ------

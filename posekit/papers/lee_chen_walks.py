@@ -295,7 +295,7 @@ def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
 
 
 def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], place: dict[str, Any]) -> Row:
-    """Compare the counts at the closest setting with the printed ones; a rare printed count differs."""
+    """Compare counts at the closest setting with the printed ones; a printed count that few settings reach differs."""
     theirs, cells = walks.theirs[columns], walks.cells[:, columns]
     ours = cells[chosen]
     low, high = np.percentile(cells, PERCENTILES, axis=0, method="inverted_cdf")

@@ -165,7 +165,7 @@ class Prior(Record):
         Returns
         -------
         posture, gravity : array (N,)
-            Of the posture alone, and of `up` given the posture; 0 where nothing is known.
+            Terms of the posture alone, and of `up` given the posture; 0 where nothing is known.
         """
         posture, gravity = np.zeros(len(found)), np.zeros(len(found))
         for index, (names, student, conditional) in enumerate(self.blocks):

@@ -43,7 +43,7 @@ class Up(Record):
     deviation : float
         Its standard deviation, degrees.
     source : str
-        Where it comes from, as a result states it.
+        Its origin, as a result states it.
     """
 
     direction: Array

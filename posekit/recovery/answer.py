@@ -82,12 +82,12 @@ def answers_of(
     probability : array (N,)
         Within a frame they sum to one minus `unlisted`.
     covariance : array (N, 42, 42), optional
-        Of the joints of each, square metres; None for exact postures.
+        Covariance of the joints of each posture, square metres; None for exact postures.
     lengths : array (17,)
         The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. Answers have them in the mean
         size of their survivors.
     relative : bool array (K,)
-        Where distances are measured relative to the neck: its depth is not known.
+        Whether distances are measured relative to the neck, whose depth is not known.
     unlisted : array (K,)
         Probability of postures that are not listed.
 

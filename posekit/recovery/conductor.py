@@ -98,7 +98,7 @@ def recover(
 
 
 class _Conductor:
-    """What is the same for all frames of a view: person, noise, checks, and the way up."""
+    """Facts that all frames of a view share: person, noise, checks, and the way up."""
 
     def __init__(
         self, view: View, settings: RecoverSettings, person: Figure, lengths: LengthUncertainty

@@ -34,7 +34,7 @@ class Gathering:
     ----------
     view : View
     sight : Sight
-        What the view shows.
+        The view by rows.
     person : Figure
     settings : RecoverSettings
     nearer : int array (F, 17)

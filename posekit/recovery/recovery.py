@@ -145,7 +145,7 @@ class Frames(Table):
     pictures : sequence of F str
         Names of the pictures; empty if there are none.
     camera : sequence of F mappings
-        What is known of the camera: ``f``, ``rotation``, ``position``, ``residual``, ``scale``.
+        Facts about the camera: ``f``, ``rotation``, ``position``, ``residual``, ``scale``.
     rejected : sequence of F mappings
         Rejected branches by reason (``check/place``): with the survivors of an exact frame they sum to 8192.
     levels : sequence of F sequences
@@ -157,7 +157,7 @@ class Frames(Table):
     reason : sequence of F str
         Why a frame has no survivors; empty where it has.
     root : sequence of F mappings or None
-        How the neck's depth was found: ``method``, ``estimate`` and ``deviation`` in metres.
+        Source of the neck's depth: ``method``, ``estimate`` and ``deviation`` in metres.
     judged : sequence of F str
         ``exact``, ``tolerated`` or ``noisy``.
     """
@@ -194,8 +194,8 @@ class Answer(Table):
     represented : sequence of F arrays
         Probability of each representative and of what it stands for.
     nearer : int array (F, 13)
-        Of each segment of the tree: 1 if its outer end is nearer to the camera by more than 5 cm, -1 if it is farther,
-        0 if neither; the most probable of the three.
+        For each segment of the tree the most probable of three cases: 1 if its outer end is nearer to the camera by
+        more than 5 cm, -1 if it is farther, 0 if neither.
     nearer_sure : array (F, 13)
         Probability of `nearer`; NaN where there is no answer.
     """
@@ -277,7 +277,7 @@ class Recovery(Record):
     frames : Frames
     answer : Answer
     path : Paths, optional
-        Where frames were followed.
+        Paths, if frames were followed.
     settings : mapping
         Everything that decided the result; plain numbers, strings and lists.
     tolerances : mapping

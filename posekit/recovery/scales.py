@@ -46,13 +46,13 @@ LONGEST_TOO_SHORT: Final = 0.3
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
     r"""Return a scaled orthographic problem as a camera at the usual distance d sees it, before the person's middle.
 
-    What is nearer looks larger before every real camera. A posture of depth z about the plane of the scale is seen at
+    Nearer parts look larger before every real camera. A posture of depth z about the plane of the scale is seen at
     :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
 
     Parameters
     ----------
     problem : Problem
-        Rays in metres.
+        Its image points are coordinates on the plane of the scale, metres.
     middle : array (F, 2)
         Middle of the person, metres.
     scale_deviation : array (F,)

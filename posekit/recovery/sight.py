@@ -1,4 +1,4 @@
-"""What is known before a posture is sought: the person, the noise, and where each frame's camera sees the root."""
+"""`Sight`: the person, the noise, and the root of each frame, known before a posture is sought."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ ENOUGH_HEAD_POINTS: Final = 1 + len(HEAD_POINTS)
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sight(Record):
-    """What a view shows, by row: a row is a frame, or one of the scales that a frame may have.
+    """A view by rows: a row is a frame, or one of the scales that a frame may have.
 
     Parameters
     ----------
     camera : PinholeCamera, LeeChenCamera or ScaledOrthographicCamera
-        Of all rows.
+        Camera of all rows.
     frame : int array (H,)
         Frame of each row.
     image : array (H, 14, 2)
@@ -74,7 +74,7 @@ class Sight(Record):
     may_be_exact : bool
         Whether no deviation is stated, and no detector placed the points.
     reasons, cameras, roots
-        Of each frame: why nothing can be sought, what is known of the camera, how the neck was found.
+        For each frame: the reason why nothing can be recovered, facts about the camera, and the way to the neck.
     """
 
     camera: PinholeCamera | LeeChenCamera | ScaledOrthographicCamera
@@ -289,7 +289,7 @@ def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: 
     image = view.image[frame]
     metres = (square[frame] - np.nanmean(square[frame, :6], axis=1, keepdims=True)) / scale[:, None, None]
     aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
-    # What is nearer looks larger, by the distance of the camera: more so far from the middle.
+    # Nearer parts look larger, by the distance of the camera: more so far from the middle.
     off = np.hypot(PHOTOGRAPH_OFFSETS, DISTANCE_DEVIATION * RELIEF_METRES / USUAL_DISTANCE_METRES * aside)
     root = np.zeros((len(frame), 3))
     root[:, :2] = square[frame, 0] / scale[:, None]

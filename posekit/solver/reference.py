@@ -310,13 +310,13 @@ def descend(
     start : array (N, 43)
         Joints, camera frame, metres, and the logarithm of the size.
     parts : int
-        What is free.
+        Parts of the body that are free, as bits.
     most : int
         Largest number of steps.
     hopeless : array (N,)
         A start whose chi2 is above this is given up if its step promises less than half of it.
     damping : array (N,)
-        Of the first step: `FIRST_DAMPING`, or where an earlier descent ended; infinite where none is wanted.
+        Damping of the first step: `FIRST_DAMPING`, or that of an earlier descent's end; infinite for no step.
     pull : callable, optional
         Further residuals of whole bodies.
 
@@ -373,8 +373,8 @@ def information(
 ) -> Array:
     """Return the information (N, 43, 43) on the unknowns: the matrix, and what is `known` besides the residuals.
 
-    `known` (3,) are the information on any place and on a hidden joint about its mode, one over square metres, and the
-    factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
+    `known` (3,) has three numbers: the information on the place of any joint, and of a hidden joint, both in 1/m^2; and
+    the factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
     """
     H = evaluate(problems[which], limits, x, parts).matrix
     p, joints, index = problems[which], x[:, :SIZE].reshape(-1, 14, 3), np.arange(SIZE)

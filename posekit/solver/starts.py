@@ -142,7 +142,7 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     problem : Problem
         The frames.
     frame : int array (T,)
-        Of each trunk.
+        Frame of each trunk.
     trunk : array (T, 6, 3)
         Metres.
     limb : int

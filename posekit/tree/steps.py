@@ -25,7 +25,7 @@ class Step(NamedTuple):
     Attributes
     ----------
     places : tuple of str
-        What it judges.
+        Places that it judges.
     numbers : tuple of 25 float
         Kind, limb, tolerance, the joints that are read (eight, -1 for none), and the numbers of the kind.
     limits : record, optional

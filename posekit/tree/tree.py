@@ -51,7 +51,7 @@ class Pruned(NamedTuple):
     frame, code : int array (P,)
         The branches.
     value, lower, upper : array (P,)
-        What was found there, and its bounds.
+        Values found there, and their bounds.
     """
 
     level: Ints
@@ -84,7 +84,7 @@ class Trees:
     length_residual : array (N,)
         Metres by which the worst segment is too short for its image and was taken as tangent to its ray.
     losses : Pruned
-        Of each frame in the order in which branches were pruned.
+        Pruned branches of each frame, in the order of pruning.
     reasons : tuple of (str, str)
         ``check/place`` and the unit of its values.
     candidates : tuple of Candidates

@@ -91,7 +91,7 @@ AROUND_FRAMES: Final = 4
 
 
 def needs_rate(body: Body, least: float) -> None:
-    """Refuse a body with fewer frames per second."""
+    """Refuse a body with fewer than `least` frames per second."""
     if body.rate < least:
         raise NotAskedError(f"it needs {least:g} frames per second")
 

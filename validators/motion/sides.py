@@ -137,7 +137,7 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
 
 
 def _length(straight: Array, crossed: Array, torn: float) -> float:
-    """Return a segment's length: the median as labelled or, if that scatters, the mode of all lengths.
+    """Return a segment's length: the median of the labelled lengths or, if these scatter, the mode of all lengths.
 
     The right length is half of all lengths, as labelled and crossed, whatever share of a clip is exchanged: the
     middle of the shortest interval with two fifths of them (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69,
@@ -177,7 +177,7 @@ def _continuity(joints: Array, across: Array) -> Array:
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
-    """Return the states (N,) of least energy, given energies (N, 64) and evidence of exchanges between (N - 1, 6)."""
+    """Return the states (N,) of least energy, given energies (N, 64) and evidence of exchanges (N - 1, 6)."""
     differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]

@@ -31,7 +31,7 @@ Json = dict[str, Any]
 MOST_FRAMES: Final = 20_000
 
 MOST_POSTURES: Final = 60_000
-#: Survivors in a page, and of one frame: the likeliest, and those that stand for the others.
+#: Most survivors in a page, and in one frame: the likeliest, and the representatives of the others.
 MOST_OF_FRAME: Final = 400
 
 MOST_CLIPS: Final = 300

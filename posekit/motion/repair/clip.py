@@ -54,7 +54,7 @@ class Clip:
     validator : Validator
         The judge.
     state : array (T, …)
-        Points (T, P, 3) in the order of `posekit.motion.motion.NAMES`; of a robot configurations (T, nq).
+        Points (T, P, 3) in the order of `posekit.motion.motion.NAMES`, or a robot's configurations (T, nq).
     time : array (T,)
         Seconds.
     rows : int array (T,)
@@ -110,7 +110,7 @@ class Clip:
 
     @property
     def own_rows(self) -> Ints:
-        """Frame of `motion` of each frame (T,); of an inserted one that of the frame before it."""
+        """Frame of `motion` that each frame (T,) comes from; an inserted frame has that of the frame before it."""
         return self.rows[np.maximum.accumulate(np.where(self.rows < 0, 0, np.arange(len(self))))]
 
     @property

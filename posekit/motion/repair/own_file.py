@@ -61,7 +61,7 @@ def in_own_file(
     data : bytes
         The file; empty if its container is not changed in place.
     notes : list of str
-        What could not follow the repair.
+        Contents that could not follow the repair.
     """
     groups = _groups(before, after)
     steps = [np.nan_to_num(new - old[rows]) for old, new, _ in groups]

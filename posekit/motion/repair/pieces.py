@@ -1,4 +1,4 @@
-r"""How a measured body moves as rigid pieces: torso, hips, head and eight segments, each turned about its own start.
+r"""Motion of a measured body as rigid pieces: torso, hips, head and eight segments, each turned about its own start.
 
 A point is its parent's place plus a vector of its piece: :math:`x_p = x_{parent(p)} + R_{piece(p)} b_p`. All lengths
 stay.
@@ -72,7 +72,7 @@ PIECE_OF_NAME: Final = {
 
 
 def vectors_of(points: Array) -> Array:
-    """Return the vector that ends at each point (N, P, 3); of the neck its place."""
+    """Return the vector that ends at each point (N, P, 3); for the neck, its place."""
     vectors = points.copy()
     vectors[:, 1:] -= points[:, list(PIECE_PARENTS[1:])]
     return vectors

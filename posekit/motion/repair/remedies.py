@@ -145,7 +145,7 @@ def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Take out steps of the whole body that last: between their frames there is nothing to interpolate.
+    """Undo lasting displacements of the whole body: no frames lie between to interpolate.
 
     The body goes on where it went before, and as many frames as possible stay.
     """

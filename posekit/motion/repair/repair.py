@@ -54,9 +54,9 @@ class Repaired(Record):
     motion : Motion or None
         The repaired motion, with the frames that passed as they were; None for several files.
     before, report : Report
-        What checks say of the given motion, and of the repaired one as it is read again.
+        Reports about the given motion, and about the repaired one as it is read again.
     notes : tuple of str
-        What was invented, and what is left, one sentence each.
+        Invented frames and remaining defects, one sentence each.
     data : bytes
         The repaired file with all that is the user's own; empty if the motion is written anew.
     """
