@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -134,7 +134,12 @@ class PostureJudge:
         """Return a check as steps of the compiled tree; None if it has no such form."""
         if not hasattr(check, "steps"):
             return None
-        return _steps(check, self.figure, replace(self.settings, checks=None), self.tolerance)
+        return _steps(check, self.figure, self._unnamed, self.tolerance)
+
+    @cached_property
+    def _unnamed(self) -> ValidateSettings:
+        """The settings without checks: those may be objects by which no steps can be kept."""
+        return replace(self.settings, checks=None)
 
 
 @lru_cache(maxsize=128)

@@ -22,7 +22,7 @@ import numpy as np
 
 from posekit.errors import refusal, shown
 from posekit.files import DATA
-from posekit.geometry import Array, Record, read_only
+from posekit.geometry import Array, Record, dot, read_only
 from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
 
 PRIORS: Final = DATA / "priors"
@@ -106,8 +106,10 @@ class StudentMixture(Record):
         """Return the log of the sum over the components at points (N, d)."""
         W = self.whitening[:count, :count]
         points, middles = x[:, :count] @ W.T, self.means[:, :count] @ W.T
-        squared = (points**2).sum(1)[:, None] + (middles**2).sum(1) - 2.0 * points @ middles.T
-        base = 1.0 + np.maximum(squared, 0.0) / self.dof
+        # 1 + |p - m|^2 / nu, as one product of matrices.
+        left = np.column_stack([points, dot(points, points), np.ones(len(points))])
+        right = np.column_stack([-2 * middles, np.ones(len(middles)), self.dof + dot(middles, middles)])
+        base = left @ right.T / self.dof
         power = (self.dof + count) / 2
         # Counted from the nearest component, no power vanishes.
         nearest = base.min(axis=1)

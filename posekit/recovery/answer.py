@@ -124,7 +124,7 @@ def answers_of(
         gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
         sides[own] = np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2)
     near, far = np.add.reduceat(weight[:, None, None] * sides, starts).transpose(1, 0, 2)
-    each = np.stack([1.0 - near - far, near, far])
+    each = np.stack([1.0 - near - far, near, far]).round(9)  # of equal ones the first
     known = np.isfinite(laid[:, 1:, 2] - laid[:, PARENTS[1:], 2])
     return {
         "joints": laid + np.add.reduceat(weight[:, None, None] * base, starts),

@@ -184,8 +184,9 @@ class Gathering:
         """
         view, parts = self.view, [one.columns() for one in self.survivors]
         table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        order = np.argsort(table["frame"], kind="stable")
-        table = {name: values[order] for name, values in table.items()}
+        if (np.diff(table["frame"]) < 0).any():
+            order = np.argsort(table["frame"], kind="stable")
+            table = {name: values[order] for name, values in table.items()}
         starts = np.searchsorted(table["frame"], np.arange(len(view)))
         points = with_head(table["joints"], table["head"])
         return Recovery(
