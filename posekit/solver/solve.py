@@ -10,7 +10,7 @@ from posekit.geometry import Array, Ints
 from posekit.solver import reference
 from posekit.solver.engine import descend
 from posekit.solver.limits import ENDS, MIDDLES
-from posekit.solver.modes import Modes, distinct, merged
+from posekit.solver.modes import MERGE_DISTANCE_METRES, Modes, distinct, merged
 from posekit.solver.problem import Problem
 from posekit.solver.reference import Pull
 from posekit.solver.starts import limb_starts, trunk_starts
@@ -18,7 +18,7 @@ from posekit.solver.starts import limb_starts, trunk_starts
 #: Probability with which noise alone exceeds the largest chi2 that passes.
 REJECTION_PROBABILITY: Final = 1e-3
 
-#: Steps after which trunks that approach each other are merged.
+#: Steps after which trunks, and whole bodies, that approach each other are merged.
 FIRST_STEPS: Final = 4
 
 #: Trunks none of whose joints, relative to the neck, are farther apart are one.
@@ -28,12 +28,6 @@ SAME_TRUNK_METRES: Final = 0.03
 #:
 #: Every position of a hidden joint within its limits fits: what is kept are representatives.
 SAME_LIMB_METRES: Final = np.array([0.02, 0.25, 0.45])
-
-#: Whole bodies none of whose joints, relative to the neck, are farther apart after `FIRST_STEPS` are one.
-APPROACHING_METRES: Final = 0.003
-
-#: Steps of a limb alone: it goes on together with its trunk.
-LIMB_STEPS: Final = 8
 
 #: Largest chi2 of a limb on a fixed trunk that the whole body may still meet.
 LOOSE_LIMB: Final = 300.0
@@ -149,7 +143,6 @@ def _bodies(
         row, body = row[open_[frame[row]]], body[open_[frame[row]]]
         body, value, _ = descend(problem, frame[row], body, WHOLE, hopeless=HOPELESS * passing[frame[row]])
         good = value <= 2 * HOPELESS * passing[frame[row]]
-        x = x.copy()
         x[row[good]] = body[good]
     row, body, _ = _combined(problem, frame, x, chi2, most=None)
     frame = frame[row]
@@ -158,7 +151,7 @@ def _bodies(
     # Bodies that approach each other go on as one.
     order = np.lexsort((chi2, frame))
     own = frame[order]
-    keep = np.sort(order[distinct(problem, own, own, x[order], WHOLE, APPROACHING_METRES)])
+    keep = order[distinct(problem, own, own, x[order], WHOLE, MERGE_DISTANCE_METRES, sure=True)]
     frame, hopeless = frame[keep], hopeless[keep]
     x, chi2, _ = descend(problem, frame, x[keep], WHOLE, hopeless=hopeless, damping=damping[keep])
     return frame, x, chi2
@@ -178,7 +171,7 @@ def _combined(
         on, start = limb_starts(problem, frame, trunk, limb)
         alone = x[on].copy()
         alone[:, column] = start.reshape(-1, 6)
-        alone, value, _ = descend(problem, frame[on], alone, 2 << limb, most=LIMB_STEPS)
+        alone, value, _ = descend(problem, frame[on], alone, 2 << limb)
         order = np.lexsort((value, on))
         order = order[value[order] < LOOSE_LIMB]
         on, alone, value = on[order], alone[order], value[order]
