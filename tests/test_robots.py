@@ -401,6 +401,13 @@ def test_the_order_of_configurations_does_not_matter(g1: Robot) -> None:
     assert (g1.collisions(q[order]).hit == g1.collisions(q).hit[order]).all()
 
 
+def test_a_configuration_is_judged_alike_in_any_call(g1: Robot) -> None:
+    q, validator = configurations(g1, 320, 0.2), Validator(g1)
+    together, alone = validator.check(q), validator.check(q[:8])
+    np.testing.assert_allclose(alone.worst, together.worst[:8], atol=1e-9)
+    assert (alone.ok == together.ok[:8]).all()
+
+
 def test_capsules_stand_in_for_absent_meshes() -> None:
     human = load_robot("human", bodies="capsules")
     assert {"torso_1", "hips", "right_thigh", "left_forearm"} <= set(human.body_names)

@@ -74,11 +74,12 @@ class SelfCollision:
             [isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_
         )
         self._half = self._exact * np.array([getattr(one, "halfLength", 0.0) for one in shapes])
-        boxes = [(M, *_box(one)) for M, one in zip(places, shapes, strict=True)]
-        self._axes = np.array([M.rotation @ R for M, R, *_ in boxes]).reshape(-1, 3, 3)
-        self._centre = np.array([M.act(centre) for M, _, centre, *_ in boxes]).reshape(-1, 3)
-        self._size = np.array([box[3] for box in boxes]).reshape(-1, 3)
-        radius = np.array([box[4] for box in boxes])
+        boxes = [_box(one) for one in shapes]
+        self._axes = np.array([M.rotation for M in places]).reshape(-1, 3, 3)
+        centres = [M.act(centre) for M, (centre, _, _) in zip(places, boxes, strict=True)]
+        self._centre = np.array(centres).reshape(-1, 3)
+        self._size = np.array([half for _, half, _ in boxes]).reshape(-1, 3)
+        radius = np.array([ball for _, _, ball in boxes])
         self._pair = np.full((len(bodies), len(bodies)), -1)
         for k, pair in enumerate(geometry.collisionPairs):
             self._pair[pair.first, pair.second] = k
@@ -168,36 +169,28 @@ class SelfCollision:
 
 
 def _hull(mesh: coal.BVHModelBase) -> coal.CollisionGeometry:
-    """Return the convex hull of a mesh; the mesh itself if it is flat, for which coal has no hull."""
+    """Return the convex hull of a mesh; the mesh itself if it is flat, for which coal has none."""
     vertices = np.array(mesh.vertices())
-    if np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)[-1] < FLAT * np.abs(vertices).max():
+    if np.linalg.matrix_rank(vertices - vertices.mean(axis=0), tol=FLAT * np.abs(vertices).max()) < 3:
         return mesh
     try:
         mesh.buildConvexHull(True, "Qt")
     except RuntimeError:  # of qhull
         return mesh
-    return mesh.convex or mesh
+    return mesh.convex
 
 
-def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, Array, float]:
-    """Return a box around a shape: axes (3, 3), centre, half sides; and the radius of a ball about its centre.
-
-    A mesh has the smaller one of the boxes along its own axes and along the principal axes of its vertices.
-    """
+def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, float]:
+    """Return a box along a shape's axes: centre, half sides; and the radius of a ball about its centre."""
     shape.computeLocalAABB()
-    corners = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
-    points, found = np.stack(np.meshgrid(*corners.T), axis=-1).reshape(-1, 3), [np.eye(3)]
-    if isinstance(shape, coal.ConvexBase | coal.BVHModelBase):
-        hull = isinstance(shape, coal.ConvexBase)
-        points = np.array([shape.point(k) for k in range(shape.num_points)] if hull else shape.vertices())
-        found.append(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T)
-    axes = min(found, key=lambda R: float(np.prod(np.ptp(points @ R, axis=0))))
-    low, high = (points @ axes).min(axis=0), (points @ axes).max(axis=0)
-    centre = axes @ (low + high) / 2
-    ball = float(np.linalg.norm(points - centre, axis=1).max())
+    low, high = np.ravel(shape.aabb_local.min_), np.ravel(shape.aabb_local.max_)
+    centre, half = (low + high) / 2, (high - low) / 2
     if isinstance(shape, coal.Sphere | coal.Capsule):
-        ball = float(shape.radius + getattr(shape, "halfLength", 0.0))
-    return axes, centre, (high - low) / 2, ball
+        return centre, half, float(half.max())
+    if isinstance(shape, coal.ConvexBase):
+        points = np.array([shape.point(k) for k in range(shape.num_points)])
+        return centre, half, float(np.linalg.norm(points - centre, axis=1).max())
+    return centre, half, float(np.linalg.norm(half))
 
 
 def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
