@@ -27,7 +27,7 @@ def backend() -> str:
 @cache
 def _warn_once() -> None:
     warnings.warn(
-        "posekit was installed without its compiled solver: noisy frames take about ten times as long; install a "
+        "posekit was installed without its compiled solver: noisy frames take about 20 times as long; install a "
         "C++ compiler (apt-get install g++) and reinstall posekit",
         UserWarning,
         stacklevel=4,

@@ -52,6 +52,10 @@ MOST_DAMPING: Final = 1e6
 #: Decrease of chi2 below which a start has arrived.
 PRECISION: Final = 1e-2
 
+#: Ends of the 17 segments, and the matrix (17, 14) that takes joints to segments.
+SEGMENT_STARTS, SEGMENT_ENDS = np.sort(SEGMENTS, axis=1).T
+INCIDENCE: Final = np.eye(14)[SEGMENT_ENDS] - np.eye(14)[SEGMENT_STARTS]
+
 #: Limits in their order: three of the pelvis and four a limb, then the turn of four limbs about straight joints.
 ROWS: Final = 19
 
@@ -140,29 +144,20 @@ def _image_terms(out: Normal, problems: Records, joint: Array, j: int) -> None:
 
 def _length_terms(out: Normal, problems: Records, x: Array, free: Flags, sized: Flags) -> None:
     """Add the 17 log-lengths; the curvature of a segment that turns is kept where it is positive."""
-    joints = x[:, :SIZE].reshape(-1, 14, 3)
-    for s, pair in enumerate(SEGMENTS):
-        a, b = sorted(pair)
-        if not free[b]:
-            continue
-        ends = [(b, 1.0), (a, -1.0)] if free[a] else [(b, 1.0)]
-        line, w = joints[:, b] - joints[:, a], problems["length_weight"][:, s]
-        q = dot(line, line)
-        r = w * (0.5 * np.log(q) - problems["log_length"][:, s] - x[:, SIZE])
-        t, bend = (w / q)[:, None] * line, np.maximum(w * r, 0.0) / q
-        block = t[:, :, None] * t[:, None, :] + bend[:, None, None] * np.eye(3)
-        block -= (bend / q)[:, None, None] * line[:, :, None] * line[:, None, :]
-        along = np.where(sized, w, 0.0)
-        out.chi2 += r * r
-        for i, sign in ends:
-            own = slice(3 * i, 3 * i + 3)
-            out.gradient[:, own] += sign * t * r[:, None]
-            out.matrix[:, own, SIZE] -= sign * along[:, None] * t
-            out.matrix[:, SIZE, own] -= sign * along[:, None] * t
-            for k, other in ends:
-                out.matrix[:, own, 3 * k : 3 * k + 3] += sign * other * block
-        out.gradient[:, SIZE] -= along * r
-        out.matrix[:, SIZE, SIZE] += along * along
+    some = free[SEGMENT_ENDS]
+    line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
+    q, w = dot(line, line), problems["length_weight"][:, some]
+    r = w * (0.5 * np.log(q) - problems["log_length"][:, some] - x[:, SIZE:])
+    bend = np.sqrt(np.maximum(w * r, 0.0) / q)[..., None, None]
+    across = np.eye(3) - line[..., None] * line[..., None, :] / q[..., None, None]
+    # Of each segment: its own derivative, and its turns in three directions.
+    rows = np.concatenate([(w / q)[..., None, None] * line[..., None, :], bend * across], axis=2)
+    d = np.zeros((*rows.shape[:3], WIDTH))
+    d[..., :SIZE] = np.einsum("sj,nski->nskji", INCIDENCE[some] * free, rows).reshape(*rows.shape[:3], SIZE)
+    d[:, :, 0, SIZE] = -np.where(sized[:, None], w, 0.0)
+    residual = np.zeros(rows.shape[:3])
+    residual[..., 0] = r
+    out.add(residual.reshape(len(x), -1), d.reshape(len(x), -1, WIDTH))
 
 
 def _pull(way: Array, other: Array, w: Array) -> tuple[Array, Array]:
