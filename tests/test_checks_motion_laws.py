@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -263,3 +264,20 @@ def test_frames_come_again_only_while_the_body_moves(step: float, found: bool) -
     joints += (step * np.arange(120))[:, None, None] * [1.0, 0.0, 0.0]
     joints[50:53] = joints[49]
     assert bool(len(rows_of(judged(joints), "repeated"))) is found
+
+
+@pytest.mark.parametrize(("stated", "asked"), [("0", False), ("1e9", False), ("2.0", True)])
+def test_a_velocity_of_zero_or_a_huge_one_is_no_limit(stated: str, asked: bool, tmp_path: Path) -> None:
+    path, name = tmp_path / "person.urdf", "right_elbow_flexion"
+    words = Path(posekit.__file__).with_name("urdf").joinpath("stick_figure.urdf").read_text(encoding="utf-8")
+    path.write_text(re.sub(r'velocity="[^"]*"', f'velocity="{stated}"', words), encoding="utf-8")
+    robot = posekit.load_robot(str(path))
+    q = np.tile(robot.neutral, (20, 1))
+    q[:, robot.configuration_names.index(name)] = np.linspace(0, 0.5, 20)
+    motion = Motion(q=q, robot=str(path), time=np.arange(20) / 100, up="+z")
+    report = posekit.Validator(robot, checks=["joint-velocity"]).check(motion)
+    assert ("joint-velocity" in report.not_asked) is not asked
+    if asked:
+        found = rows_of(report, "joint-velocity")
+        assert set(found.place) == {name}
+        assert found.value.to_numpy() == pytest.approx(0.5 / 19 * 100 / float(stated))

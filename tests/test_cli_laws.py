@@ -89,6 +89,20 @@ def test_only_commands_about_configurations_ask_for_a_robot(run: Any, name: str)
     assert all(option in out for option in ("--unit", "--up", "--rate")) or name in ("render", "recover")
 
 
+def test_a_line_that_cannot_be_read_ends_following_unless_it_is_to_go_on(run: Any) -> None:
+    image = posekit.open("walk.json").image[0] * 1000 + 500
+    good = json.dumps({"time": 0.0, "points": image.tolist()})
+    later = good.replace('"time": 0.0', '"time": 0.1')
+    words = ("follow", "--stdin", "--size", "1280x720", "--stature", "175cm")
+    lines = f"{good}\nno JSON\n{later}\n"
+    code, out, err = run(*words, stdin=lines)
+    assert code == 2 and len(out.splitlines()) <= 1 and "no JSON" in err
+    code, out, _ = run(*words, "--keep-going", stdin=lines)
+    answers = [json.loads(line) for line in out.splitlines()]
+    errors = [one["error"] for one in answers if "error" in one]
+    assert code == 0 and len(errors) == 1 and "no JSON" in errors[0]
+
+
 # Views
 
 

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import posekit
 from posekit.cameras import PinholeCamera
+from posekit.doors import view_of
 from posekit.robots import load_robot
 from posekit.skeleton import JOINTS, other_side
 from posekit.synthesis import random_views
@@ -110,6 +111,33 @@ def test_the_answer_is_near_its_survivor_and_its_signs_are_its_depths(found: pos
         representatives = found.answer.representatives[k]
         assert (rows.start <= representatives).all() and (representatives < rows.stop).all()
         assert (np.diff(found.answer.represented[k]) <= 1e-9).all()
+
+
+def test_exact_postures_alone_are_listed_if_points_are_not_to_be_refined(view: posekit.View) -> None:
+    exact = posekit.builtin_view("seq1")
+    as_usual = posekit.recover(exact)
+    alone = posekit.recover(exact, posekit.RecoverSettings(refine=False))
+    np.testing.assert_allclose(alone.survivors.joints, as_usual.survivors.joints)
+    image = exact.image.copy()
+    image[:, 6:] += np.random.default_rng(0).normal(
+        0, 1e-3, image[:, 6:].shape
+    )  # limbs are too long for it, or short
+    for refine, empty in ((False, True), (None, False)):
+        found = posekit.recover(replace(exact, image=image), posekit.RecoverSettings(refine=refine))
+        assert (len(found.survivors) == 0) is empty
+        assert not empty or set(found.frames.reason) == {"no posture is exact"}
+
+
+@pytest.mark.parametrize(("place", "seen"), [(-1.0, False), (0.0, True), (639.0, True), (640.0, False)])
+@pytest.mark.parametrize("confidence", [0.1, 0.9])
+def test_unsure_points_outside_the_picture_are_not_seen(place: float, seen: bool, confidence: float) -> None:
+    """The centres of the first and the last column of a picture of 640 are 0 and 639."""
+    points = np.full((1, 17, 3), 0.9)
+    points[0, :, :2] = np.random.default_rng(0).uniform(100, 400, (17, 2))
+    points[0, 9] = [place, 200.0, confidence]  # the left wrist
+    image = view_of(points, layout="coco_17", camera=CAMERA).image
+    assert bool(np.isfinite(image[0, JOINTS.index("left_wrist")]).all()) is (seen or confidence > 0.5)
+    assert np.isfinite(image[0, JOINTS.index("right_wrist")]).all()
 
 
 # Objects

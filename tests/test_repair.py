@@ -442,6 +442,8 @@ def test_a_folder_comes_back_with_the_same_names(
     assert not (target / "broken.bvh").exists()
     assert done.notes[0] == "2 of 2 files valid: 1 unchanged, 1 repaired"
     assert any("broken.bvh" in note for note in done.notes)
+    assert any(Path("sub/bad.npz").as_posix() in note for note in done.notes)
+    assert not any("good.bvh" in note for note in done.notes)
     with pytest.raises(posekit.InputError, match="new or empty folder"):
         repair(folder, target)
 
