@@ -402,9 +402,10 @@ def test_the_order_of_configurations_does_not_matter(g1: Robot) -> None:
 
 
 def test_a_configuration_is_judged_alike_in_any_call(g1: Robot) -> None:
+    """Depths agree within the tolerance of coal, which starts from the pair's query before."""
     q, validator = configurations(g1, 320, 0.2), Validator(g1)
     together, alone = validator.check(q), validator.check(q[:8])
-    np.testing.assert_allclose(alone.worst, together.worst[:8], atol=1e-9)
+    np.testing.assert_allclose(alone.worst, together.worst[:8], atol=1e-5)
     assert (alone.ok == together.ok[:8]).all()
 
 
