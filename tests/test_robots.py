@@ -97,7 +97,7 @@ def g1() -> Robot:
         (
             text(
                 *(link(f"l{k}") for k in range(300)),
-                *(joint(f"j{k}", f"l{k}", f"l{k + 1}") for k in range(299)),
+                *(joint(f"j{k}", f"l{k}", f"l{k + 1}", "fixed", "") for k in range(299)),
             ),
             "250",
         ),

@@ -19,12 +19,8 @@ from posekit.robots.urdf import Element, need, parse_xml, text_with
 Kind = Literal["collision", "visual"]
 KINDS: Final = {"collision": pin.GeometryType.COLLISION, "visual": pin.GeometryType.VISUAL}
 
-#: Bytes of one mesh; those of published robots have at most 29 MB.
-MAX_MESH_BYTES: Final = 64_000_000
 #: Bytes of all meshes of a robot: about two million triangles of STL.
 MAX_MESHES_BYTES: Final = 100_000_000
-#: Triangles of one mesh; published robots have at most 350,000.
-MAX_TRIANGLES: Final = 500_000
 #: Largest coordinate of a mesh; coal accepts NaN silently.
 MAX_COORDINATE: Final = 1e6
 #: Bytes of a line of an OBJ file; the time to triangulate a face grows with the square of its corners.
@@ -81,12 +77,8 @@ def build_bodies(
     for body in geometry.geometryObjects:
         mesh, place = body.geometry, f"link {link_of(model, body)!r}"
         if isinstance(mesh, coal.BVHModelBase):
-            got, few = f"a mesh of {mesh.num_tris:,} triangles", f"1 to {MAX_TRIANGLES:,}"
-            need(source, 0 < mesh.num_tris <= MAX_TRIANGLES, place, got, few, "simplify it")
-            ok, expected = (
-                (np.abs(mesh.vertices()) <= MAX_COORDINATE).all(),
-                f"coordinates up to {MAX_COORDINATE:,.0f}",
-            )
+            ok = mesh.num_tris > 0 and (np.abs(mesh.vertices()) <= MAX_COORDINATE).all()
+            expected = f"coordinates up to {MAX_COORDINATE:,.0f}"
             need(source, ok, place, "a mesh with other vertices", expected, "export it again")
     return geometry
 
@@ -138,8 +130,8 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
 def _check_mesh_file(path: Path) -> int:
     """Return the size of a mesh file; refuse files that would exhaust a native reader or lead it elsewhere."""
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
-    ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESH_BYTES
-    expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESH_BYTES / 1e6:.0f} MB"
+    ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
+    expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"
     check(ok, "", f"{size:,} bytes of {suffix or 'no kind'}", expected, "convert or simplify it")
     data = path.read_bytes()
     if suffix == ".stl":
@@ -156,10 +148,9 @@ def _check_mesh_file(path: Path) -> int:
         check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
     # The native reader goes by the content: any file may name a material library, which it would open.
     for library in re.findall(rb"^[ \t]*mtllib[ \t]*(.*?)\s*$", data, re.MULTILINE):
-        plain = (
-            re.fullmatch(rb"(\./)?\w[\w. -]*", library) and not (path.parent / library.decode()).is_symlink()
-        )
-        check(plain, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")
+        plain = re.fullmatch(rb"(\./)?\w[\w. -]*", library)
+        ok = plain is not None and not (path.parent / library.decode()).is_symlink()
+        check(ok, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")
     return size
 
 

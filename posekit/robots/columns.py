@@ -35,11 +35,10 @@ def mimics_of(robot: Element) -> tuple[Mimic, ...]:
     """List the mimics of a checked URDF, each after the one that its target is."""
     found: dict[str, Mimic] = {}
     for joint in robot.findall("joint"):
-        for mimic in joint.findall("mimic"):
-            if FREEDOM[joint.get("type", "")] == 1:
-                factor, offset = (numbers(mimic, *one)[0] for one in (("multiplier", "1"), ("offset", "0")))
-                name = joint.get("name", "")
-                found[name] = Mimic(name, mimic.get("joint", ""), factor, offset)
+        mimic, name = joint.find("mimic"), joint.get("name", "")
+        if mimic is not None and FREEDOM[joint.get("type", "")] == 1:
+            factor, offset = (numbers(mimic, *one)[0] for one in (("multiplier", "1"), ("offset", "0")))
+            found[name] = Mimic(name, mimic.get("joint", ""), factor, offset)
 
     def depth(mimic: Mimic) -> int:
         return 1 + depth(found[mimic.target]) if mimic.target in found else 0

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.errors import refusal
-from posekit.geometry import Array, align, rotation_between
+from posekit.geometry import Array, align, known_median, rotation_between
 from posekit.robots.urdf import SIZES, Element, numbers
 from posekit.skeleton import HIPS, JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS, TORSO
 
@@ -142,10 +142,7 @@ def _set(element: Element, attribute: str, values: Array) -> None:
 def segment_lengths(joints: Array) -> Array:
     """Return the median length of each segment of `posekit.skeleton.SEGMENTS` (17,), metres; NaN if never seen."""
     gaps = np.linalg.norm(joints[:, [a for a, _ in SEGMENTS]] - joints[:, [b for _, b in SEGMENTS]], axis=2)
-    seen = np.isfinite(gaps).any(axis=0)
-    out = np.full(len(SEGMENTS), np.nan)
-    out[seen] = np.nanmedian(gaps[:, seen], axis=0)
-    return out
+    return np.array([known_median(one) for one in gaps.T])
 
 
 def _wanted(own: Array, joints: Array, source: str) -> Array:

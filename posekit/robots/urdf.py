@@ -28,14 +28,11 @@ Element = ElementTree.Element
 MAX_BYTES: Final = 10_000_000
 #: Elements inside each other; readers recurse.
 MAX_NESTING: Final = 64
-#: Links of a robot; the largest published ones have about 150.
-MAX_LINKS: Final = 1000
 #: Links from the root to a leaf; Pinocchio's reader overflows its stack at about 5000.
 MAX_CHAIN: Final = 250
-#: Degrees of freedom; Pinocchio's data grow with their cube and have 0.3 GB at this number.
-MAX_FREEDOM: Final = 200
-#: Bodies of one kind; the largest published robots have 112.
-MAX_BODIES: Final = 500
+#: Largest numbers of parts. The largest published robots have about 150 links and 112 bodies; Pinocchio's data grow
+#: with the cube of the degrees of freedom and have 0.3 GB at 200.
+MOST: Final = {"links": 1000, "bodies": 500, "degrees of freedom": 200}
 #: Metres or radians; products of larger numbers overflow.
 MAX_NUMBER: Final = 1e6
 #: Range of the largest limit of a revolute joint (rad) that is read as degrees if two joints have it.
@@ -130,9 +127,10 @@ def check_urdf(text: str, source: str) -> Element:
             if part.tag in _KEPT and child.tag not in _KEPT[part.tag]:
                 part.remove(child)
     links, joints = robot.findall("link"), robot.findall("joint")
-    check(0 < len(links) <= MAX_LINKS, "", f"{len(links):,} links", f"1 to {MAX_LINKS}", "simplify the robot")
-    count = len(robot.findall("link/collision"))
-    check(count <= MAX_BODIES, "", f"{count:,} bodies", f"at most {MAX_BODIES}", "simplify it")
+    freedom = sum(FREEDOM.get(joint.get("type", ""), 0) for joint in joints)
+    counts = len(links), len(robot.findall("link/collision")), freedom
+    for count, (what, most) in zip(counts, MOST.items(), strict=True):
+        check(count <= most, "", f"{count:,} {what}", f"at most {most:,}", "simplify the robot")
     _check_tree(robot, check)
     for part in (*joints, *links):
         _check_numbers(part, f"{part.tag} {part.get('name')!r}", check)
@@ -235,9 +233,6 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
         got = f"a limit of {value:g} rad, and {len(large) - 1} more beyond {DEGREES[0]:g} rad"
         remedy = f"if they are degrees, write radians ({value:g} degrees are {math.radians(value):.4g} rad)"
         check(False, f"joint {name!r}", got, "limits in radians", remedy)
-    freedom = sum(FREEDOM[joint.get("type", "")] for joint in joints.values())
-    got = f"{freedom} degrees of freedom"
-    check(freedom <= MAX_FREEDOM, "", got, f"at most {MAX_FREEDOM}", "fix some joints")
 
 
 def _check_limit(joint: Element, kind: str, place: str, check: Need) -> float:
