@@ -79,9 +79,7 @@ def parse(data: bytes, source: str) -> C3d:
     if not section < start <= len(data):
         raise damaged("header", f"frames from byte {start:,}", "frames after the parameters")
     parameters = _parameters(data, section + 4, start, processor, damaged)
-    stated = parameters.get("POINT:SCALE")
-    if isinstance(stated, np.ndarray) and stated.size:
-        scale = float(stated[0])
+    scale = next(iter(_numbers(parameters, "POINT:SCALE")), scale)
     if not math.isfinite(scale) or scale == 0:
         raise damaged("POINT:SCALE", f"{scale:g}", "a finite number that is not 0")
     width = (4 * count + analogues) * (4 if scale < 0 else 2)
@@ -95,9 +93,8 @@ def parse(data: bytes, source: str) -> C3d:
     with np.errstate(invalid="ignore"):  # a NaN of the file is a missing point
         points = values[..., :3].astype(np.float64)
         points[~(values[..., 3] >= 0)] = np.nan
-    own = parameters.get("POINT:RATE")
-    rates = [float(own[0])] if isinstance(own, np.ndarray) and own.size else []
-    rate = next((one for one in (*rates, rate) if math.isfinite(one) and one > 0), math.nan)
+    rates = (*_numbers(parameters, "POINT:RATE")[:1], rate)
+    rate = next((one for one in rates if math.isfinite(one) and one > 0), math.nan)
     return C3d(points=points * scale if scale > 0 else points, rate=rate, parameters=parameters)
 
 
@@ -109,22 +106,22 @@ def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
     return (words[:, 0] << 16 | words[:, 1]).view(np.float32) / np.float32(4)
 
 
+def _numbers(parameters: dict[str, Any], name: str) -> list[float]:
+    """Return the numbers of a parameter; none if it is absent or a text."""
+    found = parameters.get(name)
+    return found.tolist() if isinstance(found, np.ndarray) else []
+
+
 def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width: int, damaged: Any) -> int:
     """Return the number of frames; a header counts to 65,535, and longer files say so in one of three other ways."""
     count = last - first + 1
     if count < 1:
         raise damaged("header", f"frames {first} to {last}", "the last not before the first")
-    stated = [
-        int(parameters[name][0])
-        for name in ("POINT:FRAMES", "POINT:LONG_FRAMES")
-        if isinstance(parameters.get(name), np.ndarray)
-        and parameters[name].size
-        and 0 <= parameters[name][0] < 2**31
-    ]
-    ends = [parameters.get(f"TRIAL:ACTUAL_{name}_FIELD") for name in ("START", "END")]
-    words = [end for end in ends if isinstance(end, np.ndarray) and end.size >= 2]
-    if len(words) == 2:
-        begin, end = (int(low + 65536 * high) for low, high in (word[:2] for word in words))
+    names = ("POINT:FRAMES", "POINT:LONG_FRAMES")
+    stated = [int(one) for name in names for one in _numbers(parameters, name)[:1] if 0 <= one < 2**31]
+    words = [_numbers(parameters, f"TRIAL:ACTUAL_{name}_FIELD")[:2] for name in ("START", "END")]
+    if min(map(len, words)) == 2:
+        begin, end = (int(low + 65536 * high) for low, high in words)
         stated.append(end - begin + 1)
     longest = max(stated, default=0)
     if longest > MAX_COUNT:
@@ -195,10 +192,8 @@ def looks_like(document: Any) -> bool:
 def read(document: C3d, path: str, options: Options) -> Motion:
     """Make a motion of a C3D file's points; analogue channels are left out, and time begins at 0."""
     count = document.points.shape[1]
-    names = document.texts("LABELS")
-    k = 2
-    while len(names) < count and (more := document.texts(f"LABELS{k}")):
-        names, k = [*names, *more], k + 1
+    labels = ("LABELS", *(f"LABELS{k}" for k in range(2, 258)))
+    names = [name for label in labels for name in document.texts(label)]
     names = [name or f"unnamed_{k}" for k, name in enumerate([*names, *[""] * count][:count], 1)]
     if len(set(names)) != len(names):
         names = [name if names.index(name) == k else f"{name}_{k}" for k, name in enumerate(names)]

@@ -60,11 +60,17 @@ def parse(data: bytes, source: str | Path) -> Any:
     if not data.strip():
         raise refusal(source, "", "an empty file", "JSON", "check how it was written")
     spelled = text(data, str(source))
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) != len(pairs):
+            twice = next(key for k, (key, _) in enumerate(pairs) if key in dict(pairs[:k]))
+            raise refusal(source, cut(twice), "the same key twice in one object", "one", "remove one")
+        return found
+
     try:
         with without_collection():
-            return json.loads(spelled, object_pairs_hook=_unique if len(data) < MAX_BY_HAND else None)
-    except _RepeatedKeyError as error:
-        raise refusal(source, str(error), "the same key twice in one object", "one", "remove one") from None
+            return json.loads(spelled, object_pairs_hook=unique if len(data) < MAX_BY_HAND else None)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno} column {error.colno}"
         rest = spelled[error.pos : error.pos + 20]
@@ -76,18 +82,6 @@ def parse(data: bytes, source: str | Path) -> Any:
         raise refusal(source, "", "values nested too deeply", "at most 900 levels", "flatten it") from None
     except ValueError as error:  # an integer of more digits than Python converts
         raise refusal(source, "", cut(str(error)), "numbers of ordinary length") from None
-
-
-class _RepeatedKeyError(Exception):
-    """Raised inside the parser, which has no file name."""
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
-        keys = [key for key, _ in pairs]
-        raise _RepeatedKeyError(cut(next(key for key in keys if keys.count(key) > 1)))
-    return found
 
 
 def write(path: str | Path, head: dict[str, Any], name: str = "", items: Iterable[Any] = ()) -> None:

@@ -49,13 +49,12 @@ class Table:
         self.lines, self.delimiter, self.source = lines, delimiter, source
         self.numbers_of_lines = list(numbers or range(1, len(lines) + 1))
         self.about: dict[str, str] = {}
-        self._columns: dict[str, Any] = {}
 
     @classmethod
     def of_columns(cls, columns: dict[str, Any], about: dict[str, str], source: str) -> Table:
         """Make a table of named arrays, as binary containers hold them."""
         table = cls([], ",", source)
-        table.about, table._columns = about, columns
+        table.about, table.columns, table.names = about, columns, tuple(columns)
         return table
 
     def parted(self, line: str) -> list[str]:
@@ -83,7 +82,7 @@ class Table:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the columns: the last row before the numbers; empty if there is none."""
-        return tuple(self._columns) or tuple(self.head[-1] if self.head else ())
+        return tuple(self.head[-1] if self.head else ())
 
     @cached_property
     def cells(self) -> list[list[str]]:
@@ -106,34 +105,33 @@ class Table:
         return rows
 
     @cached_property
+    def columns(self) -> dict[str, Any]:
+        """Cells by the name of their column; the first column of a name."""
+        columns = zip(*self.cells, strict=True) if self.cells else ([] for _ in self.names)
+        named = list(zip(self.names, columns, strict=True))
+        return dict(reversed(named))
+
+    @cached_property
     def numbers(self) -> Array:
-        """All cells as numbers (N, C), NaN where a cell holds none."""
-        if self._columns:
-            return np.stack([_floats(column) for column in self._columns.values()], axis=1)
+        """All cells of a table of text as numbers (N, C), NaN where a cell holds none."""
         return numbers([cell for row in self.cells for cell in row]).reshape(len(self.cells), -1)
 
     def column(self, name: str) -> Array:
         """Return a column as numbers (N,), NaN where a cell holds none."""
-        if self._columns:
-            return _floats(self._columns[name])
-        place = self.names.index(name)
-        return numbers([row[place] for row in self.cells])
+        values = np.asarray(self.columns[name])
+        known = values.dtype.kind in "iufb"
+        return values.astype(np.float64) if known else numbers(self.texts(name))
 
     def texts(self, name: str) -> list[str]:
         """Return a column as text."""
-        if self._columns:
-            return [str(value) for value in self._columns[name]]
-        place = self.names.index(name)
-        return [row[place] for row in self.cells]
+        return [str(value) for value in self.columns[name]]
 
     def checked(self, name: str) -> Array:
         """Return a column as numbers (N,), or refuse a cell that is neither a number nor empty."""
-        if self._columns:
+        if not self.lines:
             return self.column(name)
-        start = len(self.head)
-        return checked(
-            self.texts(name), self.source, lambda k: f"line {self.numbers_of_lines[start + k]}, {name}"
-        )
+        lines = self.numbers_of_lines[len(self.head) :]
+        return checked(self.texts(name), self.source, lambda k: f"line {lines[k]}, {name}")
 
 
 def parse(data: bytes, source: str) -> Table:
@@ -176,11 +174,6 @@ def _number(cell: str) -> float:
 
 def _is_number(cell: str) -> bool:
     return not np.isnan(_number(cell)) or cell.casefold() == "nan"
-
-
-def _floats(column: Any) -> Array:
-    values = np.asarray(column)
-    return values.astype(np.float64) if values.dtype.kind in "iufb" else numbers([str(one) for one in values])
 
 
 def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
