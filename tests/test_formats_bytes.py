@@ -304,19 +304,11 @@ def test_bodies_of_glb_are_closed_capsules_on_the_links(tmp_path: Path) -> None:
     assert sorted(ends) == sorted(capsules)
 
 
-def test_alternative_postures_of_glb_stand_side_by_side(tmp_path: Path) -> None:
-    recovery = posekit.recover(posekit.builtin_view("seq1"))
-    alternatives = recovery.motion("all")
-    posekit.save(alternatives, tmp_path / "every.glb")
-    document, numbers = gltf(tmp_path / "every.glb")
-    names = [one["name"] for one in document["nodes"]]
-    found = nodes_in_world(document, numbers, 0)
-    assert "animations" not in document and names.count("posture_1") == 1
-    expected = alternatives.rotated("+y").figure_joints
-    for k in (0, 1, len(alternatives) - 1):
-        np.testing.assert_allclose(
-            found[f"posture_{k}.left_knee"][1], expected[k, JOINTS.index("left_knee")], atol=2e-5
-        )
+@pytest.mark.parametrize("ending", [".glb", ".bvh", ".trc", ".c3d"])
+def test_alternative_postures_are_refused_by_formats_of_one_recording(tmp_path: Path, ending: str) -> None:
+    alternatives = posekit.recover(posekit.builtin_view("seq1")).motion("all")
+    with pytest.raises(posekit.InputError, match="several postures a frame"):
+        posekit.save(alternatives, tmp_path / f"every{ending}")
 
 
 def bvh_places(text: str) -> tuple[dict[str, Any], float]:

@@ -1,4 +1,4 @@
-"""GLB: the figure's bodies, standing or moving, as glTF 2.0 in one binary file. It is written, not read.
+"""GLB: the figure's body, standing or moving, as glTF 2.0 in one binary file. It is written, not read.
 
 Khronos Group, *glTF 2.0 Specification* (2021). Metres, y up, right-handed. One node a joint, with the joint's name and
 its place; the capsule of its link hangs on it. A motion is one animation with a rotation for each node that turns and a
@@ -8,7 +8,6 @@ translation for the pelvis, linear between frames. Numbers of an animation are 3
 
 from __future__ import annotations
 
-import colorsys
 import json
 import struct
 from pathlib import Path
@@ -21,19 +20,15 @@ from scipy.spatial import ConvexHull
 from posekit.errors import refusal
 from posekit.files import write_bytes
 from posekit.formats.figure_tree import NODES, TO_Y_UP, euler_rotation, figure_of, offsets, placed, rest_place
-from posekit.formats.trc import seconds
+from posekit.formats.trc import one_recording, seconds
 from posekit.geometry import Array, Ints, cross, quaternion_from_rotation
 
 if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.motion import Motion
 
-#: Postures in one file: each is a body of 21 nodes.
-MAX_BODIES: Final = 1000
 #: Colours of one body: right orange, left blue, the trunk grey.
 SIDE_COLOURS: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
-#: Turn of the hue from one body to the next, so that neighbours differ however many there are.
-GOLDEN_TURN: Final = 0.6180339887498949
 #: Corners of a capsule's rings, and rings of a half sphere: faces lie inside the capsule by under 1 % of its radius.
 RING_CORNERS, HALF_SPHERE_RINGS = 24, 6
 _FLOAT, _UINT16, _VERTICES, _INDICES = 5126, 5123, 34962, 34963
@@ -84,36 +79,25 @@ class _Glb:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write a motion as GLB: one body that moves, or a standing body for each alternative posture.
+    """Write one recording as GLB: a body that moves.
 
     Raises
     ------
     InputError
-        If the motion has no body, several recordings, or too many postures.
+        If the motion has no body, several recordings, or alternative postures of a frame.
     """
-    moving = motion.in_time or len(motion) == 1
-    if moving and len(np.unique(np.asarray(motion.clip))) > 1:
-        raise refusal(path, "", "several recordings", "one for GLB", "choose one")
-    if not moving and len(motion) > MAX_BODIES:
-        raise refusal(path, "", f"{len(motion)} postures", f"at most {MAX_BODIES}", "choose fewer")
+    if motion.joints is not None:
+        one_recording(motion, "GLB")
     figure, q = figure_of(motion)
     root, angles = placed(figure, q, motion.up)
     glb = _Glb()
     origin = np.round((root.min(axis=0) + root.max(axis=0)) / 2)
-    world = glb.append("nodes", {"name": "origin", "translation": (origin + 0.0).tolist(), "children": []})
+    world = glb.append("nodes", {"name": "origin", "translation": (origin + 0.0).tolist(), "children": [1]})
     glb.document["scenes"][0]["nodes"] = [world]
-    turns, away, shapes, steps = _turns(angles), root - origin, _shapes(glb, figure), offsets(figure)
-    if moving:
-        colours = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
-        used = {link: colours[link.split("_")[0] if "_" in link else ""] for link in shapes}
-        first = _body(glb, world, steps, away[0], turns[0], shapes, used)
-        if len(q) > 1:
-            _animate(glb, path, first, away, turns, seconds(motion))
-    else:
-        for k in range(len(q)):
-            rgb = colorsys.hsv_to_rgb((0.58 + GOLDEN_TURN * k) % 1.0, 0.65, 0.85)
-            used = dict.fromkeys(shapes, _material(glb, f"posture_{k}", rgb))
-            _body(glb, world, steps, away[k], turns[k], shapes, used, f"posture_{k}")
+    turns, away = _turns(angles), root - origin
+    _body(glb, figure, away[0], turns[0])
+    if len(q) > 1:
+        _animate(glb, path, away, turns, seconds(motion))
     write_bytes(path, glb.packed())
 
 
@@ -149,36 +133,25 @@ def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
     return shapes
 
 
-def _body(
-    glb: _Glb,
-    world: int,
-    steps: Array,
-    root: Array,
-    turns: Array,
-    shapes: dict[str, dict[str, Any]],
-    materials: dict[str, int],
-    label: str = "",
-) -> int:
-    """Add a body's nodes under the world and return the first; those of a named body hang on a node of that name."""
-    nodes = glb.document["nodes"]
-    if label:
-        nodes[world]["children"].append(len(nodes))
-        world = glb.append("nodes", {"name": label, "children": []})
-    first = len(nodes)
+def _body(glb: _Glb, figure: Figure, root: Array, turns: Array) -> None:
+    """Add the nodes of the body after that of the world, parents first."""
+    nodes, shapes, steps = glb.document["nodes"], _shapes(glb, figure), offsets(figure)
+    colours = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
     for k, node in enumerate(NODES):
-        entry: dict[str, Any] = {"name": f"{label}.{node.name}" if label else node.name}
-        entry["translation"] = ((root if node.parent < 0 else steps[k]) + 0.0).tolist()
+        place = root if node.parent < 0 else steps[k]
+        entry: dict[str, Any] = {"name": node.name, "translation": (place + 0.0).tolist()}
         if node.link:
             entry["rotation"] = turns[k].tolist()
         if node.link in shapes:
-            primitive = {**shapes[node.link], "material": materials[node.link]}
-            entry["mesh"] = glb.append("meshes", {"name": entry["name"], "primitives": [primitive]})
-        parent = world if node.parent < 0 else first + node.parent
-        nodes[parent].setdefault("children", []).append(glb.append("nodes", entry))
-    return first
+            side = node.link.split("_")[0] if "_" in node.link else ""
+            primitive = {**shapes[node.link], "material": colours[side]}
+            entry["mesh"] = glb.append("meshes", {"name": node.name, "primitives": [primitive]})
+        index = glb.append("nodes", entry)
+        if node.parent >= 0:
+            nodes[1 + node.parent].setdefault("children", []).append(index)
 
 
-def _animate(glb: _Glb, path: str | Path, first: int, away: Array, turns: Array, time: Array) -> None:
+def _animate(glb: _Glb, path: str | Path, away: Array, turns: Array, time: Array) -> None:
     """Add the key frames of a body."""
     keys = (time - time[0]).astype(np.float32)
     if not (np.diff(keys) > 0).all():
@@ -190,7 +163,7 @@ def _animate(glb: _Glb, path: str | Path, first: int, away: Array, turns: Array,
     channels, samplers = [], []
     for k, what, values in tracks:
         samplers.append({"input": inputs, "interpolation": "LINEAR", "output": glb.accessor(values)})
-        channels.append({"sampler": len(samplers) - 1, "target": {"node": first + k, "path": what}})
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": 1 + k, "path": what}})
     glb.append("animations", {"name": "motion", "channels": channels, "samplers": samplers})
 
 
