@@ -14,9 +14,6 @@ from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints, up_vecto
 from posekit.motion import Motion
 from posekit.skeleton import JOINT, JOINTS, SIDES
 
-#: Sentences, to which functions add theirs.
-Lines = list[str]
-
 #: Metres in each unit that can be stated.
 METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 #: Words for units in files, in lower case.
@@ -67,8 +64,6 @@ def points_motion(
     metres: float | None = None,
     up: str = "",
     up_by_custom: str = "",
-    notes: Sequence[str] = (),
-    warnings: Sequence[str] = (),
     partial: bool = False,
     **fields: Any,
 ) -> Motion:
@@ -83,7 +78,7 @@ def points_motion(
     source : str
         The file.
     options : Options
-        Facts that the user states; they win over the file's.
+        Facts that the user states, which win over the file's; remarks are added to it.
     layout : Layout, optional
         Meaning of the names, if the reader knows it.
     time : array (T,), optional
@@ -96,8 +91,6 @@ def points_motion(
         Metres in the file's unit, if the reader has found it.
     up_by_custom : str
         Axis that points up by the format's custom.
-    notes, warnings : sequence of str
-        Notes and warnings of the reader, to which more are added.
     partial : bool
         Whether files of this format are of markers, of which some sets have no joints: these are read without joints,
         with a warning.
@@ -109,48 +102,42 @@ def points_motion(
     InputError
         If no layout fits, or a stated fact is wrong.
     """
-    notes, warnings = list(notes), list(warnings)
     points = np.array(points, dtype=np.float64)
     if points.ndim != 3 or points.shape[2] != 3 or not len(points):
         raise refusal(source, "points", f"shape {points.shape}", "frames x points x 3", "check the file")
-    layout = _layout_of(points, names, source, options, layout, notes, warnings if partial else None)
+    layout = _layout_of(points, names, source, options, layout, partial)
     if not names:
         points, names = points[:, : len(layout.points)], layout.points
-    _mark_missing(points, names, layout, notes)
+    _mark_missing(points, names, layout, options)
     placed, joints, derived = layout.place(names, points)
     if layout.name and not set(placed) & set(JOINTS):
         expected = f"some of {', '.join(part for parts in layout.sources.values() for part in parts)[:200]}"
         raise refusal(source, "points", f"no point of {layout.name}", expected, "choose another layout")
     if derived:
-        notes.append(f"{' and '.join(derived)} placed from shoulders and hips")
-    missing = [limb for limb in LIMBS if limb not in placed]
+        options.note(f"{' and '.join(derived)} placed from shoulders and hips")
+    missing = ", ".join(limb for limb in LIMBS if limb not in placed)
     if missing and layout.name:
-        warnings.append(f"{', '.join(missing)} are not in the file: what needs them stays undecided")
+        options.warn(f"{missing} are not in the file: what needs them stays undecided")
     body = _tree(placed, joints)
     _check_depth(_tree(placed, joints, without=derived), source)
     unit = options.unit or unit or layout.fields.get("unit", "")
     if metres is None:
-        unit, metres = body_unit(body, unit, notes, warnings)
+        unit, metres = body_unit(body, unit, options)
     joints, body = joints * metres, body * metres
     clip, frame = fields.get("clip"), fields.get("frame")
     stated = options.up or up or layout.fields.get("up", "")
-    up = body_up(body, clip, stated, up_by_custom, notes, warnings)
-    time = times(len(points), time, rate, options, notes, warnings, clip, frame)
+    up = body_up(body, clip, stated, up_by_custom, options)
+    time = times(len(points), time, rate, options, clip, frame)
     fields.setdefault("in_world", not _is_rooted(body))
     if not fields["in_world"]:
-        notes.append("every frame is relative to its own hips: nothing is known of the ground and of travel")
-    fields |= {"source": source, "layout": layout.name, "notes": notes, "warnings": warnings}
+        remark = "every frame is relative to its own hips: nothing is known of the ground and of travel"
+        options.note(remark)
+    fields |= {"source": source, "layout": layout.name, "notes": options.notes, "warnings": options.warnings}
     return Motion(joints=joints, joint_names=placed, time=time, up=up, unit=unit, **fields)
 
 
 def _layout_of(
-    points: Array,
-    names: Sequence[str],
-    source: str,
-    options: Options,
-    layout: Layout | None,
-    notes: list[str],
-    warnings: list[str] | None,
+    points: Array, names: Sequence[str], source: str, options: Options, layout: Layout | None, partial: bool
 ) -> Layout:
     """Return the stated layout, or the one that names or points fit; an empty one for markers without joints."""
     if options.layout:
@@ -158,14 +145,15 @@ def _layout_of(
         if layout.kind != "points":
             raise refusal(source, "layout", shown(layout.name), "a layout of points", "choose another layout")
     if layout is None and not names:
-        layout = unnamed(points, source, notes)
+        layout = unnamed(points, source, options)
     if layout is None:
         try:
             return by_names(names, source)
         except InputError as error:
-            if warnings is None:
+            if not partial:
                 raise
-            warnings.append(f"no joints among {len(names)} markers: {str(error).partition('got ')[2]}")
+            why = str(error).partition("got ")[2]
+            options.warn(f"no joints among {len(names)} markers: {why}")
             return Layout(name="", points=tuple(names))
     if not names and not 0 < len(layout.points) <= points.shape[1]:
         got = f"{points.shape[1]} points without names"
@@ -174,7 +162,7 @@ def _layout_of(
     return layout
 
 
-def unnamed(points: Array, source: str, notes: list[str]) -> Layout:
+def unnamed(points: Array, source: str, options: Options) -> Layout:
     """Find the layout of points (T, P, 3) without names, by their number and by how the body hangs together.
 
     Raises
@@ -185,7 +173,7 @@ def unnamed(points: Array, source: str, notes: list[str]) -> Layout:
     candidates = by_order(points.shape[1])
     fits = [one for one in candidates if _misfit(one, points) < 1.0]
     if len(candidates) == 1 and not fits:
-        notes.append(f"points are in the order of {candidates[0].name}, which has {points.shape[1]}")
+        options.note(f"points are in the order of {candidates[0].name}, which has {points.shape[1]}")
         return candidates[0]
     if not fits:
         counts = sorted({(len(one.points), one.name) for k in range(1, 200) for one in by_order(k)})
@@ -196,7 +184,7 @@ def unnamed(points: Array, source: str, notes: list[str]) -> Layout:
         remedy = f"name their order with --layout {named or 'NAME'}, or a TOML file of your own"
         raise refusal(source, "points", got, named or f"as many as {known}", remedy)
     layout = min(fits, key=lambda one: _misfit(one, points))
-    notes.append(f"points are in the order of {layout.name}: so the body hangs together")
+    options.note(f"points are in the order of {layout.name}: so the body hangs together")
     return layout
 
 
@@ -228,7 +216,7 @@ def _apart(a: Array, b: Array) -> float:
     return float(np.median(distance)) if len(distance) else float("nan")
 
 
-def _mark_missing(points: Array, names: Sequence[str], layout: Layout, notes: list[str]) -> None:
+def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: Options) -> None:
     """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing one.
 
     A point whose three coordinates are the same number in some frames and others in the rest is missing there: zeros,
@@ -250,7 +238,7 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, notes: li
         if gone.any():
             points[gone, k] = np.nan
             written = ", ".join(f"{value:g}" for value in sentinels)
-            notes.append(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames: {written}")
+            options.note(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames: {written}")
 
 
 def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> Array:
@@ -284,7 +272,7 @@ def stature(body: Array) -> float:
     return float(np.median(found)) if found else float("nan")
 
 
-def body_unit(body: Array, stated: str, notes: Lines, warnings: Lines) -> tuple[str, float]:
+def body_unit(body: Array, stated: str, options: Options) -> tuple[str, float]:
     """Find the unit of joints (T, 14, 3): the stated one, unless a body has its size only in another.
 
     Returns
@@ -308,12 +296,12 @@ def body_unit(body: Array, stated: str, notes: Lines, warnings: Lines) -> tuple[
         found = fitting[0]
         finding = f"lengths are in {found}: a body is {size * METRES[found]:.2f} m tall by its limbs"
         if stated:
-            warnings.append(f"{finding}; in {stated}, as stated, it would be {size * metres:.3g} m")
+            options.warn(f"{finding}; in {stated}, as stated, it would be {size * metres:.3g} m")
         else:
-            notes.append(finding)
+            options.note(finding)
         return found, METRES[found]
     basis = f"in {stated}, as stated" if stated else "in metres"
-    warnings.append(f"a body is {size * metres:.3g} m tall by its limbs {basis}: check the unit (--unit)")
+    options.warn(f"a body is {size * metres:.3g} m tall by its limbs {basis}: check the unit (--unit)")
     return stated or "m", metres
 
 
@@ -333,7 +321,7 @@ def stands_along(body: Array) -> str:
     return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}" if abs(mean[axis]) >= CLEAR_UP_SHARE else ""
 
 
-def body_up(body: Array, clip: Ints | None, stated: str, custom: str, notes: Lines, warnings: Lines) -> str:
+def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: Options) -> str:
     """Find the axis that points up of joints (T, 14, 3): the stated one, else how bodies stand, the ground, the custom.
 
     A stated axis that bodies contradict stays, with a warning; so does one found that points against the custom.
@@ -346,27 +334,27 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, notes: Lin
         level = bool(stands) and rise[stated] < FLAT_METRES and rise[stands] > STEEP_METRES
         if stands and stands != stated and not level:
             how = "upside down" if stands[1] == stated[1] else "lying"
-            warnings.append(
+            options.warn(
                 f"the person is {how} in most frames if {stated} is up, as stated: bodies stand along {stands} (--up)"
             )
         return stated
     if stands and not (rise[stands] > STEEP_METRES and min(rise.values()) < FLAT_METRES):
         finding = f"{stands} is up by how bodies stand"
         if custom and stands != custom:
-            warnings.append(f"{finding}, against {custom} by custom: if people lie, state the axis (--up)")
+            options.warn(f"{finding}, against {custom} by custom: if people lie, state the axis (--up)")
         elif stands[0] == "-":
-            warnings.append(f"{finding}: the head is below the feet along +{stands[1]}")
+            options.warn(f"{finding}: the head is below the feet along +{stands[1]}")
         elif stands != custom:
-            notes.append(finding)
+            options.note(finding)
         return stands
     best = min(UP_AXES, key=lambda name: rise[name])
     others = min(rise[name] for name in UP_AXES if name[1] != best[1])
     if rise[best] < FLAT_METRES and CLEAR_RATIO * rise[best] < others:
         best = custom if custom[1:] == best[1] else f"+{best[1]}"
-        notes.append(f"{best} is up by the ground: the lowest joint stays level along it")
+        options.note(f"{best} is up by the ground: the lowest joint stays level along it")
         return best
     if not custom:
-        notes.append("which axis is up is not known: nobody stands, and no ground is level (--up)")
+        options.note("which axis is up is not known: nobody stands, and no ground is level (--up)")
     return custom
 
 
@@ -399,14 +387,12 @@ def times(
     time: Array | None,
     rate: float | None,
     options: Options,
-    notes: list[str],
-    warnings: list[str],
     clip: Ints | None = None,
     frame: Ints | None = None,
 ) -> Array | None:
     """Return seconds of each frame: the file's times, else the user's rate or the file's; None if none is known.
 
-    Contradictions between times and rates are added to `warnings`. Rows of one frame are alternative postures.
+    Contradictions between times and rates are added to the warnings. Rows of one frame are alternative postures.
     """
     stated = rate if rate is not None and 0 < rate < np.inf else None
     clip = np.zeros(frames, dtype=np.intp) if clip is None else clip
@@ -417,25 +403,25 @@ def times(
         for given, whose in ((stated, "the file's rate"), (options.rate, "--rate")):
             if given and step and abs(step * given - 1) > RATE_DISAGREES:
                 contradiction = f"times are {step:.4g} s apart and contradict {whose} {given:g} a second"
-                warnings.append(f"{contradiction}: times are kept")
+                options.warn(f"{contradiction}: times are kept")
         if step or not len(steps) or not (stated or options.rate):
             if (steps <= 0).any():
-                warnings.append(f"times stand still or go back at {(steps <= 0).sum()} of {len(steps)} steps")
-            return _unrounded(time, stated, notes) if counted.all() else time
-        warnings.append("times stand still: the rate is used instead")
+                options.warn(f"times stand still or go back at {(steps <= 0).sum()} of {len(steps)} steps")
+            return _unrounded(time, stated, options) if counted.all() else time
+        options.warn("times stand still: the rate is used instead")
     if stated and options.rate and abs(stated / options.rate - 1) > 1e-6:
-        warnings.append(f"--rate {options.rate:g} is used in place of the file's {stated:g} a second")
+        options.warn(f"--rate {options.rate:g} is used in place of the file's {stated:g} a second")
     used = options.rate or stated
     if used is None:
         if frames > 1:
-            notes.append("the file says no times and no rate above 0 (--rate)")
+            options.note("the file says no times and no rate above 0 (--rate)")
         return None
     first = np.concatenate([[True], np.diff(clip) != 0])
     number = np.arange(frames) - np.flatnonzero(first)[np.cumsum(first) - 1]
     return np.asarray((number if frame is None else frame) / used)
 
 
-def _unrounded(time: Array, stated: float | None, notes: list[str]) -> Array:
+def _unrounded(time: Array, stated: float | None, options: Options) -> Array:
     """Return even times (T,) if only rounding to at most 3 decimals makes a file's uneven: 0.017, 0.033, 0.05."""
     digits = next((d for d in range(4) if np.array_equal(np.round(time, d), time)), None)
     if digits is None or len(time) < 3 or not time[-1] > time[0]:
@@ -445,6 +431,6 @@ def _unrounded(time: Array, stated: float | None, notes: list[str]) -> Array:
         even = time[0] + np.arange(len(time)) / (rate or np.nan)
         if np.abs(even - time).max() <= 0.51 * 10.0**-digits:
             if np.abs(even - time).max() > 1e-9:
-                notes.append(f"times are rounded to {digits} decimals: even steps of 1/{rate:g} s are used")
+                options.note(f"times are rounded to {digits} decimals: even steps of 1/{rate:g} s are used")
             return np.asarray(even)
     return time

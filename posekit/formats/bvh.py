@@ -226,11 +226,14 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
     points = world_points(document, absolute=absolute)
     frames = len(document.values)
     counted = f"Frames is {document.frames}, but the file has {frames}: it may be cut off"
-    notes = ["position channels stand in place of the offsets"] if absolute and _moves(document) else []
+    if absolute and _moves(document):
+        options.note("position channels stand in place of the offsets")
+    if frames != document.frames:
+        options.warn(counted)
     if options.unit:
         unit, metres = options.unit, METRES.get(options.unit)
     else:
-        unit, metres = _unit(document, points, path, notes)
+        unit, metres = _unit(document, points, path, options)
     kept = [k for k, site in enumerate(document.sites) if not site or document.offsets[k].any()]
     return points_motion(
         points[:, kept],
@@ -241,8 +244,6 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
         metres=metres,
         rate=1.0 / document.frame_time,
         up_by_custom="+y",
-        notes=notes,
-        warnings=[counted] if frames != document.frames else [],
         document=document,
         in_world=True,
     )
@@ -336,7 +337,7 @@ def positions_are_absolute(document: Bvh) -> bool:
     return bool(decisive) and 2 * sum(decisive) >= len(decisive)
 
 
-def _unit(document: Bvh, points: Array, source: str, notes: list[str]) -> tuple[str, float]:
+def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[str, float]:
     """Find the unit by the longest chain of bones, which no posture changes."""
     length = _longest_chain(points[:: max(1, len(points) // FRAMES_SAMPLED)], document.parents)
     unit = min(UNITS, key=lambda name: abs(np.log(max(length * UNITS[name] / CHAIN_METRES, 1e-300))))
@@ -345,7 +346,7 @@ def _unit(document: Bvh, points: Array, source: str, notes: list[str]) -> tuple[
         got = f"a skeleton whose longest chain of bones has {length:.4g} units"
         raise refusal(source, "unit", got, f"{CHAIN_METRES:g} m in {', '.join(UNITS)}", "state it (--unit)")
     words = "CMU's unit (an inch over 0.45)" if unit == "0.45 in" else unit
-    notes.append(f"lengths are in {words}: the longest chain of bones has {length:.4g} units, {metres:.2f} m")
+    options.note(f"lengths are in {words}: the longest chain of bones has {length:.4g} units, {metres:.2f} m")
     return unit, UNITS[unit]
 
 

@@ -199,6 +199,8 @@ def read(document: C3d, path: str, options: Options) -> Motion:
         names = [name if names.index(name) == k else f"{name}_{k}" for k, name in enumerate(names)]
     word = next(iter(document.texts("UNITS")), "")
     unit = UNIT_WORDS.get(word.casefold(), "")
+    if word and not unit:
+        options.note(f"POINT:UNITS {shown(word)} is not known")
     up = next(iter(document.texts("Y_SCREEN")), "").casefold()
     up = f"+{up}" if f"+{up}" in UP_AXES else up
     return points_motion(
@@ -209,7 +211,6 @@ def read(document: C3d, path: str, options: Options) -> Motion:
         rate=document.rate,
         unit=unit,
         up=up if up in UP_AXES else "",
-        notes=[f"POINT:UNITS {shown(word)} is not known"] if word and not unit else [],
         partial=True,
     )
 

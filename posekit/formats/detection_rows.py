@@ -141,20 +141,19 @@ def detections_of(rows: Rows, options: Options) -> Detections:
     elif (rows.names or options.layout) and values.shape[1] != width:
         got = f"{values.shape[1]} points a person"
         raise refusal(rows.source, "points", got, f"{width} of {layout.name}", "change it")
-    notes: list[str] = []
-    names, placed, derived = layout.seen(rows.names, _in_pixels(rows, held, values[..., :2], notes))
+    names, placed, derived = layout.seen(rows.names, _in_pixels(rows, held, values[..., :2], options))
     confidence = layout.seen(rows.names, values[..., 2:])[1][..., 0]
     sizes = {size[1:] for size in rows.pictures.values()}
     size = sizes.pop() if len(sizes) == 1 else UNKNOWN
-    film, place = _places(rows, held, placed, notes)
+    film, place = _places(rows, held, placed, options)
     frame = np.array([place[label] for label in held], dtype=np.intp)
     order = np.argsort(frame, kind="stable")
     pictures = [""] * (max(place.values(), default=-1) + 1)
     stamps = np.full(len(pictures), np.nan)
     for label, index in place.items():
         pictures[index], stamps[index] = label, rows.pictures[label][0]
-    time, warnings = _times(stamps, film, options, notes)
-    notes.append(f"{len(placed)} detections in {len(place)} pictures, {rows.kind}, {layout.name}")
+    time = _times(stamps, film, options)
+    options.note(f"{len(placed)} detections in {len(place)} pictures, {rows.kind}, {layout.name}")
     found = Detections(
         points=placed[order],
         confidence=confidence[order],
@@ -169,14 +168,14 @@ def detections_of(rows: Rows, options: Options) -> Detections:
         by_camera=rows.by_camera,
         layout=layout.name,
         source=rows.source,
-        notes=tuple(notes),
-        warnings=tuple(warnings),
+        notes=tuple(options.notes),
+        warnings=tuple(options.warnings),
         derived=derived,
     )
     if film and len(np.unique(found.frame)) < len(found) <= MOST_TRACKED:
         numbers, counts = np.unique(found.people(), return_counts=True)
         listed = ", ".join(f"{who} in {n}" for who, n in zip(numbers[:MOST_LISTED], counts, strict=False))
-        found = replace(found, notes=(f"people by number, and their pictures: {listed}", *notes))
+        found = replace(found, notes=(f"people by number, and their pictures: {listed}", *options.notes))
     return found
 
 
@@ -219,7 +218,7 @@ def _head_share(points: Array, layout: Layout) -> float:
     return float(np.median(small / np.maximum(whole, 1e-9)))
 
 
-def _in_pixels(rows: Rows, held: list[str], points: Array, notes: list[str]) -> Array:
+def _in_pixels(rows: Rows, held: list[str], points: Array, options: Options) -> Array:
     """Turn fractions of the picture into pixels where its size is known; leave them where it is not."""
     known = points[~np.isnan(points[..., 0])]
     if rows.kind == "openpose" and len(known) and np.abs(known).max() <= 1 and known.min() < 0:
@@ -228,12 +227,12 @@ def _in_pixels(rows: Rows, held: list[str], points: Array, notes: list[str]) -> 
         return points
     sizes = np.array([rows.pictures[label][1:] for label in held])
     if np.isnan(sizes).any():
-        notes.append("points are fractions of the picture, whose size the file does not have")
+        options.note("points are fractions of the picture, whose size the file does not have")
         return points
     return np.asarray(points * sizes[:, None])
 
 
-def _places(rows: Rows, held: list[str], points: Array, notes: list[str]) -> tuple[bool, dict[str, int]]:
+def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tuple[bool, dict[str, int]]:
     """Tell whether the pictures are of a film, and give each its frame; left-out pictures keep their place."""
     labels = list(rows.pictures)
     numbers = _numbers(rows, labels)
@@ -256,9 +255,9 @@ def _places(rows: Rows, held: list[str], points: Array, notes: list[str]) -> tup
     if not film or int(place.max()) + 1 > MOST_SPREAD * len(labels):
         place = np.argsort(np.argsort(numbers, kind="stable"))
     if step > 1 and film:
-        notes.append(f"pictures are numbered in steps of {step}")
+        options.note(f"pictures are numbered in steps of {step}")
     if not film and len(labels) > 1:
-        notes.append("pictures are unrelated photographs: people are not followed through them")
+        options.note("pictures are unrelated photographs: people are not followed through them")
     return film, dict(zip(labels, map(int, place), strict=True))
 
 
@@ -293,22 +292,23 @@ def _moves_little(frame: Ints, points: Array) -> bool:
     return not moved or float(np.median(moved)) <= FILM_MOTION
 
 
-def _times(stated: Array, film: bool, options: Options, notes: list[str]) -> tuple[Array | None, list[str]]:
+def _times(stated: Array, film: bool, options: Options) -> Array | None:
     """Return the times of all pictures (F,), those left out put between the others; None if the file has none."""
     known = np.isfinite(stated)
     if not known.any() or not film:
         if film and options.rate is None and len(stated) > 1:
-            notes.append("the frame rate is not known; give it with --rate")
-        return None, []
+            options.note("the frame rate is not known; give it with --rate")
+        return None
     steps = np.diff(stated[known]) / np.diff(np.flatnonzero(known))
     time = stated.copy()
     if len(steps) and float(np.median(steps)) > 2:  # a "timestamp" in milliseconds
         time, steps = time * 1e-3, steps * 1e-3
     if (steps <= 0).any():
-        return None, ["times of the pictures do not ascend: they are not used"]
+        options.warn("times of the pictures do not ascend: they are not used")
+        return None
     time = np.interp(np.arange(len(time)), np.flatnonzero(known), time[known]) - time[known][0]
     rate = 1 / float(np.median(steps)) if len(steps) else None
     if rate and options.rate and abs(rate / options.rate - 1) > 0.05:
         contradiction = f"the file's times are {rate:.3g} frames a second, not {options.rate:g}"
-        return time, [f"{contradiction}: its times are used"]
-    return time, []
+        options.warn(f"{contradiction}: its times are used")
+    return np.asarray(time)

@@ -74,7 +74,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
         return _read_table(document, path, options)
     key = _key(document)
     points = _shaped(document.get(key), path, key or "")
-    frames, notes = len(points), []
+    frames = len(points)
     names = tuple(str(one) for one in np.ravel(next((document[n] for n in NAMES if n in document), ())))
     if names and len(names) != points.shape[1]:
         got = f"{len(names)} names"
@@ -87,7 +87,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     fields: dict[str, Any] = {"clips": tuple(str(one) for one in np.ravel(document.get("clip_names", ())))}
     fields |= _counts(document, frames, len(fields["clips"]) or frames, path)
     if "pred_cam_t" in document:  # SAM 3D Body
-        notes.append("points are relative to the body in each frame; pred_cam_t is left out")
+        options.note("points are relative to the body in each frame; pred_cam_t is left out")
     if "in_world" in document or "pred_cam_t" in document:
         fields["in_world"] = bool(document.get("in_world", False))
     if np.shape(document.get("q"))[:1] == (frames,):
@@ -98,7 +98,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     for name, known in (("unit", UNIT_WORDS), ("up", UP_WORDS)):
         fields[name] = _word(document, name, known, path)
     custom = "+y" if "clip_fps" in document else ""
-    return points_motion(points, names, path, options, up_by_custom=custom, notes=notes, **fields)
+    return points_motion(points, names, path, options, up_by_custom=custom, **fields)
 
 
 def _shaped(values: Any, path: str, key: str) -> Array:

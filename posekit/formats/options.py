@@ -1,8 +1,8 @@
-"""Options of `posekit.open`: facts that a file does not state, given by its user."""
+"""Options of `posekit.open`: facts that a file does not state, given by its user, and remarks on what was read."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +23,8 @@ class Options:
         Name or path of the robot of a table of configurations.
     person : int or None
         Person of a file of several people, from 0.
+    notes, warnings : list of str
+        Readers add the assumptions that they make, and the contradictions that a user must see.
     """
 
     layout: str = ""
@@ -31,3 +33,13 @@ class Options:
     rate: float | None = None
     urdf: str = ""
     person: int | None = None
+    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def note(self, assumption: str) -> None:
+        """Add an assumption."""
+        self.notes.append(assumption)
+
+    def warn(self, contradiction: str) -> None:
+        """Add a contradiction."""
+        self.warnings.append(contradiction)

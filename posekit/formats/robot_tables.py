@@ -119,15 +119,13 @@ def read(document: Any, path: str, options: Options) -> Motion:
     """
     columns = _columns(document)
     about = document.about if isinstance(document, Table) else columns
-    notes: list[str] = []
-    warnings: list[str] = []
     layout, order = _stated_layout(columns, path, options)
     time, rate = _time(columns)
     parts = layout.fields
     if "whole" in parts:
-        place, turn, joints, labels, time = _of_whole(parts, columns, time, notes)
+        place, turn, joints, labels, time = _of_whole(parts, columns, time, options)
     else:
-        place, turn, joints, labels = _of_parts(parts, columns, path, notes)
+        place, turn, joints, labels = _of_parts(parts, columns, path, options)
     if labels and len(labels) != joints.shape[1]:
         got = f"{len(labels)} names"
         raise refusal(path, "joint names", got, f"{joints.shape[1]}, one a joint", "correct the file")
@@ -135,26 +133,26 @@ def read(document: Any, path: str, options: Options) -> Motion:
         raise refusal(path, "", "a number too large", f"numbers below {FARTHEST_COORDINATE:g}")
     up = options.up or str(about.get("up", ""))
     if place.shape[1]:
-        joints = _radians(joints, parts["joints"].get("unit", ""), notes)
+        joints = _radians(joints, parts["joints"].get("unit", ""), options)
         how = parts.get("rotation", parts.get("whole", {}))
         if turn.shape[1] == 3:
             turn, how = _euler(turn, how), {"order": "xyzw"}
-        turn, up = root_quaternion(turn, how.get("order", ""), place, up, path, notes, warnings)
-        place = _metres(place, options.unit or parts.get("position", {}).get("unit", ""), up, notes)
-    labels, joints = _named(labels, joints, order or _order(parts, columns, joints.shape[1]), options, notes)
+        turn, up = root_quaternion(turn, how.get("order", ""), place, up, path, options)
+        place = _metres(place, options.unit or parts.get("position", {}).get("unit", ""), up, options)
+    labels, joints = _named(labels, joints, order or _order(parts, columns, joints.shape[1]), options)
     robot = options.urdf or str(about.get("robot", "")) or _robot_of(labels)
     if not robot:
-        notes.append("which robot it is the file does not say (--urdf)")
+        options.note("which robot it is the file does not say (--urdf)")
     return Motion(
         q=np.hstack([place, turn, joints]),
         q_names=(*(ROOT_NAMES if place.shape[1] else ()), *labels) if labels else (),
         robot=robot,
-        time=times(len(joints), time, rate, options, notes, warnings),
+        time=times(len(joints), time, rate, options),
         up=up,
         source=path,
         layout=layout.name,
-        notes=notes,
-        warnings=warnings,
+        notes=options.notes,
+        warnings=options.warnings,
     )
 
 
@@ -171,7 +169,7 @@ def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> t
 
 
 def _of_whole(
-    parts: Mapping[str, Any], columns: Mapping[str, Any], time: Array | None, notes: list[str]
+    parts: Mapping[str, Any], columns: Mapping[str, Any], time: Array | None, options: Options
 ) -> tuple[Array, Array, Array, tuple[str, ...], Array | None]:
     """Part rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
     labels = _labels(parts, columns)
@@ -187,13 +185,13 @@ def _of_whole(
     off = [np.median(np.abs(np.linalg.norm(whole[:, k : k + 4], axis=1) - 1)) for k in (3, 4)]
     if even and first[1] > 0 and off[1] < NO_QUATERNION and off[0] > UNIT_LENGTH_ERROR:
         counts = first[1] % 1 == 0
-        notes.append(f"the first column is {'frame numbers' if counts else 'seconds'}")
+        options.note(f"the first column is {'frame numbers' if counts else 'seconds'}")
         values, time = values[:, 1:], time if counts else first
     return values[:, :3], values[:, 3:7], values[:, 7:], labels, time
 
 
 def _of_parts(
-    parts: Mapping[str, Any], columns: Mapping[str, Any], path: str, notes: list[str]
+    parts: Mapping[str, Any], columns: Mapping[str, Any], path: str, options: Options
 ) -> tuple[Array, Array, Array, tuple[str, ...]]:
     """Return the root's place (T, 3), its rotation (T, 3 or 4), joints (T, K), and names."""
     joint_part, labels = parts["joints"], _labels(parts, columns)
@@ -216,7 +214,7 @@ def _of_parts(
         root = int([str(one) for one in np.ravel(columns.get("body_names", ()))][:1] == ["world"])
         place, turn = place[:, root], turn[:, root]
     if labels and len(labels) + len(ROOT_NAMES) == joints.shape[-1]:
-        notes.append("the joints begin with the root's place and quaternion")
+        options.note("the joints begin with the root's place and quaternion")
         place, turn, joints = joints[:, :3], joints[:, 3:7], joints[:, 7:]
     count = len(joints)
     fits = joints.ndim == 2 and place.shape == (count, 3) and turn.shape in ((count, 4), (count, 3))
@@ -268,20 +266,20 @@ def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> 
 
 
 def _named(
-    labels: tuple[str, ...], joints: Array, order: str, options: Options, notes: list[str]
+    labels: tuple[str, ...], joints: Array, order: str, options: Options
 ) -> tuple[tuple[str, ...], Array]:
     """Name unnamed joints by a layout's order, and bring those of a G1 into its own, with zeros where they lack."""
     names = load_layout(order).fields["joints"] if order and not labels else ()
     if len(names) == joints.shape[1] and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
-        notes.append(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
+        options.note(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
         labels = tuple(names)
     elif not labels:
-        notes.append("joints are in the robot's own order: the file does not name them")
+        options.note("joints are in the robot's own order: the file does not name them")
     if not _robot_of(labels):
         return labels, joints
     missing = [name for name in _g1() if name not in labels]
     if missing:
-        notes.append(f"{', '.join(missing)} are not in the file and set to 0")
+        options.note(f"{', '.join(missing)} are not in the file and set to 0")
     joints = np.hstack([joints, np.zeros((len(joints), len(missing)))])
     return tuple(_g1()), joints[:, [(*labels, *missing).index(name) for name in _g1()]]
 
@@ -294,21 +292,21 @@ def _robot_of(labels: Sequence[str]) -> str:
     return "g1" if labels and set(labels) <= set(_g1()) else ""
 
 
-def _radians(joints: Array, unit: str, notes: list[str]) -> Array:
+def _radians(joints: Array, unit: str, options: Options) -> Array:
     known = np.abs(joints[np.isfinite(joints)])
     if not unit and len(known) and np.percentile(known, 99) > DEGREES_FROM:
-        notes.append(f"joints are in degrees: values reach {known.max():.4g}")
+        options.note(f"joints are in degrees: values reach {known.max():.4g}")
         unit = "deg"
     return np.radians(joints) if unit == "deg" else joints
 
 
-def _metres(place: Array, unit: str, up: str, notes: list[str]) -> Array:
+def _metres(place: Array, unit: str, up: str, options: Options) -> Array:
     """Return the root's place in metres; its height tells centimetres and millimetres."""
     heights = np.abs(place[:, "xyz".index(up[1])])
     height = float(np.nanmedian(heights)) if np.isfinite(heights).any() else 0.0
     found = next(name for name, most in HEIGHTS.items() if height < most or name == "mm")
     if not unit and found != "m":
-        notes.append(f"the root's place is in {found}: its height is {height:.4g}")
+        options.note(f"the root's place is in {found}: its height is {height:.4g}")
     return place * METRES[unit or found]
 
 
@@ -323,7 +321,7 @@ def _euler(angles: Array, part: Mapping[str, Any]) -> Array:
 
 
 def root_quaternion(
-    values: Array, order: str, place: Array, up: str, source: str, notes: list[str], warnings: list[str]
+    values: Array, order: str, place: Array, up: str, source: str, options: Options
 ) -> tuple[Array, str]:
     """Bring quaternions into the order x, y, z, w, and find the axis along which the robot stands.
 
@@ -356,16 +354,16 @@ def root_quaternion(
         got = f"a quaternion of length {length[frame]:.4g}"
         raise refusal(source, f"rotation[{frame}]", got, "1", "give quaternions x, y, z, w or w, x, y, z")
     if off.max(initial=0.0) > UNIT_LENGTH_ERROR:
-        warnings.append(f"quaternions are up to {off.max():.1%} off length 1: they are scaled to it")
+        options.warn(f"quaternions are up to {off.max():.1%} off length 1: they are scaled to it")
     if zero.any():
-        warnings.append(f"the quaternion is zero: no rotation is known in {zero.sum()} of {len(zero)} frames")
+        options.warn(f"the quaternion is zero: no rotation is known in {zero.sum()} of {len(zero)} frames")
     values = values / np.where(zero, np.nan, length)[:, None]
     known = np.isfinite(values).all(axis=1)
     if not known.any():
         return values, up or "+z"
     both = {"xyzw": values, "wxyz": values[:, [1, 2, 3, 0]]}
-    order = order or _likely({name: q[known] for name, q in both.items()}, place[known], notes, warnings)
-    return both[order], _standing(both[order][known], up, warnings)
+    order = order or _likely({name: q[known] for name, q in both.items()}, place[known], options)
+    return both[order], _standing(both[order][known], up, options)
 
 
 def _lean(q: Array, axis: int = 2) -> float:
@@ -374,7 +372,7 @@ def _lean(q: Array, axis: int = 2) -> float:
     return float(np.degrees(np.arccos(np.clip(np.median(z[:, axis]), -1, 1))))
 
 
-def _likely(both: Mapping[str, Array], place: Array, notes: list[str], warnings: list[str]) -> str:
+def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
     """Return the order by which the robot stands, or else heads where it travels."""
     lean = {name: min(_lean(q), _lean(q, 1)) for name, q in both.items()}
     first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
@@ -382,16 +380,16 @@ def _likely(both: Mapping[str, Array], place: Array, notes: list[str], warnings:
     ahead, other = sorted(off, key=lambda name: off[name])
     reading = "the root's quaternion is read as"
     if lean[second] - lean[first] <= LEAN_DEGREES and off[other] - off[ahead] > HEADING_DEGREES:
-        (notes if ahead == first else warnings).append(
+        (options.note if ahead == first else options.warn)(
             f"{reading} {SPELT[ahead]}: the robot stands by both; it heads {off[ahead]:.0f} degrees from its way "
             f"by this, {off[other]:.0f} by the other"
         )
         return ahead
     if lean[second] - lean[first] > SAME_LEAN_DEGREES:
         by = f"the robot leans {lean[first]:.0f} degrees by this order, {lean[second]:.0f} by the other"
-        notes.append(f"{reading} {SPELT[first]}: {by}")
+        options.note(f"{reading} {SPELT[first]}: {by}")
         return first
-    notes.append(f"{reading} x, y, z, w, by custom: the robot stands by both orders")
+    options.note(f"{reading} x, y, z, w, by custom: the robot stands by both orders")
     return "xyzw"
 
 
@@ -406,13 +404,13 @@ def _off_heading(q: Array, place: Array) -> float:
     return float(np.degrees(np.arccos(np.clip(np.median(cosine[moved > 0.2 * np.nanmax(moved)]), -1, 1))))
 
 
-def _standing(q: Array, stated: str, warnings: list[str]) -> str:
+def _standing(q: Array, stated: str, options: Options) -> str:
     """Return the stated axis, or the one along which the robot stands in most frames; +z if it stands along none."""
     for axis, name in ((2, "+z"), (1, "+y"), (0, "+x")):
         if _lean(q, axis) < STANDING_DEGREES:
             if name != (stated or "+z"):
-                warnings.append(f"the robot stands along {name}: this axis is up, or the robot lies (--up)")
+                options.warn(f"the robot stands along {name}: this axis is up, or the robot lies (--up)")
             return stated or name
     how = "upside down" if _lean(q) > 180 - STANDING_DEGREES else "lying"
-    warnings.append(f"the robot is {how} in most frames: check the quaternion's order and the up axis")
+    options.warn(f"the robot is {how} in most frames: check the quaternion's order and the up axis")
     return stated or "+z"

@@ -69,7 +69,7 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
     used = poses[:, : 3 * count].reshape(len(poses), count, 3)
     if not (np.abs(used) < FARTHEST_COORDINATE).all() or not (np.abs(place) < FARTHEST_COORDINATE).all():
         raise refusal(path, keys[0], "a number that is not finite", "finite numbers", "correct the file")
-    rest, notes = _rest(document)
+    rest = _rest(document, options)
     held = {**outer, **document}
     rate = next((np.ravel(held[name]) for name in RATES if name in held), np.empty(0))
     return points_motion(
@@ -81,23 +81,24 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
         rate=float(rate[0]) if rate.size and rate.dtype.kind in "iuf" else None,
         unit="m",
         up_by_custom="+z",
-        notes=notes,
         in_world=True,
     )
 
 
-def _rest(document: Mapping[str, Any]) -> tuple[Array, list[str]]:
+def _rest(document: Mapping[str, Any], options: Options) -> Array:
     """Return the joints at rest (22, 3): the file's own, or the mean shape's."""
     own = np.asarray(document.get("J", document.get("joints_rest", ())))
     if own.ndim == 2 and own.shape[0] >= N_JOINTS and own.shape[1] == 3:
-        return own[:N_JOINTS].astype(np.float64), ["joints at rest are the file's own"]
+        options.note("joints at rest are the file's own")
+        return own[:N_JOINTS].astype(np.float64)
     layout = load_layout("smpl_22").fields
     rest = np.array(layout["rest"])
     for k in range(1, N_JOINTS):
         rest[k] += rest[layout["parents"][k]]
     betas = np.ravel(document.get("betas", ()))
     shape = "; the file's shape (betas) needs the model and is left out" if np.any(betas) else ""
-    return rest, [f"limbs have the lengths of SMPL's mean shape{shape}"]
+    options.note(f"limbs have the lengths of SMPL's mean shape{shape}")
+    return rest
 
 
 def placed(rest: Array, poses: Array, place: Array) -> Array:

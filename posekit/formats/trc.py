@@ -69,17 +69,16 @@ def _read_trc(table: Table, path: str, options: Options) -> Motion:
     if not 0 < len(names) <= MAX_POINTS or len(set(names)) != len(names):
         got = f"{len(names)} names" if len(set(names)) == len(names) else "a name twice"
         raise refusal(path, "line 4", got, f"1 to {MAX_POINTS:,} different names", "name the points")
-    warnings, notes = [], []
     counted = _whole(fields.get("NumMarkers", ""))
     if counted is not None and counted != len(names):
-        warnings.append(f"NumMarkers is {counted}, but {len(names)} markers are named: the names are used")
+        options.warn(f"NumMarkers is {counted}, but {len(names)} markers are named: the names are used")
     values = _rows(table, start, 2 + 3 * len(names), path)
     frames = _whole(fields.get("NumFrames", ""))
     if frames is not None and frames != len(values):
-        warnings.append(f"NumFrames is {frames}, but the file has {len(values)}: it may be cut off")
+        options.warn(f"NumFrames is {frames}, but the file has {len(values)}: it may be cut off")
     unit = UNIT_WORDS.get(fields.get("Units", "").strip("\"'").casefold(), "")
     if not unit and fields.get("Units"):
-        notes.append(f"the unit {shown(fields['Units'])} is not known")
+        options.note(f"the unit {shown(fields['Units'])} is not known")
     rate = numbers([fields.get("DataRate", "")])[0]
     return points_motion(
         values[:, 2:].reshape(len(values), len(names), 3),
@@ -90,8 +89,6 @@ def _read_trc(table: Table, path: str, options: Options) -> Motion:
         rate=float(rate) if rate > 0 else None,
         unit=unit,
         up_by_custom="+y",
-        notes=notes,
-        warnings=warnings,
         partial=True,
     )
 
@@ -158,27 +155,26 @@ def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
     body = Table(table.lines[end + 2 :], "", path, table.numbers_of_lines[end + 2 :])
     values = _rows(body, 0, len(names), path)
     degrees = re.search(r"indegrees\s*=\s*yes", header) is not None
-    notes = [f"angles are in {'degrees' if degrees else 'radians'}, as the header says"]
-    warnings: list[str] = []
+    options.note(f"angles are in {'degrees' if degrees else 'radians'}, as the header says")
     places = [k for k, name in enumerate(names) if re.search(r"_t[xyz]$", name)]
     turned = [k for k in range(1, len(names)) if k not in places]
     values[:, turned] = np.radians(values[:, turned]) if degrees else values[:, turned]
     from posekit.motion import Motion
 
     if not options.urdf:
-        notes.append(
+        options.note(
             "these are coordinates of an OpenSim model: give a URDF with them (--urdf), or the .trc of the markers"
         )
     return Motion(
         q=values[:, 1:],
         q_names=names[1:],
         robot=options.urdf,
-        time=times(len(values), values[:, 0], None, options, notes, warnings),
+        time=times(len(values), values[:, 0], None, options),
         up=options.up or "+y",
         source=path,
         layout="opensim",
-        notes=notes,
-        warnings=warnings,
+        notes=options.notes,
+        warnings=options.warnings,
     )
 
 
