@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 #: Axes of the three angles of a joint.
 AXIS_ORDER: Final = (0, 2, 1)
-#: Cosine of the middle angle below which the first is arbitrary: choosing it turns the rotation by less than that.
-LOCKED_COSINE: Final = 1e-9
 #: Share of a step by which a frame may lie beside its place in an even sequence of times.
 UNEVEN_STEP_SHARE: Final = 0.1
 #: Names of the figure's joints in BVH, by which animation programs find their own characters' joints. A file's Neck may
@@ -203,12 +201,6 @@ def continuous(angles: Array) -> Array:
     angles = np.array(angles, dtype=np.float64)
     if len(angles) < 2:
         return angles
-    locked = np.abs(np.cos(angles[..., 1])) < LOCKED_COSINE
-    if locked.any():  # the first angle is that of the frame before; the last makes up for it
-        last = np.maximum.accumulate(np.where(locked, 0, np.arange(len(angles))[:, None]), axis=0)
-        held = np.take_along_axis(angles[..., 0], last, axis=0)
-        angles[..., 2] += np.where(locked, np.sin(angles[..., 1]) * (held - angles[..., 0]), 0.0)
-        angles[..., 0] = np.where(locked, held, angles[..., 0])
     # A frame's branch against the one before is the same for both branches of that one: parity adds up.
     step = turned_near(np.diff(angles, axis=0), 0.0)
     other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)

@@ -23,14 +23,6 @@ from posekit.formats.options import Options
 from posekit.formats.tables import Table
 from posekit.geometry import Array
 
-#: Parts of COCO-WholeBody's 133 points: field, number of points, and the flag that tells whether it was labelled.
-WHOLEBODY_PARTS: Final = (
-    ("keypoints", 17, ""),
-    ("foot_kpts", 6, "foot_valid"),
-    ("face_kpts", 68, "face_valid"),
-    ("lefthand_kpts", 21, "lefthand_valid"),
-    ("righthand_kpts", 21, "righthand_valid"),
-)
 #: Fields of a person's points in OpenPose's files; the second in files older than 2018.
 OPENPOSE_POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
 #: Fields of a person's landmarks in MediaPipe's frames.
@@ -111,7 +103,7 @@ def _kind(document: Any) -> str:
     first = next(_dicts(document), {})
     if "keypoint_scores" in first or ("instances" in first and "frame_id" in first):
         return "mmpose"
-    if "image_id" in first and _has(first, [name for name, *_ in WHOLEBODY_PARTS]):
+    if "image_id" in first and "keypoints" in first:
         return "results"
     return "mediapipe" if any(_has(frame, LANDMARKS) for frame in _dicts(document)) else ""
 
@@ -150,16 +142,15 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
             raise image.at("id").refused("an id of its own for each image", "renumber the images")
         sides = [image.at(side).positive() if image.has(side) else np.nan for side in ("width", "height")]
         named[identity] = rows.picture(name if own else identity, size=(sides[0], sides[1]))
-    parts = [name for name, *_ in WHOLEBODY_PARTS]
     everyone = list(root.at("annotations").list())
-    people = [one for one in everyone if _has(one.object(), parts) and not one.value.get("iscrowd")]
+    people = [one for one in everyone if "keypoints" in one.object() and not one.value.get("iscrowd")]
     names = {
         str(one.get("id")): tuple(map(str, one["keypoints"]))
         for one in _dicts(root.value.get("categories"))
         if isinstance(one.get("keypoints"), list)
     }
     people = _of_bodies(root, people, names, rows)
-    triples = [_triples(one) for one in people]
+    triples = [_by_three(one.at("keypoints")) for one in people]
     thirds = np.concatenate([one[:, 2] for one in triples]) if triples else np.empty(0)
     flags = bool(np.isin(thirds, (0, 1, 2)).all())
     for one, values in zip(people, triples, strict=True):
@@ -192,25 +183,12 @@ def _results(root: Node, rows: Rows, label: str) -> None:
         identity = one.at("image_id").value
         if type(identity) not in (int, str):
             raise one.at("image_id").refused("a number, or a picture's name")
-        values = _triples(one)
+        values = _by_three(one.at("keypoints"))
         person = one.value.get("track_id", one.value.get("idx"))
         while isinstance(person, list):  # AlphaPose lists the detections that it merged
             person = person[0] if person else None
         values[values[:, 2] == 2, 2] = np.nan
         rows.add(identity, values, person)
-
-
-def _triples(person: Node) -> Array:
-    """Return a person's points (K, 3) of x, y and flag or confidence: one list, or COCO-WholeBody's parts joined."""
-    given = person.value.get("keypoints")
-    whole = not _has(person.value, [name for name, *_ in WHOLEBODY_PARTS[1:]])
-    if whole or (isinstance(given, list) and len(given) > 3 * WHOLEBODY_PARTS[0][1]):
-        return _by_three(person.at("keypoints"))
-    parts = []
-    for name, count, flag in WHOLEBODY_PARTS:
-        absent = not person.value.get(name) or (flag and not person.value.get(flag, True))
-        parts.append(np.zeros((count, 3)) if absent else person.at(name).array(3 * count, unknown=True))
-    return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
 def _mmpose(root: Node, rows: Rows, label: str) -> None:
@@ -302,13 +280,10 @@ def _time(frame: Node) -> float:
 
 
 def _size(holder: Any, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:
-    """Return width and height that an object or its metadata states."""
-    inner = [holder, holder.get("metadata"), holder.get("video_info")] if isinstance(holder, dict) else []
-    for one in _dicts(inner):
-        for prefix in ("", "image_", "frame_", "video_"):
-            sides = one.get(f"{prefix}width"), one.get(f"{prefix}height")
-            if all(isinstance(side, int | float) and 0 < side < LARGEST_SIDE for side in sides):
-                return float(sides[0]), float(sides[1])  # type: ignore[arg-type]
+    """Return width and height that an object states."""
+    sides = (holder.get("width"), holder.get("height")) if isinstance(holder, dict) else (None, None)
+    if all(isinstance(side, int | float) and 0 < side < LARGEST_SIDE for side in sides):
+        return float(sides[0]), float(sides[1])  # type: ignore[arg-type]
     return known
 
 

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.errors import nearest
 from posekit.formats import json_file
 from posekit.formats.json_file import nullable
 from posekit.formats.node import Node, schema_of
@@ -16,7 +15,6 @@ from posekit.formats.options import Options
 from posekit.formats.view_file import check_schema
 from posekit.geometry import PER_METRE, UP_AXES, Array, from_metres, to_metres
 from posekit.motion import Motion
-from posekit.motion.motion import NAMES
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 POSTURES_SCHEMA: Final = "posekit.postures/1"
@@ -57,12 +55,11 @@ def read(document: Any, path: str | Path, options: Options) -> Motion:
         if isinstance(document.get("q"), list):
             root.object(CONFIGURATION_FIELDS)
         q = root.at("q").array(None, None, unknown=True)
-        names = root.at("configuration_names").texts() if root.has("configuration_names") else ()
-        if names and len(names) != q.shape[1]:
-            raise root.at("configuration_names").refused(f"{q.shape[1]} names", got=f"{len(names)} names")
-        robot = options.urdf or (root.at("robot").text() if root.has("robot") else "")
+        names = root.at("configuration_names", ()).texts()
+        robot = options.urdf or root.at("robot", "").text()
         return Motion(q=q, q_names=names, robot=robot, time=_times(root, len(q), options), **shared)
     points, names = _arrays(root) if "joints" in root.object() else _postures(root)
+    points[np.isnan(points).any(axis=-1)] = np.nan
     unit = root.at("unit").text(PER_METRE) if root.has("unit") and "postures" in root.value else "m"
     time = _times(root, len(points), options)
     return Motion(joints=points, joint_names=names, unit=unit, time=time, **shared)
@@ -75,19 +72,10 @@ def _times(root: Node, count: int, options: Options) -> Array | None:
     return None if rate is None else np.arange(count) / rate
 
 
-def _names(root: Node) -> tuple[str, ...]:
-    names = root.at("joint_names").texts()
-    for k, name in enumerate(names):
-        if name not in NAMES or names.index(name) < k:
-            expected = "the name of a joint, each once"
-            raise Node(name, root.source, f"joint_names[{k}]").refused(expected, nearest(name, NAMES))
-    return names
-
-
 def _postures(root: Node) -> tuple[Array, tuple[str, ...]]:
     """Return the points of a JSON document, metres."""
     root.object(FIELDS)
-    names, unit = _names(root), root.at("unit").text(PER_METRE)
+    names, unit = root.at("joint_names").texts(), root.at("unit").text(PER_METRE)
     rows = list(root.at("postures").list())
     for row in rows:
         points = list(row.list())
@@ -96,28 +84,17 @@ def _postures(root: Node) -> tuple[Array, tuple[str, ...]]:
             raise row.refused(f"{len(names)}, as there are joint_names", remedy, f"{len(points)} points")
     known = [[[np.nan] * 3 if point is None else point for point in row.value] for row in rows]
     values = Node(known, root.source, "postures").array(len(rows), len(names), 3, unknown=True)
-    _refuse_partial(root, "postures", values)
     return to_metres(values, unit), names
 
 
 def _arrays(root: Node) -> tuple[Array, tuple[str, ...]]:
     """Return the points of NPZ arrays, metres."""
-    names = _names(root) if root.has("joint_names") else JOINTS
+    names = root.at("joint_names", JOINTS).texts()
     points = root.at("joints").array(None, len(names), 3, unknown=True)
     if root.has("head"):
         head = root.at("head").array(len(points), len(HEAD_POINTS), 3, unknown=True)
         points, names = np.concatenate([points, head], axis=1), (*names, *HEAD_POINTS)
-    _refuse_partial(root, "joints", points)
     return points, names
-
-
-def _refuse_partial(root: Node, name: str, points: Array) -> None:
-    unknown = np.isnan(points)
-    partly = unknown.any(axis=-1) & ~unknown.all(axis=-1)
-    if partly.any():
-        place = name + "".join(f"[{int(k)}]" for k in np.argwhere(partly)[0])
-        expected, remedy = "three coordinates", "make the whole point null where it is not known"
-        raise Node(None, root.source, place).refused(expected, remedy, "a point that is known in part")
 
 
 def write(path: str | Path, motion: Motion, unit: str | None = None) -> None:
