@@ -300,6 +300,20 @@ def test_missing_cells_are_unknown_joints(tmp_path: Path, cell: str) -> None:
     assert np.flatnonzero(unknown).tolist() == [9, 12]
 
 
+@pytest.mark.parametrize("frames", [slice(0, 5), slice(0, None, 2), slice(7, 8), slice(None)])
+def test_a_root_at_the_origin_is_known_and_a_lost_one_is_not(tmp_path: Path, frames: slice) -> None:
+    joints = np.array(walking().joints)
+    pelvis = JOINTS.index("pelvis")
+    centred = joints.copy()
+    centred[frames] -= centred[frames, pelvis, None]
+    found = posekit.open(npz(tmp_path, centred, up="+z", fps=RATE))
+    assert np.array_equal(found.points(POINTS), centred)
+    if frames != slice(None):
+        joints[frames, pelvis] = 0.0
+        lost = np.isnan(posekit.open(npz(tmp_path, joints, up="+z", fps=RATE)).points(["pelvis"])[:, 0, 0])
+        assert np.array_equal(np.flatnonzero(lost), np.arange(len(joints))[frames])
+
+
 def test_times_that_contradict_the_rate_are_said(tmp_path: Path) -> None:
     lines = trc_of(walking(), tmp_path)
     lines[2] = lines[2].replace("30\t30", "100\t100", 1)

@@ -10,7 +10,7 @@ import numpy as np
 from posekit.errors import InputError, refusal, shown
 from posekit.formats.layout import LIMBS, Layout, by_names, by_order, load_layout, plain
 from posekit.formats.options import Options
-from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints, up_vector
+from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Flags, Ints, up_vector
 from posekit.motion import Motion
 from posekit.skeleton import JOINT, JOINTS, SIDES
 
@@ -43,6 +43,9 @@ CLEAR_UP_SHARE: Final = 0.7
 FLAT_METRES, STEEP_METRES = 0.15, 0.6
 #: Ratio of rises by which one axis is level more clearly than all others.
 CLEAR_RATIO: Final = 2.0
+#: Share by which a distance between rigid neighbours may leave its range in other frames, share that range and this come
+#: to at most (a torso's distances vary by 7 %, those along limbs by more), and number of neighbours that are compared.
+RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
 #: Share by which a stated rate and the times must differ to be a contradiction.
 RATE_DISAGREES: Final = 0.1
 #: Share by which limbs of both sides may differ in length in an order of points that fits.
@@ -219,8 +222,9 @@ def _apart(a: Array, b: Array) -> float:
 def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: Options) -> None:
     """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing one.
 
-    A point whose three coordinates are the same number in some frames and others in the rest is missing there: zeros,
-    -1, 999. One that is zero in all frames is a root where it is the pelvis or the middle of the hips, else missing.
+    A point whose three coordinates are the same number in some frames and others in the rest is missing there (zeros,
+    -1, 999), unless it keeps its distances from its neighbours: it is a root at the origin. One that is zero in all
+    frames is a root where it is the pelvis or the middle of the hips, else missing.
     """
     points[~(np.abs(points) <= FARTHEST_COORDINATE).all(axis=-1)] = np.nan
     alike = (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
@@ -228,17 +232,42 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
     roots |= {"root", "hips", "pelvis", "hip"}
     for k in np.flatnonzero(alike.any(axis=0)).tolist():
         known = np.isfinite(points[:, k, 0])
-        if alike[known, k].all() and (len(points) == 1 or points[:, k].any()):
-            continue  # one posture, or a point that lies on the diagonal in every frame
-        if alike[known, k].all() and plain(names[k]) in roots:
-            continue
+        always = alike[known, k].all()
+        if always and (len(points) == 1 or points[:, k].any() or plain(names[k]) in roots):
+            continue  # one posture, a point that lies on the diagonal in every frame, or a root
         values, counts = np.unique(points[alike[:, k], k, 0], return_counts=True)
-        sentinels = [value for value, count in zip(values, counts, strict=True) if value == 0 or count > 1]
+        sentinels = values[(values == 0) | (counts > 1)]
         gone = alike[:, k] & np.isin(points[:, k, 0], sentinels)
+        gone &= always or ~_hangs_together(points, k, alike)
         if gone.any():
             points[gone, k] = np.nan
             written = ", ".join(f"{value:g}" for value in sentinels)
             options.note(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames: {written}")
+
+
+def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
+    """Tell in which frames (T,) a point of the trunk is as far as elsewhere from its rigid neighbours.
+
+    Parameters
+    ----------
+    points : array (T, P, 3)
+    k : int
+        The point; one at a limb has fewer rigid neighbours than are asked, and hangs together nowhere.
+    unsure : bool array (T, P)
+        Points that may be missing: they are no neighbours, and the distances elsewhere are those of other frames.
+    """
+    others = np.arange(points.shape[1]) != k
+    apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]
+    elsewhere = apart[~unsure[:, k]]
+    apart = apart[:, np.isfinite(elsewhere).any(axis=0)]
+    elsewhere = elsewhere[:, np.isfinite(elsewhere).any(axis=0)]
+    usual = np.nanmedian(elsewhere, axis=0)
+    slack = np.nanmax(elsewhere, axis=0) - np.nanmin(elsewhere, axis=0) + RIGID_SHARE * usual
+    rigid = np.argsort(slack / usual)[:RIGID_NEIGHBOURS]
+    if len(rigid) < RIGID_NEIGHBOURS or (slack > RIGID_MOST * usual)[rigid].any():
+        return np.zeros(len(points), dtype=np.bool_)
+    off = (np.abs(apart - usual) - slack)[:, rigid]
+    return np.asarray(np.isfinite(off).any(axis=1) & ~(off > 0).any(axis=1))
 
 
 def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> Array:
