@@ -43,8 +43,8 @@ CLEAR_UP_SHARE: Final = 0.7
 FLAT_METRES, STEEP_METRES = 0.15, 0.6
 #: Ratio of rises by which one axis is level more clearly than all others.
 CLEAR_RATIO: Final = 2.0
-#: Share by which a distance between rigid neighbours may leave its range in other frames, share that range and this come
-#: to at most (a torso's distances vary by 7 %, those along limbs by more), and number of neighbours that are compared.
+#: Share by which a distance between rigid neighbours may leave its range in other frames, share that both come to
+#: at most (a torso's distances vary by 7 %, those along limbs by more), and number of neighbours that are compared.
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
 #: Share by which a stated rate and the times must differ to be a contradiction.
 RATE_DISAGREES: Final = 0.1
