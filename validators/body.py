@@ -15,7 +15,16 @@ from posekit.body.measured import Person, figure_of, person_of
 from posekit.geometry import Array, Record
 from posekit.motion.motion import Motion
 from posekit.settings import EXACT, MEASURED, Tolerance, ValidateSettings
-from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINT, JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
+from posekit.skeleton import (
+    FEET_POINTS,
+    HEAD_POINTS,
+    JOINT,
+    JOINTS,
+    LIMB_SEGMENTS,
+    RIGID_SEGMENTS,
+    SEGMENTS,
+    segment_name,
+)
 
 if TYPE_CHECKING:
     from posekit.body import Figure
@@ -39,6 +48,9 @@ CLAVICLE_SHARE: Final = 0.8
 #: Rotation of a clavicle about its inner end, forward or upward with the shoulder (Inman, Saunders & Abbott 1944, J
 #: Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
 CLAVICLE_DEGREES: Final = 30.0
+
+#: Segments of the limbs among `posekit.skeleton.SEGMENTS`.
+LIMB_ROWS: Final = [SEGMENTS.index(one) for one in LIMB_SEGMENTS]
 
 #: Length by which the direction of the head is measured, neck to nose, metres.
 NECK_TO_HEAD_METRES = 0.2
@@ -147,7 +159,7 @@ class Body(Record):
         if name == "time":
             return self.motion and self.dt > 0
         if name == "ground":
-            return self.up is not None and self.ground is not None
+            return self.up is not None and math.isfinite(self.ground)
         found = getattr(self, name)
         return found is not None and (name in ("robot", "up", "q") or bool(np.isfinite(found).any()))
 
@@ -171,16 +183,15 @@ class Body(Record):
         )
 
     @cached_property
-    def ground(self) -> float | None:
-        """Height of the ground along `up`, metres: as stated, else estimated from the frames; None where unknown."""
+    def ground(self) -> float:
+        """Height of the ground along `up`, metres: as stated, else estimated from the frames; NaN where unknown."""
         if self.settings.ground is not None:
             return self.settings.ground
         if not self.motion or self.up is None or not np.isfinite(self.joints).any():
-            return None
+            return math.nan
         from posekit.validators.motion.ground import ground_of
 
-        low = ground_of(self).low
-        return low if math.isfinite(low) else None
+        return ground_of(self).low
 
     @cached_property
     def person(self) -> Person:

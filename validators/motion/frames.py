@@ -15,9 +15,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.lengths import lengths_in_frames
 from posekit.geometry import Array, dot, groups, known_median, norm, runs
 from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, segment_name
-from posekit.validators.body import Body, once
+from posekit.validators.body import LIMB_ROWS, Body, once
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.jumps import LEAST_JUMP, jumps_of
 from posekit.validators.motion.sides import (
@@ -215,12 +216,12 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
     """
     found = explained(body)
     starts, ends = (list(one) for one in zip(*LIMB_SEGMENTS, strict=True))
-    lengths = norm(found.joints[:, ends] - found.joints[:, starts])
+    lengths = lengths_in_frames(found.joints)[LIMB_ROWS].T
     usual = _usual(lengths, share)
     shaken = np.maximum(found.trembling[:, starts], found.trembling[:, ends])
     shaken = np.where(shaken > SHAKEN_METRES, shaken, 0.0)
     # A length has the noise of its two ends, the median of five frames about half of it.
-    allowed = DRIFT_DEVIATIONS * np.fmax(shaken, body.noise) / np.where(usual > 0, usual, 1.0)
+    allowed = DRIFT_DEVIATIONS * np.fmax(shaken, body.noise) / usual
     return Judgement(
         tuple(map(segment_name, LIMB_SEGMENTS)),
         found.timeline.of_frames(_smooth(lengths) / usual - 1.0),
@@ -235,14 +236,12 @@ def _usual(lengths: Array, share: float) -> Array:
 
     Where many frames differ from the median, that length of the two is the usual one which the other side has.
     """
-    usual = np.array([known_median(column) for column in lengths.T])
+    usual = np.array([known_median(column) or np.nan for column in lengths.T])
     for k, column in enumerate(lengths.T):
         twin = usual[k + 2 if k % 4 < 2 else k - 2]
         others = column[np.abs(column / usual[k] - 1.0) > share]
         if len(others) > LEAST_OTHER * np.isfinite(column).sum():
-            other = float(np.median(others))
-            if abs(other - twin) < abs(usual[k] - twin):
-                usual[k] = other
+            usual[k] = min((usual[k], float(np.median(others))), key=lambda length: abs(length - twin))
     return usual
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, known_median, mean_known, norm, runs
 from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
-from posekit.validators.body import Body, once
+from posekit.validators.body import LIMB_ROWS, Body, once
 from posekit.validators.motion.timeline import timeline_of
 
 #: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
@@ -136,17 +136,9 @@ class Ground:
 
 @once
 def stature_of(body: Body) -> float:
-    """Return the stature, metres, by the median length of the legs; NaN where no leg is known."""
-    legs = [
-        norm(body.joints[:, JOINT[f"{side}_{upper}"]] - body.joints[:, JOINT[f"{side}_{lower}"]])
-        for side in SIDES
-        for upper, lower in (("hip", "knee"), ("knee", "ankle"))
-    ]
-    return 2 * float(mean_known(np.array([known_median(leg) for leg in legs]))) / LEG_SHARE
-
-
-def _stature(body: Body) -> float:
-    stature = stature_of(body)
+    """Return the stature, metres, by the median length of the legs."""
+    legs = [known_median(leg) for leg in body.segment_lengths[LIMB_ROWS[4:]]]
+    stature = 2 * float(mean_known(np.array(legs))) / LEG_SHARE
     return stature if stature > 0 else USUAL_STATURE
 
 
@@ -155,12 +147,13 @@ def up_of(body: Body) -> Array:
     return np.zeros(3) if body.up is None else body.up
 
 
+@once
 def soles(body: Body) -> tuple[Array, Array]:
-    """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
-    ankles = body.joints[:, both("ankle")]
+    """Return the points of feet (T, 6, 3), toes, heels and ankles, and the heights of their soles along up (T, 6)."""
+    points = np.concatenate([body.feet, body.joints[:, both("ankle")]], axis=1)
     toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
-    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(body)] * 2)
-    return np.concatenate([body.feet, ankles], axis=1), over
+    over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * stature_of(body)] * len(SIDES)
+    return points, points @ up_of(body) - over
 
 
 def speeds(body: Body, points: Array, frames: int = 1) -> Array:
@@ -183,20 +176,22 @@ def speeds(body: Body, points: Array, frames: int = 1) -> Array:
 @once
 def ground_of(body: Body) -> Ground:
     """Estimate the ground of a body whose direction up is known."""
-    feet, over = soles(body)
+    feet, over_ground = soles(body)
     line, up = timeline_of(body), up_of(body)
     points = np.concatenate([body.joints, feet[:, : len(FEET_POINTS)]], axis=1)
     height = points @ up
     legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them
     lifted = line.of_frames(lifted_by(line.spread(height), legs, body.rate, body.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
-    over_ground = feet @ up - over
     # The ankle of a foot whose heel is not known is its heel: it is down when the toes are up.
+    over_ground = over_ground.copy()
     over_ground[:, 4:][:, np.isfinite(over_ground[:, 2:4]).any(axis=0)] = np.nan
     sole = np.fmin.reduce(over_ground, axis=1)
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
-    slow = speeds(body, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(body)
+    frames = 1.0 if body.rate < TURNING_RATE else 2.0  # between the ends of a speed
+    noise = np.sqrt(2) * body.noise / (frames * body.dt) if body.dt > 0 else 0.0
+    slow = speeds(body, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * noise
     centre = centre_of_mass(body.joints) @ up
     still = (near & slow).any(axis=1)
     resting = carried(still, lowest, centre, body.dt)
@@ -207,7 +202,7 @@ def ground_of(body: Body) -> Ground:
     else:
         low, high = np.percentile(held, (5, 98))
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(body))
+    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * stature_of(body))
     return Ground(
         low=float(low),
         high=float(high - low),
@@ -219,12 +214,6 @@ def ground_of(body: Body) -> Ground:
         centre=centre,
         in_air=~resting & (lowest > high + air),
     )
-
-
-def _speed_noise(body: Body) -> float:
-    """Return the standard deviation of a speed between the neighbours of a frame."""
-    frames = 1.0 if body.rate < TURNING_RATE else 2.0
-    return np.sqrt(2) * body.noise / (frames * body.dt) if body.dt > 0 else 0.0
 
 
 def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: float) -> NDArray[np.bool_]:

@@ -49,7 +49,7 @@ def skating(
     smoothed : int
         Odd number of frames whose mean way counts.
     """
-    points, over = soles(body)
+    points, height_along = soles(body)
     known = np.asarray(np.isfinite(points).any(axis=(0, 2)))
     which = [side if known[side] else side + len(FEET_POINTS) for side in range(len(SIDES))]
     line, up = timeline_of(body), up_of(body)
@@ -57,7 +57,7 @@ def skating(
     ways = norm(perpendicular(np.diff(placed, axis=0), up)) / (rate * body.dt)
     padded = np.pad(ways, ((smoothed // 2, smoothed // 2), (0, 0)))
     mean = sliding_window_view(padded, smoothed, axis=0).mean(axis=-1)
-    over_ground = placed @ up - over[which] - _level(body)
+    over_ground = line.spread(height_along[:, which]) - body.ground
     value = np.full(over_ground.shape, np.nan)
     value[1:] = np.where(np.maximum(over_ground[1:], over_ground[:-1]) < height, mean, 0.0)
     return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(value), upper=way)
@@ -156,7 +156,7 @@ def above_ground(
     lasting : float
         Seconds.
     """
-    height = ground_of(body).height - _level(body)
+    height = ground_of(body).height - body.ground
     upper = np.full(len(body), np.inf)
     for start, stop in runs(height > highest):
         if (stop - start) * body.dt > lasting:
@@ -193,11 +193,6 @@ def _hips(body: Body) -> Array:
     return np.asarray(body.joints[:, both("hip")].mean(axis=1))
 
 
-def _level(body: Body) -> float:
-    """Return the height of the stated ground, or of the lowest level of the estimated one."""
-    return ground_of(body).low if body.settings.ground is None else body.settings.ground
-
-
 def _speeds(body: Body, points: Array) -> Array:
     """Return speeds since the frame before (T, P) of points (T, P, 3), metres a second."""
     line = timeline_of(body)
@@ -228,8 +223,7 @@ def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) ->
 
 def _soles(body: Body) -> Array:
     """Return the heights of soles (T, P) along up, by toes and heels, or by ankles where there are none."""
-    feet, over = soles(body)
-    height = np.asarray(feet @ up_of(body)) - over
+    height = soles(body)[1]
     toes = height[:, : len(FEET_POINTS)]
     return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
 

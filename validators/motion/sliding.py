@@ -77,10 +77,10 @@ def sliding(
         Metres a second that a foot on the ground goes up or down at most.
     """
     needs_rate(body, SLIDING_RATE)
-    line, up, (feet, over) = timeline_of(body), up_of(body), soles(body)
+    line, up, (feet, height) = timeline_of(body), up_of(body), soles(body)
     hips = body.height[:, both("hip")].min(axis=1)[:, None]
     crawls = hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body)
-    down = line.spread((~crawls & (feet @ up - over < _base(body) + DOWN_METRES)).astype(np.float64)) > 0
+    down = line.spread((~crawls & (height < _base(body) + DOWN_METRES)).astype(np.float64)) > 0
     placed = line.spread(feet)
     count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
     noise = 3 * np.sqrt(2) * body.noise / body.dt
@@ -146,8 +146,8 @@ def _stance_velocity(body: Body) -> Array:
 
     One foot of a walker always stands, so that it is near zero in every frame; NaN in frames without a foot down.
     """
-    line, up, (feet, over) = timeline_of(body), up_of(body), soles(body)
-    down = line.spread(np.where(feet @ up - over < _base(body) + 2 * DOWN_METRES, 1.0, np.nan))
+    line, up, (feet, height) = timeline_of(body), up_of(body), soles(body)
+    down = line.spread(np.where(height < _base(body) + 2 * DOWN_METRES, 1.0, np.nan))
     velocity = perpendicular(np.diff(line.spread(feet), axis=0, prepend=np.nan) / body.dt, up)
     speed = np.nan_to_num(norm(velocity) * down, nan=np.inf)
     slowest = np.take_along_axis(velocity, speed.argmin(axis=1)[:, None, None], axis=1)[:, 0]

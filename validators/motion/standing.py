@@ -184,8 +184,7 @@ def upright(body: Body, share: float) -> NDArray[np.bool_]:
 
 def beyond_feet(body: Body) -> Array:
     """Return how far the centre of mass is beyond the feet that bear (T,), metres; negative over them."""
-    feet, over = soles(body)
-    height = feet @ up_of(body) - over
+    feet, height = soles(body)
     bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
     # A foot reaches beyond its known points: all of it beyond an ankle, its end and edges beyond a toe.
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from posekit.body.lengths import lengths_in_frames
 from posekit.geometry import Array, groups, known_median, norm
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.validators.motion.timeline import centred, filtered
@@ -68,7 +69,7 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
         return np.full(joints.shape[:2], np.nan)
     rough = norm(filtered(joints, _SIXTH)) / MEDIAN_OF_THREE
     rough = np.maximum(rough - CURVED_SHARE * norm(filtered(joints, _CURVATURE)), 0.0)
-    stretched = np.abs(filtered(_lengths(joints), _SIXTH)) / MEDIAN_OF_ONE
+    stretched = np.abs(filtered(lengths_in_frames(joints).T, _SIXTH)) / MEDIAN_OF_ONE
     found = _windows(np.concatenate([rough, stretched], axis=1))
     bodily, of_lengths = found[:, : joints.shape[1]], found[:, joints.shape[1] :]
     by_length = np.stack([of_lengths[:, of_joint].min(axis=1) for of_joint in _SEGMENTS_OF], axis=1)
@@ -90,12 +91,6 @@ def _windows(rough: Array) -> Array:
     windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
     medians = np.partition(windows, half)[..., half]
     return np.repeat(medians, 3, axis=0)[: len(rough)]
-
-
-def _lengths(joints: Array) -> Array:
-    """Return the lengths of all segments (S, 17)."""
-    starts, ends = zip(*SEGMENTS, strict=True)
-    return norm(joints[:, ends] - joints[:, starts])
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
