@@ -11,12 +11,12 @@ from scipy import signal
 
 import posekit
 from posekit.errors import InputError
+from posekit.geometry import beyond_hull
 from posekit.motion import Motion
 from posekit.settings import ValidateSettings
 from posekit.skeleton import JOINT, JOINTS, other_side
 from posekit.validators import Body, Report, validate_motion
 from posekit.validators.motion.ground import ground_of
-from posekit.validators.motion.standing import beyond_support
 
 RATE = 30.0
 FIGURE = posekit.load_figure()
@@ -266,5 +266,5 @@ def test_distance_beyond_a_hull_is_that_of_its_corners_and_edges() -> None:
         ((2.0, 2.0), np.sqrt(2)),
         ((0.9, 0.5), -0.1),
     ):
-        found = beyond_support(np.array([[*point, 3.0]]), square, np.array([0, 0, 1.0]))[0]
+        found = beyond_hull(np.array([[*point, 3.0]]), square, np.array([0, 0, 1.0]))[0]
         assert found == pytest.approx(expected)

@@ -20,9 +20,6 @@ from posekit.geometry import Array, Record, runs
 if TYPE_CHECKING:
     import pandas
 
-#: Checks whose findings make other checks reject the same frames; they are named first.
-CAUSES: Final = ("timing", "frozen", "repeated", "swap", "orientation", "rate")
-
 #: Frames by which an effect may lie off its cause: trembling is measured over so many.
 NEAR_FRAMES: Final = 15
 
@@ -368,31 +365,31 @@ class Report(Record):
             if decided == decision
         ]
         reasons += [f"{len(self.refused)} unreadable"] * bool(self.refused)
-        return "; ".join([f"keep {kept} of {plural(total, 'clip')}", *filter(None, [", ".join(reasons)])])
+        head = f"keep {kept} of {plural(total, 'clip')}"
+        return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
         """Count for each check the frames and clips that it rejects, with its most frequent place and worst finding."""
-        found, counts = self.findings, {}
+        counts: dict[str, dict[str, Any]] = {}
         for k, name in enumerate(self.checks):
-            mine = np.flatnonzero(found["check"] == k)
-            rows, place, worst, frame = np.unique(found["row"][mine]), "", "", -1
-            if len(mine):
-                least = int(mine[np.argmin(found["margin"][mine])])
-                often, its = (
-                    int(Counter(found["place"][mine].tolist()).most_common(1)[0][0]),
-                    found["place"][least],
-                )
-                place, frame = self.places[often], int(self.frame[found["row"][least]])
-                worst = quantity(float(found["value"][least]), self.units[k])
-                worst = worst if its == often else f"{self.places[its]} {worst}"
+            found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}
+            rows = np.unique(found["row"])
+            undecided = int((self.silent[:, k] & self.undecided).sum())
             counts[name] = {
                 "frames": len(rows),
                 "clips": len(np.unique(self.clip[rows])),
-                "undecided": int((self.silent[:, k] & self.undecided).sum()),
-                "place": place,
-                "worst": worst,
-                "frame": frame,
+                "undecided": undecided,
             }
+            counts[name] |= {"place": "", "worst": "", "frame": -1}
+            if len(rows):
+                worst = int(np.argmin(found["margin"]))
+                often, its = (
+                    self.places[at]
+                    for at in (int(np.bincount(found["place"]).argmax()), int(found["place"][worst]))
+                )
+                value = quantity(float(found["value"][worst]), self.units[k])
+                counts[name] |= {"place": often, "worst": value if its == often else f"{its} {value}"}
+                counts[name]["frame"] = int(self.frame[found["row"][worst]])
         return counts
 
     def summary(self, most: int = 5) -> str:
@@ -516,18 +513,19 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
-    """Return what reports say of checks: whether `posekit.repair` helps, and the user's next step."""
+    """Return what reports say of checks: their rank among causes, whether repair helps, the user's next step."""
     table: dict[str, Any] = tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
     return table
 
 
+def rank_of(check: str) -> int:
+    """Return the rank of a check among causes: 0 if others reject what it finds, above 1 if it rejects what others do."""
+    return int(_known_checks().get(check, {}).get("rank", 1))
+
+
 def _in_order(spans: list[Span]) -> list[Span]:
     """Sort spans: rejections before what is undecided, causes before effects near them, then by severity."""
-    known = [_known_checks().get(one.check, {}) for one in spans]
-    ranks = [
-        0 if span.check in CAUSES else 1 + one.get("follows", 0)
-        for span, one in zip(spans, known, strict=True)
-    ]
+    ranks = [rank_of(span.check) for span in spans]
     rejected = [span.verdict == "invalid" for span in spans]
 
     def follows(k: int) -> bool:

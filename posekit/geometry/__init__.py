@@ -4,6 +4,7 @@ Arrays are batches: vectors (..., 3), quaternions (..., 4) in Pinocchio's order 
 NaN marks an unknown value and propagates. A result never depends on the size of the batch.
 """
 
+from posekit.geometry.hulls import beyond_hull as beyond_hull
 from posekit.geometry.quaternions import quaternion_from_rotation as quaternion_from_rotation
 from posekit.geometry.quaternions import quaternion_log as quaternion_log
 from posekit.geometry.quaternions import quaternion_rotate as quaternion_rotate

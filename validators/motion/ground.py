@@ -136,9 +136,13 @@ class Ground:
 
 @once
 def stature_of(body: Body) -> float:
-    """Return the stature, metres, by the median length of the legs."""
+    """Return the stature, metres, by the median length of the legs; NaN where no leg is known."""
     legs = [known_median(leg) for leg in body.segment_lengths[LIMB_ROWS[4:]]]
-    stature = 2 * float(mean_known(np.array(legs))) / LEG_SHARE
+    return 2 * float(mean_known(np.array(legs))) / LEG_SHARE
+
+
+def _stature(body: Body) -> float:
+    stature = stature_of(body)
     return stature if stature > 0 else USUAL_STATURE
 
 
@@ -152,7 +156,7 @@ def soles(body: Body) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and the heights of their soles along up (T, 6)."""
     points = np.concatenate([body.feet, body.joints[:, both("ankle")]], axis=1)
     toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
-    over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * stature_of(body)] * len(SIDES)
+    over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(body)] * len(SIDES)
     return points, points @ up_of(body) - over
 
 
@@ -202,7 +206,7 @@ def ground_of(body: Body) -> Ground:
     else:
         low, high = np.percentile(held, (5, 98))
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * stature_of(body))
+    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(body))
     return Ground(
         low=float(low),
         high=float(high - low),

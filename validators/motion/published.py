@@ -14,12 +14,11 @@ from typing import Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from posekit.geometry import Array, mean_known, norm, perpendicular, runs
+from posekit.geometry import Array, beyond_hull, mean_known, norm, perpendicular, runs
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import ground_of, soles, up_of
-from posekit.validators.motion.standing import beyond_support
 from posekit.validators.motion.timeline import timeline_of
 
 #: Parts of a clip that PHUMA judges as a whole, their overlap, and their least duration, seconds.
@@ -107,7 +106,7 @@ def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) ->
     """
     feet, _ = soles(body)
     points = _hips(body), body.joints[:, JOINT["pelvis"]]
-    away = np.stack([np.maximum(beyond_support(one, feet, up_of(body)), 0.0) for one in points], axis=1)
+    away = np.stack([np.maximum(beyond_hull(one, feet, up_of(body)), 0.0) for one in points], axis=1)
     value = _of_parts(body, away, worst=np.fmax)
     return Judgement(("root", "pelvis"), value, upper=np.array([root, pelvis]))
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, runs, unit
+from posekit.geometry import Array, beyond_hull, runs
 from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import FEET_POINTS, both
 from posekit.validators.body import Body
@@ -190,38 +189,4 @@ def beyond_feet(body: Body) -> Array:
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
     reach = (0.4 if toes else FORWARD_SHARE) * FOOT_SHARE * stature_of(body)
     centre = centre_of_mass(body.joints)
-    return beyond_support(centre, np.where(bears[..., None], feet, np.nan), up_of(body)) - reach
-
-
-def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
-    r"""Return how far points are, along the ground, beyond the convex hull of what bears.
-
-    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u: it is
-    greatest for the normal of an edge, or for the way from the nearest corner.
-
-    Parameters
-    ----------
-    points : array (T, 3)
-        Metres.
-    bearing : array (T, P, 3)
-        Corners; NaN where one bears nothing.
-    up : array (3,)
-        Unit vector against gravity.
-
-    Returns
-    -------
-    array (T,)
-        Metres; negative inside; NaN where nothing bears, or the point is not known.
-    """
-    first = unit(np.cross(up, np.eye(3)[np.abs(up).argmin()]))
-    across = np.stack([first, np.cross(up, first)], axis=1)
-    at, corners = points @ across, bearing @ across
-    one, other = zip(*itertools.permutations(range(corners.shape[1]), 2), strict=True)
-    edges = corners[:, other] - corners[:, one]
-    normals = edges[..., ::-1] * [1.0, -1.0]
-    ways = unit(np.concatenate([normals, at[:, None] - corners], axis=1))
-    reach = np.fmax.reduce(np.einsum("tdi,tpi->tdp", ways, corners), axis=2)
-    beyond = np.fmax.reduce(np.einsum("tdi,ti->td", ways, at) - reach, axis=1)
-    # A point on the only corner has no way from it.
-    on_it = (at[:, None] == corners).all(axis=2).any(axis=1)
-    return np.asarray(np.where(np.isnan(beyond) & on_it, 0.0, beyond))
+    return beyond_hull(centre, np.where(bears[..., None], feet, np.nan), up_of(body)) - reach

@@ -15,7 +15,7 @@ from posekit.motion.repair.clip import Clip, RobotClip, rejected
 from posekit.motion.repair.pieces import placed, vectors_of
 from posekit.skeleton import JOINTS, LIMB_SEGMENTS, SIDES, other_side, segment_name
 from posekit.validators.motion.sides import SIDE_PAIRS
-from posekit.validators.report import CAUSES, Report
+from posekit.validators.report import Report, rank_of
 
 #: Times that all remedies are tried in turn.
 ROUNDS: Final = 3
@@ -83,7 +83,7 @@ def _mended_over_time(clip: Clip, remedies: Sequence[tuple[str, Remedy]]) -> Cli
 def _count(report: Report) -> int:
     """Count rejected frames check by check; one of a cause, which hides others, as several."""
     pairs = np.unique(np.stack([report.findings["check"], report.findings["row"]]), axis=1)
-    return sum(CAUSE_WEIGHT if report.checks[k] in CAUSES else 1 for k in pairs[0])
+    return sum(1 if rank_of(report.checks[k]) else CAUSE_WEIGHT for k in pairs[0])
 
 
 def _numbers(report: Report, check: str, place: str, column: str = "value") -> Array:
