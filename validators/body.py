@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
+from posekit.body import Figure, load_figure
 from posekit.body.lengths import lengths_in_frames
 from posekit.body.measured import Person, figure_of, person_of
 from posekit.geometry import Array, Record
@@ -27,7 +28,6 @@ from posekit.skeleton import (
 )
 
 if TYPE_CHECKING:
-    from posekit.body import Figure
     from posekit.robots import Robot
 
 Found = TypeVar("Found")
@@ -218,11 +218,7 @@ class Body(Record):
     @cached_property
     def base_figure(self) -> Figure:
         """`base`, or the built-in figure."""
-        if self.base is not None:
-            return self.base
-        from posekit.body import load_figure
-
-        return load_figure()
+        return load_figure() if self.base is None else self.base
 
     @cached_property
     def figure(self) -> Figure:

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import PosekitError, cut, nearest, refusal, shown
+from posekit.errors import PosekitError, cut, nearest, refusal
 from posekit.geometry import Array, Record
 
 if TYPE_CHECKING:
@@ -252,10 +252,6 @@ def check(
     >>> wrists_apart.name
     'wrists-apart'
     """
-    for one in reads:
-        if one not in READABLE:
-            expected = f"some of {', '.join(READABLE)}"
-            raise refusal(f"check {name}", "reads", shown(one), expected, nearest(one, READABLE))
     return lambda judge: FunctionCheck(name, unit, tuple(reads), judge, tuple(points), over_time)
 
 

@@ -86,17 +86,15 @@ class Collision:
         head = np.isfinite(body.head).any()
         links = self.pairs or [pair for pair in _pairs(body.figure) if head or "head" not in pair]
         pairs = [(at[a], at[b]) for a, b in links]
-        used = sorted({k for pair in pairs for k in pair})
-        place = {k: column for column, k in enumerate(used)}
         # Row 19 is the middle of the head's points.
         points = np.concatenate([body.points, body.head.mean(axis=1, keepdims=True)], axis=1).swapaxes(0, 1)
-        tops = [capsules[k].start[0] for k in used]
-        ends = [capsules[k].end[0] if len(capsules[k].end) == 1 else len(POINTS) for k in used]
+        tops = [one.start[0] for one in capsules]
+        ends = [one.end[0] if len(one.end) == 1 else len(POINTS) for one in capsules]
         axis = unit(points[ends] - points[tops])
-        centre = np.array([capsules[k].center for k in used])[:, None, None]
-        half = np.array([capsules[k].half_length for k in used])[:, None, None] * axis
+        centre = np.array([one.center for one in capsules])[:, None, None]
+        half = np.array([one.half_length for one in capsules])[:, None, None] * axis
         middle, count = points[tops] + centre * axis, len(body)
-        one, other = (np.array([place[pair[end]] for pair in pairs], dtype=np.intp) for end in range(2))
+        one, other = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
         radius = [capsule.radius * _slimness(body, capsule.link) for capsule in capsules]
         radii = np.array([radius[a] + radius[b] for a, b in pairs])
         reach = np.array([capsules[a].half_length + capsules[b].half_length for a, b in pairs])

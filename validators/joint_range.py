@@ -70,7 +70,7 @@ class JointRange:
     """An angle of a joint is outside its range.
 
     The rotation of an almost straight limb is hardly determined. Its tolerance is that of directions divided by the
-    sine of the bend; below `straight_degrees` it is undecided for measured bodies.
+    sine of the bend; below `STRAIGHT_DEGREES` it is undecided for measured bodies.
 
     Parameters
     ----------
@@ -78,8 +78,6 @@ class JointRange:
         ``neck``, ``pelvis``, ``right_shoulder`` and so on; all of them by default.
     upper_only : bool
         Judge the upper segment of the limb alone.
-    straight_degrees : float
-        Bend below which the rotation of a measured limb is undecided.
     """
 
     name = "joint-range"
@@ -88,7 +86,6 @@ class JointRange:
 
     part: str = ""
     upper_only: bool = False
-    straight_degrees: float = STRAIGHT_DEGREES
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -144,9 +141,7 @@ class JointRange:
             elif part == "pelvis":
                 found.append(_pelvis(limits, body))
             else:
-                found.append(
-                    _limb(limits, body, LIMBS.index(part), self.straight_degrees if body.measured else 0.0)
-                )
+                found.append(_limb(limits, body, LIMBS.index(part)))
         return Judgement.stacked(found)
 
 
@@ -156,13 +151,14 @@ def _of_table1(body: Body) -> Mapping[str, Any] | None:
     return table if table is not None and table["kind"] in ("rotation", "projected") else None
 
 
-def _limb(limits: Limits, body: Body, limb: int, straight: float) -> Judgement:
+def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     """Judge one limb: in the usual way of writing, else in the one that is least outside.
 
     Over time, neighbouring frames of measured people tell which way a hinge bends.
     """
     joints, (places, keep) = body.joints, _places(limits, limb)
     tolerance = body.angle_tolerance((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
+    straight = STRAIGHT_DEGREES if body.measured else 0.0
     in_time = body.motion and body.tolerance is None and body.dt > 0
     if engine.compiled and not in_time:
         found = engine.compiled.stated(limits.numbers, limb, joints, tolerance, straight)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -178,16 +178,18 @@ def judge_postures(
         tolerance=tolerance,
         motion=False,
     )
-    return {one.name: judgement for one, judgement, _ in _asked(checks, body) if judgement is not None}
+    return {name: judgement for name, (_, judgement) in _asked(checks, body)[0].items()}
 
 
-def _asked(checks: Iterable[Check], body: Body) -> Iterator[tuple[Check, Judgement | None, str]]:
-    """Yield each check with what it found, or with the reason why it does not apply."""
+def _asked(checks: Iterable[Check], body: Body) -> tuple[dict[str, tuple[Check, Judgement]], dict[str, str]]:
+    """Return by name the checks with what they found, and why the others do not apply."""
+    found, not_asked = {}, {}
     for check in checks:
         try:
-            yield check, judged(check, body), ""
+            found[check.name] = check, judged(check, body)
         except NotAskedError as reason:
-            yield check, None, str(reason)
+            not_asked[check.name] = str(reason)
+    return found, not_asked
 
 
 def _validate_settings(settings: Settings) -> ValidateSettings:
@@ -268,10 +270,9 @@ def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[R
 
 def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
     """Ask all checks about one recording."""
-    asked = list(_asked(checks, body))
-    found = list({check.name: (check, one) for check, one, _ in asked if one is not None}.values())
+    by_name, not_asked = _asked(checks, body)
+    found = list(by_name.values())
     quiet = OF_SOME_ROBOTS if body.settings.checks is None else ()
-    not_asked = {one.name: reason for one, _, reason in asked if reason and one.name not in quiet}
     count = len(body)
     places = tuple(dict.fromkeys(place for _, one in found for place in one.places))
     place_at = {place: k for k, place in enumerate(places)}
@@ -300,7 +301,7 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         time=np.asarray(motion.time),
         files=(motion.source,),
         names=(name,),
-        checks=tuple(check.name for check, _ in found),
+        checks=tuple(by_name),
         units=tuple(check.unit for check, _ in found),
         places=places,
         findings=findings,
@@ -308,11 +309,11 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         silent=silent,
         incomplete=np.asarray(~np.isfinite(known.reshape(count, -1)).all(axis=1)),
         messages={check.name: message_of(check) for check, _ in found},
-        not_asked=not_asked,
+        not_asked={one: reason for one, reason in not_asked.items() if one not in quiet},
         settings={**body.settings.to_json(), **body.allowed()},
         notes=(
             *motion.notes,
-            *hints(body, {check.name: one for check, one in found}, np.asarray(motion.frame)),
+            *hints(body, {check: one for check, (_, one) in by_name.items()}, np.asarray(motion.frame)),
         ),
         warnings=(*motion.warnings, *rate_doubts(body)),
     )
@@ -376,11 +377,6 @@ class Validator:
     def body(self) -> Robot:
         """The figure or the robot."""
         return self.figure or self.robot  # type: ignore[return-value]
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model of the figure or robot."""
-        return self.body.model
 
     @property
     def configuration_names(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -35,9 +35,6 @@ USUAL_REMEDY: Final = "leave such frames out with --keep-spans, or use --repair"
 
 #: Columns of the findings that are numbers.
 NUMBERS: Final = ("value", "lower", "upper", "margin")
-
-#: Columns of the table of findings.
-COLUMNS: Final = tuple("clip frame time check place value lower upper unit margin verdict".split())
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -253,19 +250,23 @@ class Report(Record):
             ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row a violation, and a
             row for each check that is undecided about a frame, whose numbers are NaN.
         """
-        cells, titles = self._cells, [*map(_title, self.files, self.names)]
-        row, check = cells["row"], cells["check"]
-        words = {
-            "clip": (titles, self.clip[row]),
-            "check": (self.checks, check),
-            "place": ([*self.places, ""], cells["place"]),
-            "unit": (self.units, check),
-            "verdict": (("invalid", "undecided"), np.isnan(cells["margin"]).astype(np.intp)),
+        cells = self._cells
+        undecided = np.isnan(cells["margin"]).astype(np.intp)
+
+        def named(words: Iterable[str], which: NDArray[np.intp]) -> NDArray[Any]:
+            return np.array([*words], dtype=object)[which]
+
+        return {
+            "clip": named(map(_title, self.files, self.names), self.clip[cells["row"]]),
+            "frame": self.frame[cells["row"]],
+            "time": self.time[cells["row"]],
+            "check": named(self.checks, cells["check"]),
+            "place": named([*self.places, ""], cells["place"]),
+            **{name: cells[name] for name in ("value", "lower", "upper")},
+            "unit": named(self.units, cells["check"]),
+            "margin": cells["margin"],
+            "verdict": named(("invalid", "undecided"), undecided),
         }
-        columns = {name: np.array(known, dtype=object)[which] for name, (known, which) in words.items()}
-        columns |= {"frame": self.frame[row], "time": self.time[row]}
-        columns |= {name: cells[name] for name in NUMBERS}
-        return {name: columns[name] for name in COLUMNS}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a data frame."""
@@ -383,10 +384,8 @@ class Report(Record):
             counts[name] |= {"place": "", "worst": "", "frame": -1}
             if len(rows):
                 worst = int(np.argmin(found["margin"]))
-                often, its = (
-                    self.places[at]
-                    for at in (int(np.bincount(found["place"]).argmax()), int(found["place"][worst]))
-                )
+                often = self.places[int(np.bincount(found["place"]).argmax())]
+                its = self.places[int(found["place"][worst])]
                 value = quantity(float(found["value"][worst]), self.units[k])
                 counts[name] |= {"place": often, "worst": value if its == often else f"{its} {value}"}
                 counts[name]["frame"] = int(self.frame[found["row"][worst]])
@@ -519,7 +518,7 @@ def _known_checks() -> Mapping[str, Mapping[str, Any]]:
 
 
 def rank_of(check: str) -> int:
-    """Return the rank of a check among causes: 0 if others reject what it finds, above 1 if it rejects what others do."""
+    """Return the rank of a check among causes: 0 if other checks reject what it finds, above 1 the other way."""
     return int(_known_checks().get(check, {}).get("rank", 1))
 
 

@@ -73,13 +73,9 @@ def _over_gaps(joints: Array) -> Array:
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)
-    before = np.concatenate([np.full((1, last.shape[1]), -1), last[:-1]])[: len(joints)]
-    gap = known & (before >= 0) & (before < slots - 1)
-    ways = np.full(known.shape, np.nan)
-    at, joint = np.nonzero(gap)
-    from_slot = before[at, joint]
-    ways[at, joint] = norm(joints[at, joint] - joints[from_slot, joint]) / (at - from_slot)
-    return ways
+    before = np.pad(last, ((1, 0), (0, 0)), constant_values=-1)[:-1]
+    way = norm(joints - np.take_along_axis(joints, np.maximum(before, 0)[..., None], axis=0))
+    return np.where((before >= 0) & (before < slots - 1), way / np.maximum(slots - before, 1), np.nan)
 
 
 @check("joint-velocity", unit="1", reads=("q", "robot", "time"), over_time=True)
