@@ -11,7 +11,7 @@ import numpy as np
 
 from posekit.body import load_figure
 from posekit.cameras import LeeChenCamera
-from posekit.cameras.head import TABLE_A2, HeadPoints, calibrate, dlt
+from posekit.cameras.head import TABLE_A2, HeadPoints, solve_pose
 from posekit.cameras.lee_chen import (
     camera_position,
     image_from_paper,
@@ -23,6 +23,9 @@ from posekit.geometry import Array
 from posekit.papers.rows import Row, printed, row
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 from posekit.synthesis import random_postures
+
+#: The paper's camera before f is known.
+UNKNOWN: Final = LeeChenCamera(f=None)
 
 #: Distance of the paper's image plane, metres (Table 2).
 F: Final = 0.05
@@ -71,7 +74,7 @@ def exact_image(head: HeadPoints = TABLE_A2) -> Array:
 @cache
 def table_2() -> dict[str, Array]:
     """Return Table 2(a) to (d) from exact projections, in the paper's frames, centimetres."""
-    pose = calibrate(TABLE_A2, exact_image())
+    pose = solve_pose(TABLE_A2, exact_image(), UNKNOWN)
     R, t, f = pose.R_cam_head[0], pose.t_cam_head[0], float(pose.f[0])
     return {
         "T": transformation_matrix(R, 100 * t, 100 * f),
@@ -98,17 +101,8 @@ def _figure_rows() -> Iterator[Row]:
 
 
 def _null_space_rows() -> Iterator[Row]:
-    """Solve eqs. (2)-(5), written out here."""
-    rows = []
-    for (x, y, z), (u, v) in zip(100 * TABLE_A2.points, exact_image() * [100.0, -100.0], strict=True):
-        rows.append([x, 0, -u * x, y, 0, -u * y, z, 0, -u * z, 1, 0, -u])
-        rows.append([0, x, -v * x, 0, y, -v * y, 0, z, -v * z, 0, 1, -v])
-    _, singular, axes = np.linalg.svd(np.array(rows))
-    S = axes[-1].reshape(4, 3)
-    S *= np.sign(S[3, 2]) / np.linalg.norm(S[:3, 0])  # the sign of a camera that has the head in front of it
-    f = 1 / float(np.linalg.norm(S[:3, 2]))
-    R = np.stack([S[:3, 0], S[:3, 1], -f * S[:3, 2]], axis=1)
-    x, y, z = R @ [-S[3, 0], -S[3, 1], (S[3, 2] - 1) * f]
+    singular, f, R, position = _null_space(TABLE_A2, exact_image())
+    x, y, z = position
     rank = int((singular > 1e-9 * singular[0]).sum())
     yield row("rank", f"rank {rank} of 12 unknowns", rank == 11)
     here = f"{f:.6f} and ({x:.6f}, {abs(y):.6f}, {abs(z):.6f}) cm"
@@ -117,10 +111,24 @@ def _null_space_rows() -> Iterator[Row]:
     yield row("rotation", f"{off:.0e} off", off < 1e-6)
 
 
+def _null_space(head: HeadPoints, image: Array) -> tuple[Array, float, Array, Array]:
+    """Solve eqs. (2)-(5): singular values, f, the axes of the camera, and its position, centimetres."""
+    rows = []
+    for (x, y, z), (u, v) in zip(100 * head.points, image * [100.0, -100.0], strict=True):
+        rows.append([x, 0, -u * x, y, 0, -u * y, z, 0, -u * z, 1, 0, -u])
+        rows.append([0, x, -v * x, 0, y, -v * y, 0, z, -v * z, 0, 1, -v])
+    _, singular, axes = np.linalg.svd(np.array(rows))
+    S = axes[-1].reshape(4, 3)
+    S *= np.sign(S[3, 2]) / np.linalg.norm(S[:3, 0])  # the sign of a camera that has the head in front of it
+    f = 1 / float(np.linalg.norm(S[:3, 2]))
+    R = np.stack([S[:3, 0], S[:3, 1], -f * S[:3, 2]], axis=1)
+    return singular, f, R, R @ [-S[3, 0], -S[3, 1], (S[3, 2] - 1) * f]
+
+
 def _noisy_error(head: HeadPoints) -> float:
     """Return the median error of the camera position from noisy head points, centimetres."""
     noise = IMAGE_NOISE * np.random.default_rng(0).normal(size=(N_PICTURES, 8, 2))[:, : len(head.points)]
-    pose = calibrate(head, exact_image(head) + noise)
+    pose = solve_pose(head, exact_image(head) + noise, UNKNOWN)
     position = camera_position(pose.R_cam_head, pose.t_cam_head, pose.f)
     return float(100 * np.median(np.linalg.norm(position - CAMERA, axis=1)))
 
@@ -150,15 +158,14 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
     """Return how far off the camera is, centimetres, and the head point that does not fit the others."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the misfit is returned
-        pose = calibrate(head, image)
+        pose = solve_pose(head, image, UNKNOWN)
     position = camera_position(pose.R_cam_head[0], pose.t_cam_head[0], float(pose.f[0]))
     return 100 * float(np.linalg.norm(position - CAMERA)), pose.misfit[0] or "no point"
 
 
 def _linear(head: HeadPoints, image: Array) -> float:
     """Return how far off the camera of the linear solution is, centimetres."""
-    found = dlt(head, image)
-    return 100 * float(np.linalg.norm(camera_position(found.R[0], found.t[0], float(found.f[0])) - CAMERA))
+    return float(np.linalg.norm(_null_space(head, image)[3] - 100 * CAMERA))
 
 
 def _body_rows() -> Iterator[Row]:

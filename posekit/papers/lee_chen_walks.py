@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.cameras import LeeChenCamera, View
-from posekit.cameras.head import TABLE_A2, calibrate
+from posekit.cameras.head import TABLE_A2, solve_pose
 from posekit.geometry import Array
 from posekit.papers.lee_chen_camera import F
 from posekit.papers.lee_chen_constraints import body_of
@@ -176,7 +176,7 @@ def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -
     those of `table1-printed`.
     """
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
-    pose = calibrate(TABLE_A2, image)
+    pose = solve_pose(TABLE_A2, image, LeeChenCamera(f=None))
     trees = grow(
         LeeChenCamera(f=pose.f),
         view.image,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, LengthUncertainty
 from posekit.body.lengths import stature_from_lengths
 from posekit.cameras import LeeChenCamera, PinholeCamera, ScaledOrthographicCamera, View
-from posekit.cameras.head import HeadPoints, HeadPose, calibrate, solve_pose
+from posekit.cameras.head import HeadPoints, HeadPose, solve_pose
 from posekit.cameras.lee_chen import camera_position, rotation_to_paper
 from posekit.errors import PosekitError, refusal
 from posekit.geometry import Array, Record
@@ -218,10 +218,8 @@ def _head_pose(
     own = dict(zip(("neck", *HEAD_POINTS), origin + person.head_points, strict=True))
     points = HeadPoints.from_mapping({**own, **stated})
     image = np.where(enough[:, None, None], image, np.nan)
-    if unknown:
-        pose = calibrate(points, image)
-        return LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)), pose
-    return model, solve_pose(points, image, model)
+    pose = solve_pose(points, image, model)
+    return (LeeChenCamera(f=np.where(pose.found, pose.f, 1.0)) if unknown else model), pose
 
 
 def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) -> None:
