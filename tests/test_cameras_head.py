@@ -31,7 +31,8 @@ def scene(head=TABLE_A2, frames=40, seed=0, depth=(1.5, 5)):
 )
 def test_exact_points_give_the_pose(camera):
     R, t, points = scene()
-    pose = solve_pose(TABLE_A2, camera.project(points), camera).require()
+    pose = solve_pose(TABLE_A2, camera.project(points), camera)
+    assert pose.found.all()
     np.testing.assert_allclose(pose.R_cam_head, R, atol=1e-7)
     np.testing.assert_allclose(pose.t_cam_head, t, atol=1e-6)
     np.testing.assert_allclose(pose.point("nose"), points[:, 1], atol=1e-6)
@@ -123,11 +124,8 @@ def test_a_mirrored_image_is_recognised():
 @pytest.mark.parametrize(
     ("act", "says"),
     [
-        (lambda: HeadPoints(names=("a",) * 6, points=TABLE_A2.points), "twice"),
         (lambda: TABLE_A2.with_points({"nose": TABLE_A2.points[0]}), "coincide"),
         (lambda: HeadPoints(names=TABLE_A2.names, points=TABLE_A2.points * [1, 1, 0]), "coincide|plane"),
-        (lambda: TABLE_A2.with_points({"chin": [0, 1]}), "chin"),
-        (lambda: TABLE_A2.index("noze"), "did you mean nose"),
         (lambda: solve_pose(TABLE_A2, np.ones((5, 2)), UNKNOWN), r"\(6, 2\)"),
         (lambda: solve_pose(TABLE_A2, np.ones((6, 2)), UNKNOWN), "one line"),
         (lambda: solve_pose(TABLE_A2, np.full((6, 2), np.inf), UNKNOWN), "infinite"),

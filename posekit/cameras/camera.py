@@ -127,9 +127,8 @@ def positive(name: str, value: float | Array | None) -> float | Array | None:
     values = read_only(value)
     good = (values >= 1 / FARTHEST_COORDINATE) & (values <= FARTHEST_COORDINATE)
     if values.ndim > 1 or not good.all():
-        bad = shown(values.tolist()) if values.ndim > 1 else shown(float(values[~good].flat[0]))
-        limits = f"{1 / FARTHEST_COORDINATE:g} to {FARTHEST_COORDINATE:g}"
-        raise refusal("camera", name, bad, f"a number from {limits}, one or one a frame", error=CameraError)
+        expected = f"a number from {1 / FARTHEST_COORDINATE:g} to {FARTHEST_COORDINATE:g}, one or one a frame"
+        raise refusal("camera", name, shown(values.tolist()), expected, error=CameraError)
     return values if values.ndim else float(values)
 
 

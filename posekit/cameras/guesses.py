@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from posekit.cameras.pinhole import PinholeCamera
-from posekit.errors import CameraError, refusal, shown
+from posekit.errors import CameraError, refusal
 
 #: Relative standard deviation of f. Angles and equivalents are rounded, measured along one axis or another, and quoted
 #: for a lens without distortion. Rounding 26 mm to a millimetre costs 2 %; an equivalent by width instead of by
@@ -52,8 +52,6 @@ def camera_from_fov(
     if not 0 < fov_degrees < 180:
         raise refusal("camera", "fov", f"{fov_degrees:g}", "degrees between 0 and 180", error=CameraError)
     extents = {"diagonal": math.hypot(*size), "horizontal": size[0], "vertical": size[1]}
-    if axis not in extents:
-        raise refusal("camera", "axis", shown(axis), f"one of {', '.join(extents)}", error=CameraError)
     f = extents[axis] / (2 * math.tan(math.radians(fov_degrees) / 2))
     how = f"a guess: {fov_degrees:g} degrees of view ({axis}), f within {100 * deviation:.0f} %"
     K = np.array([[f, 0.0, (size[0] - 1) / 2], [0.0, f, (size[1] - 1) / 2], [0.0, 0.0, 1.0]])

@@ -112,14 +112,7 @@ class HeadPose(Record):
 
     def point(self, name: str) -> Array:
         """Return one point of the head (F, 3), camera frame, metres."""
-        return np.asarray(self.points_cam[:, self.head.index(name)])
-
-    def require(self) -> HeadPose:
-        """Return self, or raise `HeadError` for the first frame without a pose."""
-        for frame, reason in enumerate(self.reasons):
-            if reason:
-                raise HeadError(f"frame {frame}: {reason}" if len(self.reasons) > 1 else reason)
-        return self
+        return np.asarray(self.points_cam[:, self.head.names.index(name)])
 
 
 def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeChenCamera) -> HeadPose:
@@ -214,8 +207,8 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
         rms=np.sqrt(whole(cost, fitted) / np.maximum(seen.sum(axis=-1), 1)),
         misfit=tuple(misfit),
     )
-    if np.ndim(image) == 2:
-        pose.require()
+    if np.ndim(image) == 2 and reasons[0]:
+        raise HeadError(reasons[0])
     _warn(pose, chance[good], rows[good])
     return pose
 
@@ -340,11 +333,12 @@ class _Problem(NamedTuple):
         fits = [self.fit(self.start())]
         thinnest = np.linalg.svd(self.points, full_matrices=False)[2][:, 2]
         mirror = np.eye(3) - 2 * thinnest[:, :, None] * thinnest[:, None, :]
-        R, *rest = _parts(fits[0][0])
-        fits.append(self.fit(_pose(np.diag([1.0, 1.0, -1.0]) @ R @ mirror, *rest)))
+        R, shift, scale, slope = _parts(fits[0][0])
+        fits.append(self.fit(_pose(np.diag([1.0, 1.0, -1.0]) @ R @ mirror, shift, scale, slope)))
         if self.free:
-            *near, slope = _parts(self.start())
-            fits.append(self.fit(_pose(*near, slope + NEAR_SLOPE)))
+            near = self.start()
+            near[:, -1] = NEAR_SLOPE
+            fits.append(self.fit(near))
         which, each = np.argmin([cost for _, cost, _ in fits], axis=0), np.arange(len(self.points))
         x, cost, residual = (np.stack(values)[which, each] for values in zip(*fits, strict=True))
         return x, cost, residual

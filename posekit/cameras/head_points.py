@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.errors import HeadError, nearest, refusal, shown
+from posekit.errors import HeadError, refusal
 from posekit.geometry import Array, Flags, Record
 from posekit.skeleton import HEAD_POINTS
 
@@ -55,8 +55,6 @@ class HeadPoints(Record):
         if points.shape != (len(names), 3) or not np.isfinite(points).all():
             got = f"{len(names)} names and points of shape {points.shape}"
             raise refusal("head_points", "", got, "three finite numbers for each name", error=HeadError)
-        if repeated := sorted({name for name in names if names.count(name) > 1}):
-            raise refusal("head_points", "", f"{repeated[0]} twice", "each name once", error=HeadError)
         if reason := degeneracy(names, points, np.ones(len(names), dtype=np.bool_)):
             raise HeadError(reason)
         self._set("names", names)
@@ -65,22 +63,11 @@ class HeadPoints(Record):
     @classmethod
     def from_mapping(cls, points: Mapping[str, ArrayLike]) -> HeadPoints:
         """Make a head of points by name, any names, in the mapping's order; metres."""
-        for name, point in points.items():
-            if np.shape(point) != (3,):
-                raise refusal("head_points", name, shown(point), "three numbers x, y, z", error=HeadError)
-        places = np.array(list(points.values()), dtype=np.float64).reshape(-1, 3)
-        return cls(names=tuple(points), points=places)
+        return cls(names=tuple(points), points=np.array(list(points.values()), dtype=np.float64))
 
     def with_points(self, points: Mapping[str, ArrayLike]) -> HeadPoints:
         """Replace points by name and append new ones."""
         return HeadPoints.from_mapping({**dict(zip(self.names, self.points, strict=True)), **points})
-
-    def index(self, name: str) -> int:
-        """Return the row of a point; raise `HeadError` if there is none."""
-        if name not in self.names:
-            near = nearest(name, self.names)
-            raise refusal("head_points", "", shown(name), "a point", near, error=HeadError)
-        return self.names.index(name)
 
 
 def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:

@@ -84,13 +84,14 @@ class PinholeCamera(Camera):
             counts = (0, 4) if self.fisheye else lens.COEFFICIENT_COUNTS
             if len(distortion) not in counts or not (abs(distortion) <= lens.MAX_COEFFICIENT).all():
                 model = "the fisheye model" if self.fisheye else "OpenCV's models"
-                most = lens.MAX_COEFFICIENT
-                expected = f"{', '.join(map(str, counts))} coefficients of {model}, up to {most:g}"
+                expected = (
+                    f"{', '.join(map(str, counts))} coefficients of {model}, up to {lens.MAX_COEFFICIENT:g}"
+                )
                 got = f"{len(distortion)} coefficients {shown(distortion.tolist())}"
                 raise self._refused("distortion", got, expected)
             self._set("distortion", distortion if distortion.any() or self.fisheye else None)
         if self.R is not None:
-            self._set("R", rotation_from_rounded(self.R))
+            self._set("R", self._rotation(np.asarray(self.R, dtype=np.float64)))
         if self.t is not None:
             t = np.array(self.t, dtype=np.float64).ravel()
             if t.shape != (3,) or not np.isfinite(t).all():
@@ -98,8 +99,7 @@ class PinholeCamera(Camera):
             self._set("t", t)
         if self.size is not None:
             sides = tuple(self.size)
-            whole = [0 < side <= MAX_PICTURE_SIDE and float(side).is_integer() for side in sides]
-            if len(sides) != 2 or not all(whole):
+            if len(sides) != 2 or not all(side in range(1, MAX_PICTURE_SIDE + 1) for side in sides):
                 expected = f"a width and a height in whole pixels, 1 to {MAX_PICTURE_SIDE:,}"
                 raise self._refused("size", shown(sides), expected)
             self._set("size", (int(sides[0]), int(sides[1])))
@@ -107,6 +107,17 @@ class PinholeCamera(Camera):
             raise self._refused("up", shown(self.up), f"one of {', '.join(UP_AXES)}")
         if not 0 <= self.deviation < 1:
             raise self._refused("deviation", f"{self.deviation:g}", "a fraction of the focal length below 1")
+
+    def _rotation(self, given: Array) -> Array:
+        """Return the rotation nearest to a rounded matrix (3, 3)."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = np.abs(given @ given.T - np.eye(3)).max() if given.shape == (3, 3) else np.inf
+        if not off <= ROTATION_ROUNDING:
+            raise self._refused("R", shown(given.tolist()), "a rotation matrix of shape (3, 3)")
+        rotation, values = best_rotation(given)
+        if values[2] < 0:
+            raise self._refused("R", "a mirroring matrix, of determinant -1", "a rotation")
+        return rotation
 
     def _refused(self, field: str, got: str, expected: str) -> CameraError:
         source = f"camera {shown(self.name)}" if self.name else "camera"
@@ -171,26 +182,3 @@ class PinholeCamera(Camera):
         }
         given = {name: value for name, value in optional.items() if value}
         return {"model": "opencv", "K": self.K.tolist(), **given}
-
-
-def rotation_from_rounded(matrix: Array) -> Array:
-    """Return the rotation nearest to a rounded matrix (3, 3).
-
-    Raises
-    ------
-    CameraError
-        If the matrix is no rotation within `ROTATION_ROUNDING`, or mirrors.
-    """
-    R = np.asarray(matrix, dtype=np.float64)
-    if R.shape != (3, 3) or not np.isfinite(R).all():
-        raise refusal("camera", "R", shown(R.tolist()), "a finite matrix of shape (3, 3)", error=CameraError)
-    with np.errstate(over="ignore", invalid="ignore"):
-        error = float(np.abs(R @ R.T - np.eye(3)).max())
-    if not error <= ROTATION_ROUNDING:
-        got = f"a matrix with R R^T off the identity by {error:.2g}"
-        raise refusal("camera", "R", got, "a rotation matrix", error=CameraError)
-    rotation, values = best_rotation(R)
-    if values[2] < 0:
-        raise refusal("camera", "R", "a mirroring matrix, of determinant -1", "a rotation", error=CameraError)
-    rotation.flags.writeable = False
-    return rotation

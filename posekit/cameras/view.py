@@ -13,7 +13,6 @@ from posekit.cameras.pinhole import PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera
 from posekit.errors import nearest, refusal, shown
 from posekit.geometry import FARTHEST_COORDINATE, Array, Ints, Record
-from posekit.geometry.record import short
 from posekit.settings import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
@@ -166,19 +165,14 @@ class View(Record):
         return replace(self, camera=self.camera.take(index), pictures=pictures, **taken)
 
     def _facts(self) -> list[str]:
+        seen = np.isfinite(self.image).all(axis=2).mean()
         known = [name for name in ("root", "truth") if np.isfinite(getattr(self, name)).any()]
-        seen = np.isfinite(self.image).all(axis=2)
         return [
             f"{len(self)} frame{'s' if len(self) > 1 else ''}",
             f"{self.time[0]:g} to {self.time[-1]:g} s",
             f"camera={type(self.camera).__name__}",
-            f"{seen.mean():.0%} of joints seen",
+            f"{seen:.0%} of joints seen",
             *[f"with {name}" for name in known],
-            *[
-                f"{name}={short(getattr(self, name))}"
-                for name in ("stature", "deviation")
-                if getattr(self, name)
-            ],
         ]
 
     def _check_figure(self) -> None:

@@ -138,7 +138,7 @@ def _table_2_rows() -> Iterator[Row]:
     gap = float(np.abs(image * [100, -100] - tables["image"]).max())
     yield row("image", f"{gap:.0e} cm off at most", gap < 1e-3)
     rounded = image_from_paper(tables["image"] / 100)
-    eye = TABLE_A2.points[TABLE_A2.index("right_eye")] * [0, 1, 1] + [
+    eye = TABLE_A2.points[TABLE_A2.names.index("right_eye")] * [0, 1, 1] + [
         _tables()["misprinted_eye_x"] / 100,
         0,
         0,
