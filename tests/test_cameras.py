@@ -224,7 +224,7 @@ def test_a_view_fills_what_is_unknown_and_takes_frames():
     [
         ({"time": []}, "no frame"),
         ({"image": np.ones((3, 13, 2))}, r"image: got shape \(3, 13, 2\)"),
-        ({"image": np.full((3, 14, 2), np.nan)}, "neck"),
+        ({"image": np.full((3, 14, 2), np.nan)}, "a joint in at least one frame"),
         ({"image": np.where(np.eye(2)[0], np.nan, np.ones((3, 14, 2)))}, "image"),
         ({"root": np.full((3, 3), np.inf)}, "root"),
         ({"confidence": -np.ones((3, 19))}, "confidence"),

@@ -217,14 +217,14 @@ def test_tracker_tells_of_a_detectors_points_what_recover_finds(walk):
     np.testing.assert_allclose(told.joints, posekit.recover(view).answer.joints[0], atol=1e-9)
     points[layout.points.index("left_shoulder")] = np.nan
     hidden = live.update(points, time=0.1)
-    assert "neck" in hidden.reason
+    assert "shoulders" in hidden.reason
     assert np.isnan(hidden.joints).all()
 
 
 def test_tracker_goes_on_without_a_person(walk):
     points, image = walk
     live = tracker(lag=0)
-    assert "neck" in live.update(np.full((14, 2), np.nan), time=0.0).reason
+    assert "shoulders" in live.update(np.full((14, 2), np.nan), time=0.0).reason
     assert np.isnan(live.update(np.full((14, 2), np.nan), time=0.1).path.joints).all()
     assert live.update(image[0], time=0.2, root=points[0, 0]).survivors
     with pytest.raises(posekit.InputError, match="seconds after"):

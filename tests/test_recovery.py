@@ -44,7 +44,7 @@ def noisy(seed, sigma=2.0, count=6):
         image=image,
         head_image=np.empty(0),
         root=view.truth[:, 0],
-        deviation=sigma,
+        deviation=sigma or None,
         lengths=dict(FIGURE.lengths),
     )
 
@@ -163,6 +163,20 @@ def test_hidden_joints_are_inferred_and_what_is_beyond_them_used(random_frames):
         assert np.linalg.norm(wrist - image[k, JOINT["left_wrist"]], axis=1).max() < 12.0
 
 
+@pytest.mark.parametrize(("sigma", "given"), [(0.0, True), (0.0, False), (2.0, True), (2.0, False)])
+def test_a_neck_may_be_hidden(sigma, given):
+    view = noisy(seed=5, sigma=sigma)
+    image = view.image.copy()
+    image[[1, 4], 0] = np.nan
+    seen = replace(view, image=image, root=view.truth[:, 0] if given else np.empty(0))
+    recovery = recover(seen, length_deviation=0.02 if sigma else None)
+    for k in (1, 4):
+        frame, truth = recovery[k], view.truth[k]
+        assert frame.inferred[:, 0].all() and not frame.inferred[:, 1:].any() and np.isfinite(frame.q).all()
+        assert frame.sure_of == ("position" if given else "relative to the neck")
+        assert pa_mpjpe(frame.joints, truth).min() < (0.06 if sigma else 0.01)
+
+
 def test_a_photograph_is_recovered_up_to_its_scale(random_frames):
     s = 180.0
     view = posekit.View(
@@ -238,10 +252,10 @@ def test_an_empty_frame_says_why(random_frames):
 
 def test_unseen_people_and_roots_are_told(random_frames):
     image = random_frames.image[:3].copy()
-    image[1], image[2, 0] = np.nan, np.nan
+    image[1], image[2, 1:4] = np.nan, np.nan
     recovery = recover(replace(random_frames.take([0, 1, 2]), image=image))
     assert [bool(reason) for reason in recovery.frames.reason] == [False, True, True]
-    assert "person is not seen" in recovery.frames.reason[1] and "neck" in recovery.frames.reason[2]
+    assert "person is not seen" in recovery.frames.reason[1] and "pelvis" in recovery.frames.reason[2]
     with pytest.raises(posekit.InputError, match="ray"):
         recover(replace(random_frames, root=random_frames.root + np.array([1.0, 0, 0])))
 

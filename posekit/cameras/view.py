@@ -44,8 +44,7 @@ class View(Record):
         Seconds.
     image : array (F, 14, 2)
         Image points of the joints, in tree order. OpenCV's convention, y down, always: pixels, or metres on the image
-        plane of Lee & Chen's camera. The neck is seen in at least one frame, unless the camera is scaled
-        orthographic: postures hang on it.
+        plane of Lee & Chen's camera. A joint is seen in at least one frame.
     head_image : array (F, 5, 2), optional
         Image points of the head, in the order of `posekit.skeleton.HEAD_POINTS`.
     own_head_image : array (F, K, 2), optional
@@ -84,7 +83,7 @@ class View(Record):
     ------
     InputError
         If a shape is wrong, a number is infinite, a point is known in part, a name is unknown, a length is
-        not positive, or no frame shows the neck.
+        not positive, or no frame shows a joint.
 
     Notes
     -----
@@ -142,8 +141,8 @@ class View(Record):
             self._set(name, values)
         if np.isnan(self.time).any():
             raise refusal("view", "time", "NaN", "a time for every frame", "number the frames if need be")
-        if not isinstance(self.camera, ScaledOrthographicCamera) and np.isnan(self.image[:, 0, 0]).all():
-            raise refusal("view", "image[:, 0]", "NaN", "the neck in at least one frame", "add it")
+        if np.isnan(self.image[..., 0]).all():
+            raise refusal("view", "image", "NaN", "a joint in at least one frame", "add one")
         if self.pictures and len(self.pictures) != frames:
             raise refusal("view", "pictures", f"{len(self.pictures)} names", f"{frames}", "name every frame")
         self._check_figure()

@@ -223,7 +223,7 @@ class Tracker:
         return PathPosture(number, frame.time, joints)
 
     def _view(self, points: Array, time: float, root: ArrayLike | None) -> View:
-        """Make the view of one picture; raise `PosekitError` if it does not show the neck."""
+        """Make the view of one picture."""
         missing = np.isnan(points[:, :2]).any(axis=1, keepdims=True)
         image = np.where(missing, np.nan, points[:, :2])[None]
         confidence = np.where(missing, np.nan, points[:, 2:] if points.shape[1] == 3 else np.nan)[None]
@@ -238,7 +238,5 @@ class Tracker:
             frame=np.zeros(1, dtype=np.intp),
             time=np.array([time]),
         )
-        if "neck" not in names or np.isnan(image[0, names.index("neck")]).any():
-            raise PosekitError("the neck is not seen")
         view = replace(detections.view(self.camera), **self._known)
         return view if root is None else replace(view, root=np.asarray(root, dtype=np.float64)[None])

@@ -72,10 +72,8 @@ def read(document: Any, path: str | Path, options: Options) -> View:
     image = points_by_name(images, JOINTS, 2, "joint")
     head_names = (*HEAD_POINTS, *own)
     head_image = points_by_name([frame.at("head_image", {}) for frame in frames], head_names, 2, "head point")
-    if not isinstance(camera, ScaledOrthographicCamera) and np.isnan(image[:, 0, 0]).all():
-        got = f"nothing in any of {len(frames)} frames"
-        expected = "the neck in at least one frame: the tree grows from it"
-        raise frames[0].at("image").wrong("neck", None, expected, "add it", got)
+    if np.isnan(image[..., 0]).all():
+        raise frames[0].at("image").refused("a joint in at least one frame", "add one")
     if isinstance(camera, LeeChenCamera):
         image, head_image = (image_from_paper(to_metres(points, unit)) for points in (image, head_image))
     confidence = points_by_name([frame.at("confidence", {}) for frame in frames], POINTS, 0, "joint")

@@ -129,7 +129,7 @@ def answers_of(
     return {
         "joints": laid + np.add.reduceat(weight[:, None, None] * base, starts),
         "sure": np.add.reduceat(weight * inside, starts) * listed,
-        "sure_of": np.where(relative, "relative to the neck", "position"),
+        "sure_of": np.where(relative, "relative to the neck", "position").tolist(),
         "survivor": survivor,
         "representatives": rows,
         "represented": [one * share for one, share in zip(held, listed, strict=True)],

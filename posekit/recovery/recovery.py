@@ -74,7 +74,8 @@ class Derived:
         return held.get(self.name)
 
     def __set__(self, table: Any, value: Any) -> None:
-        vars(table)[self.name] = read_only(value) if isinstance(value, np.ndarray) else value or {}
+        given = {} if value is None else value
+        vars(table)[self.name] = read_only(given) if isinstance(given, np.ndarray) else given
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -136,13 +136,10 @@ def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
 def _unseen(view: View) -> list[str]:
     """Say of each frame why nothing can be sought in it; empty if it can."""
     seen = np.isfinite(view.image[:, :, 0])
-    trunk, neck = seen[:, 1:4].any(axis=1), "the neck, from which the posture grows, is not seen"
-    if "neck" in view.derived:
-        neck += ": a shoulder is not, and it is between the shoulders"
+    trunk = seen[:, 1:4].any(axis=1)
     reasons = {
         "the person is not seen: none of the joints is": ~seen.any(axis=1),
         "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover": ~trunk,
-        neck: ~seen[:, 0] & view.camera.perspective,
     }
     return [str(reason) for reason in np.select(list(reasons.values()), list(reasons), "")]
 
