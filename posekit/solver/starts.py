@@ -41,6 +41,10 @@ def sphere(count: int) -> Array:
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
 
 
+#: Where hidden hips start beside those of a straight trunk, which pelvises turn by some 20 degrees (metres).
+HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
+
+
 def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array, far: Flags | bool) -> Array:
     """Return the end (N, 3) of segments on a joint's ray, near or far; the foot of the start if it is too short."""
     o, d = (one[frame, joint] for one in problem.rays)
@@ -119,9 +123,9 @@ def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[I
             a, b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
             R, _ = best_rotation(np.einsum("rki,rkj->rij", target - b, source - a))
             laid = np.einsum("rij,rkj->rki", R, body - a) + b
-            laid[:, pattern] = given
-            frames.append(frame[rows])
-            trunks.append(laid)
+            for aside in HIP_PLACES if part.start else HIP_PLACES[:1]:
+                trunks.append(np.where(pattern[:, None], trunk[rows], laid + aside))
+                frames.append(frame[rows])
     frame = np.concatenate(frames)
     order = np.argsort(frame, kind="stable")
     return frame[order], np.concatenate(trunks)[order]
