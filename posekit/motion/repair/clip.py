@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Final, Self
 
 import numpy as np
@@ -18,17 +19,25 @@ from posekit.motion.motion import NAMES, Motion
 from posekit.motion.repair.pieces import (
     FEET,
     HEAD_PIECE,
+    HINGES,
+    HIPS_PIECE,
+    LIMB_PIECES,
     N_PIECES,
-    PIECE_OF_NAME,
+    PIECE_OF_POINT,
     PIECE_PARENTS,
+    TORSO_PIECE,
     TRUNK,
     between,
     carried,
+    moved,
     near_good,
+    placed,
+    turned,
+    vectors_of,
 )
 from posekit.skeleton import JOINTS, POINTS
-from posekit.validators.body import Body
-from posekit.validators.check import Check
+from posekit.validators.body import MADE_UP_METRES, Body
+from posekit.validators.check import Check, NotAskedError, judged
 from posekit.validators.judge import Validator, chosen_checks
 from posekit.validators.report import Report
 from posekit.validators.robot import sole_points
@@ -39,8 +48,18 @@ THIRD_DIFFERENCE: Final = (-1.0, 3.0, -3.0, 1.0)
 STAYS: Final = 1e9
 #: Times that the way from a posture that passes to one that does not is halved.
 HALVINGS: Final = 7
-#: Distance inside its limits to which a joint of a robot is brought, radians or metres.
-INSIDE_LIMITS: Final = 2e-6
+#: Metres that a degree counts as: about the way of a limb's end.
+METRES_A_DEGREE: Final = 0.3 * np.pi / 180
+#: Distance inside its bounds to which a posture is pushed, metres or radians: rounding in a file does not reject it.
+INSIDE_METRES: Final = 5e-6
+#: Distance by which bodies of robots are moved apart beyond their margin, metres: depths of meshes are known to 1e-5.
+DEPTH_METRES: Final = 5e-5
+#: Steps of a push, bounds that one considers, and the largest change in one, radians or metres.
+PUSHES, MOST_BOUNDS, MOST_STEP = 12, 12, 0.2
+#: Step by which margins are differentiated, radians or metres.
+DIFFERENCE: Final = 1e-3
+#: Added to the diagonal of the normal matrix of a step, m²/rad²: bounds that nothing moves demand nothing.
+SOFTNESS: Final = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,9 +194,9 @@ class Clip:
         """Return the frames (T,) in which enough is known to place a body."""
         return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
 
-    def carried(self, start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
-        """Move states (n, …) a share (n,) of the way to others: all, or what is loose (n, K), in its place."""
-        return carried(start, end, share, loose)
+    def carried(self, start: Array, end: Array, share: Array) -> Array:
+        """Move states (n, …) a share (n,) of the way to others."""
+        return carried(start, end, share)
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
         """Return states (n, …) between others; lengths go from the ones to the others, too."""
@@ -199,41 +218,78 @@ class Clip:
     def legal(self) -> Self:
         """Return the clip with postures that checks of postures pass.
 
-        A posture that is rejected goes toward a good one as far as it must: the parts of the body that findings name,
-        else their limbs, else all. The good posture lies between the nearest ones that pass, or is the nearest of
-        these; without any it is at rest.
+        A posture that is rejected goes as far as it must toward the first that passes of these: itself pushed inside
+        the bounds that it violates, one between the nearest good ones, and the nearest good one.
         """
         if not self.checks(over_time=False):
             return self
         report = self.report(over_time=False)
         bad = np.flatnonzero(report.invalid & self.placed())
-        if not bad.size:
-            return self
-        between_good, nearest_good = self.good(bad, ~report.invalid & self.placed())
-        clip = self.bounded(report, bad, between_good)
-        ways = [(between_good, loose) for loose in self.loose(report)]
-        for goal, loose in [*ways, (nearest_good, ways[-1][1])]:
+        clip = self
+        goals = (
+            [self.pushed(bad, report), *self.good(bad, ~report.invalid & self.placed())] if bad.size else []
+        )
+        for goal in goals:
             left = clip.invalid(bad)
-            if not left.any():
-                break
-            clip = clip.eased(bad[left], goal[left], loose[bad[left]])
-        return clip
+            clip = clip.eased(bad[left], goal[left]) if left.any() else clip
+        return clip if self.motion.in_time else clip.restored(bad, self.state[bad])
 
-    def eased(self, rows: Ints, goal: Array, loose: Flags) -> Self:
-        """Bring some frames as far toward goals (n, …), by what is loose (n, K), as checks of postures demand.
+    def pushed(self, rows: Ints, report: Report) -> Array:
+        """Push some frames inside bounds: distances by the joints, then all else by turning limbs, then all parts.
 
-        Frames that are rejected at their goals stay as they are.
+        Elbows and knees that bend backward are straight at first: a posture alone does not show it, its neighbours do.
         """
+        vectors, found = vectors_of(self.state), report.findings
+        for row, place, value in zip(found["row"], found["place"], found["value"], strict=True):
+            if value < 0 and report.places[place] in HINGES:
+                middle, end = HINGES[report.places[place]]
+                vectors[row, end] = np.linalg.norm(vectors[row, end]) * unit(vectors[row, middle])
+        body = Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
+        every, limbs = range(3 * N_PIECES), range(3 * HEAD_PIECE, 3 * N_PIECES)
+        state, joints = placed(vectors)[rows], range(3 * len(JOINTS))
+        state = pushed(state, moved, joints, partial(self.margins, body, rigid=True))
+        for free in (limbs, every):
+            state = pushed(state, turned, free, partial(self.margins, body, rigid=False))
+        return state
+
+    def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
+        """Return margins (n, K) of lengths, or of all else, as metres; infinite where undecided."""
+        joints, head, feet = np.split(points, [len(JOINTS), len(POINTS)], axis=1)
+        these = replace(body, joints=joints, head=head, feet=feet, motion=False)
+        vars(these)["person"] = body.person  # that of the whole clip, not of these postures
+        found = [np.full((len(points), 1), np.inf)]
+        for check in self.checks(over_time=False):
+            if (check.name == "rigid-parts") == rigid:
+                scale = METRES_A_DEGREE if check.unit == "deg" else 1.0
+                with suppress(NotAskedError):
+                    found.append(scale * judged(check, these).margin)
+        every = np.concatenate(found, axis=1)
+        return np.where(np.isnan(every), np.inf, every)
+
+    def eased(self, rows: Ints, goal: Array) -> Self:
+        """Bring some frames as far toward goals (n, …) as they must; those that are rejected there stay."""
         start = self.state[rows]
         low, high = np.zeros(len(rows)), np.full(len(rows), np.nan)
         share = np.ones(len(rows))
         for _ in range(HALVINGS):
-            passes = ~self.with_rows(rows, self.carried(start, goal, share, loose)).invalid(rows)
+            passes = ~self.with_rows(rows, self.halfway(start, goal, share)).invalid(rows)
             low, high = np.where(passes, low, share), np.where(passes, share, high)
             if np.isnan(high).all():
                 return self
             share = (low + high) / 2
-        return self.with_rows(rows, self.carried(start, goal, np.nan_to_num(high), loose))
+        passing = np.isfinite(high)
+        return self.with_rows(rows[passing], self.halfway(start, goal, high)[passing])
+
+    def restored(self, rows: Ints, given: Array) -> Self:
+        """Give trunk, head and limbs of some frames their given directions (n, P, 3) where all checks still pass."""
+        clip = self
+        for pieces in ({TORSO_PIECE, HIPS_PIECE}, {HEAD_PIECE}, *LIMB_PIECES):
+            own = [k for k, piece in enumerate(PIECE_OF_POINT) if piece in pieces]
+            vectors = vectors_of(clip.state[rows])
+            vectors[:, own] = vectors_of(given)[:, own]
+            passing = ~clip.with_rows(rows, placed(vectors)).invalid(rows)
+            clip = clip.with_rows(rows[passing], placed(vectors)[passing])
+        return clip
 
     def with_rows(self, rows: Ints, state: Array) -> Self:
         """Return the clip with other states of some frames."""
@@ -268,24 +324,6 @@ class Clip:
         turned = np.einsum("nij,npj->npi", found.rotation, state)
         return np.asarray(turned + found.translation[:, None])
 
-    def bounded(self, report: Report, rows: Ints, good: Array) -> Self:
-        """Give the frames in which distances are wrong those of good postures; all directions stay."""
-        off = rejected(report, "rigid-parts")[rows]
-        return self.with_rows(rows[off], self.carried(good[off], self.state[rows[off]], np.ones(off.sum())))
-
-    def loose(self, report: Report) -> Iterator[Flags]:
-        """Yield what may move (T, 11) of frames that are rejected: named pieces, their limbs, all pieces."""
-        named = np.zeros((len(self), N_PIECES), dtype=np.bool_)
-        for row, place in zip(report.findings["row"], report.findings["place"], strict=True):
-            named[row, [piece for name, piece in PIECE_OF_NAME.items() if name in report.places[place]]] = (
-                True
-            )
-        yield named
-        limbs = named[:, HEAD_PIECE + 1 :].reshape(len(self), -1, 2)
-        named[:, HEAD_PIECE + 1 :] = np.repeat(limbs.any(axis=2), 2, axis=1)
-        yield named
-        yield np.ones_like(named)
-
 
 def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
     """Return the frames (T,) that checks reject; if places are given, where (T, K), with unknown ones everywhere."""
@@ -296,6 +334,48 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
         name = report.places[place]
         out[row, places.index(name) if name in places else slice(None)] = True
     return out if places else out[:, 0]
+
+
+def pushed(
+    state: Array,
+    moved: Callable[[Array, Array], Array],
+    free: Sequence[int],
+    margins: Callable[[Array], Array],
+) -> Array:
+    """Push states (n, …) inside bounds by the shortest steps: Newton's method on the margins that are negative.
+
+    Parameters
+    ----------
+    state : array (n, …)
+    moved : callable
+        From states and steps (n, size) to states.
+    free : sequence of int
+        Entries of a step that may change; the size is the last of them and one.
+    margins : callable
+        From states to margins (n, K), metres, negative where violated. Their slopes are differences.
+    """
+    size = free[-1] + 1
+    for _ in range(PUSHES):
+        margin = margins(state) - INSIDE_METRES
+        worst = np.argsort(margin, axis=1)[:, :MOST_BOUNDS]
+        value = np.minimum(np.take_along_axis(margin, worst, axis=1), 0.0)
+        rows = np.flatnonzero(value.any(axis=1))
+        if not rows.size:
+            break
+        value, worst, near = value[rows], worst[rows], state[rows]
+        slope = np.zeros((*value.shape, size))
+        for k in free:
+            there = (
+                margins(moved(near, np.tile(DIFFERENCE * np.eye(size)[k], (len(rows), 1)))) - INSIDE_METRES
+            )
+            change = np.minimum(np.take_along_axis(there, worst, axis=1), 0.0) - value
+            slope[..., k] = np.where(value < 0, change / DIFFERENCE, 0.0)
+        transposed = slope.swapaxes(1, 2)
+        normal = slope @ transposed + SOFTNESS * np.eye(value.shape[1])
+        step = -(transposed @ np.linalg.solve(normal, value[..., None]))[..., 0]
+        state = state.copy()
+        state[rows] = moved(near, np.clip(step, -MOST_STEP, MOST_STEP))
+    return state
 
 
 def smoothed(values: Array, loose: Flags, strength: float) -> Array:
@@ -349,18 +429,21 @@ class RobotClip(Clip):
         """Return the frames (T,) whose configuration is known."""
         return np.asarray(np.isfinite(self.state).all(axis=1))
 
-    def carried(self, start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
-        """Move configurations along the geodesics to others: all entries of v, or those that are loose (n, nv)."""
+    def carried(self, start: Array, end: Array, share: Array) -> Array:
+        """Move configurations a share of the geodesics to others."""
         model = self.robot.model
         steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
         steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
-        steps = steps if loose is None else steps * loose
         out = [pin.integrate(model, q, step) for q, step in zip(start, steps, strict=True)]
         return np.asarray(self.robot.with_mimics(np.array(out).reshape(start.shape)))
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
         """Return configurations between others."""
         return self.carried(start, end, share)
+
+    def restored(self, rows: Ints, given: Array) -> Self:
+        """Return the clip as it is: joints that no bound concerns were not pushed."""
+        return self
 
     def shifted(self, by: Array) -> Self:
         """Move the root by (T, 3), metres; a robot with a fixed root stays."""
@@ -389,32 +472,28 @@ class RobotClip(Clip):
         return np.asarray(self.robot.neutral)
 
     def laid(self, state: Array, rows: Ints) -> Array:
-        """Return states as they are: the root of a configuration is not moved."""
-        return state
+        """Give configurations (n, nq) the roots of some frames."""
+        root = 7 if self.robot.free_flyer else 0
+        return np.concatenate([self.state[rows, :root], state[:, root:]], axis=1)
 
-    def bounded(self, report: Report, rows: Ints, good: Array) -> Self:
-        """Bring joints within the limits of the URDF, and mimicking joints to their targets."""
-        lower, upper = self.robot.lower + INSIDE_LIMITS, self.robot.upper - INSIDE_LIMITS
-        return self.with_rows(rows, self.robot.with_mimics(np.clip(self.state[rows], lower, upper)))
+    def pushed(self, rows: Ints, report: Report) -> Array:
+        """Bring joints within the limits of the URDF, and move bodies apart; the root stays."""
+        robot, model = self.robot, self.robot.model
+        lower, upper = robot.lower + INSIDE_METRES, robot.upper - INSIDE_METRES
+        settings = self.validator.settings
+        made_up = MADE_UP_METRES if robot.bodies == "capsules" and not settings.strict else 0.0
+        margin = settings.contact_margin - made_up
 
-    def loose(self, report: Report) -> Iterator[Flags]:
-        """Yield what may move (T, nv) of frames that are rejected: joints between bodies that touch, then all."""
-        model, named = self.robot.model, np.zeros((len(self), self.robot.model.nv), dtype=np.bool_)
-        between_bodies = self._joints_between()
-        for row, place in zip(report.findings["row"], report.findings["place"], strict=True):
-            for joint in between_bodies.get(report.places[place], ()):
-                named[row, model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]] = True
-        yield named
-        every = np.ones_like(named)
-        every[:, : 6 if self.robot.free_flyer else 0] = False
-        yield every
+        def moved(state: Array, step: Array) -> Array:
+            out = [pin.integrate(model, q, one) for q, one in zip(state, step, strict=True)]
+            return np.asarray(robot.with_mimics(np.clip(np.array(out).reshape(state.shape), lower, upper)))
 
-    def _joints_between(self) -> dict[str, set[int]]:
-        """Return the joints on the way from one body of each pair to the other, by the pair's place in findings."""
-        found: dict[str, set[int]] = {}
-        bodies = () if self.robot.geometry is None else self.robot.geometry.geometryObjects
-        on_the_way = {body.name: set(self.robot.model.supports[body.parentJoint]) for body in bodies}
-        links = dict(zip(self.robot.body_names, self.robot.body_links, strict=True))
-        for one, other in self.robot.collision_pairs:
-            found[f"{links[one]}-{links[other]}"] = on_the_way[one] ^ on_the_way[other]
-        return found
+        def margins(state: Array) -> Array:
+            out = np.full((len(state), max(len(robot.collision_pairs), 1)), np.inf)
+            found = robot.collisions(state, margin=max(margin, 0.0))
+            out[found.frame, found.pair] = found.distance - margin - DEPTH_METRES
+            return out
+
+        free = range(6 if robot.free_flyer else 0, model.nv)
+        state = moved(self.state[rows], np.zeros((len(rows), model.nv)))
+        return pushed(state, moved, free, margins)

@@ -21,14 +21,12 @@ from posekit.geometry import (
     vector_from_rotation,
 )
 from posekit.motion.motion import NAMES
-from posekit.robots.capsules import PARTS
 from posekit.skeleton import (
     HEAD,
     HIPS,
     JOINT,
     JOINTS,
     LIMB_JOINTS,
-    LIMB_SEGMENTS,
     N_TRUNK_JOINTS,
     PARENTS,
     POINTS,
@@ -36,6 +34,8 @@ from posekit.skeleton import (
 
 TORSO_PIECE, HIPS_PIECE, HEAD_PIECE = 0, 1, 2
 N_PIECES: Final = 3 + 2 * len(LIMB_JOINTS)
+#: Upper and lower piece of each limb.
+LIMB_PIECES: Final = [{3 + 2 * limb, 4 + 2 * limb} for limb in range(len(LIMB_JOINTS))]
 FEET: Final = tuple(range(len(POINTS), len(NAMES)))
 #: Joints without which nothing of a posture can be placed.
 TRUNK: Final = list(range(N_TRUNK_JOINTS))
@@ -45,6 +45,8 @@ PIECE_PARENTS: Final = (
     *(JOINT["neck"] for _ in HEAD),
     *(JOINT[f"{NAMES[foot].split('_')[0]}_ankle"] for foot in FEET),
 )
+#: Middle and end joint of the hinges, by the names of their angles.
+HINGES: Final = {f"{JOINTS[middle]}.flexion": (middle, end) for _, middle, end in LIMB_JOINTS}
 #: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
 MOST_CONTINUED: Final = 3
 
@@ -64,11 +66,6 @@ def _piece_of_points() -> list[int]:
 
 #: The piece whose vector ends at each point; that of the neck is not read.
 PIECE_OF_POINT: Final = _piece_of_points()
-#: The pieces of limbs by the names that findings have for them: of the joint at their start, and of their capsule.
-PIECE_OF_NAME: Final = {
-    **{JOINTS[start]: PIECE_OF_POINT[end] for start, end in LIMB_SEGMENTS},
-    **{part: PIECE_OF_POINT[JOINT[end]] for part, (_, end) in PARTS.items() if part not in ("torso", "hips")},
-}
 
 
 def vectors_of(points: Array) -> Array:
@@ -103,21 +100,26 @@ def turns_between(start: Array, end: Array) -> Array:
     return R
 
 
-def carried(start: Array, end: Array, share: Array, loose: Flags | None = None) -> Array:
-    """Turn the pieces of postures (N, P, 3) a share (N,) of the way to others, and move the neck as far.
-
-    If `loose` (N, 11) is given, only these pieces turn, and the neck stays.
-    """
-    turn = share[:, None, None] * vector_from_rotation(turns_between(start, end))
-    shift = share[:, None] * (end[:, 0] - start[:, 0])
-    if loose is not None:
-        turn, shift = turn * loose[..., None], np.zeros_like(shift)
-    vectors = vectors_of(start)
-    vectors[:, 1:] = np.einsum(
-        "npij,npj->npi", rotation_from_vector(turn)[:, PIECE_OF_POINT[1:]], vectors[:, 1:]
-    )
-    vectors[:, 0] += shift
+def turned(points: Array, turn: Array) -> Array:
+    """Turn the pieces of postures (N, P, 3) by rotation vectors (N, 33), radians; the neck stays."""
+    R = rotation_from_vector(turn.reshape(-1, N_PIECES, 3))
+    vectors = vectors_of(points)
+    vectors[:, 1:] = np.einsum("npij,npj->npi", R[:, PIECE_OF_POINT[1:]], vectors[:, 1:])
     return placed(vectors)
+
+
+def moved(points: Array, step: Array) -> Array:
+    """Move the joints of postures (N, P, 3) by steps (N, 42), metres; head and feet move with neck and ankles."""
+    step = step.reshape(len(points), len(JOINTS), 3)
+    every = np.concatenate([step, step[:, PIECE_PARENTS[len(JOINTS) :]]], axis=1)
+    return np.asarray(points + every)
+
+
+def carried(start: Array, end: Array, share: Array) -> Array:
+    """Turn the pieces of postures (N, P, 3) a share (N,) of the way to others, and move the neck as far."""
+    turn = vector_from_rotation(turns_between(start, end)).reshape(len(start), 3 * N_PIECES)
+    shift = end[:, :1] - start[:, :1]
+    return turned(start, share[:, None] * turn) + share[:, None, None] * shift
 
 
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:

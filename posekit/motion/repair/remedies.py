@@ -60,7 +60,7 @@ def mended(clip: Clip, *, filled: bool = False) -> Clip:
     if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
     if filled:
-        clip = clip.interpolated(binary_dilation(clip.validator.check(clip.as_motion()).invalid))
+        clip = clip.interpolated(binary_dilation(~clip.validator.check(clip.as_motion()).ok))
     for remedies in (REMEDIES[:N_CAUSES], REMEDIES):
         clip = _mended_over_time(clip, remedies).legal()
     return clip
