@@ -66,7 +66,7 @@ def cost_of(frames, path):
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_cheapest_path_is_that_of_brute_force(seed, noise):
+def test_paths_are_as_likely_as_by_brute_force(seed, noise):
     rng = np.random.default_rng(seed)
     frames = []
     for k in range(3):
@@ -78,10 +78,15 @@ def test_cheapest_path_is_that_of_brute_force(seed, noise):
         trellis.push(frame)
     every = {path: cost_of(frames, path) for path in itertools.product(range(-1, 3), repeat=3)}
     best = min(every, key=every.get)
-    assert tuple(trellis.cheapest_path()) == best
     assert trellis.cheapest.min() == pytest.approx(every[best], rel=1e-9)
-    for share in trellis.marginals():
-        assert share.sum() == pytest.approx(1.0)
+    paths = np.array(list(every))
+    chance = np.exp(every[best] - np.array(list(every.values())))
+    chance /= chance.sum()
+    for k, (stage, share) in enumerate(zip(trellis.stages, trellis.marginals(), strict=True)):
+        for one in range(-1, 3):
+            through = share[stage.survivor == one].sum()
+            # Ends that cost too much are dropped, although later frames may favour them.
+            assert through == pytest.approx(chance[paths[:, k] == one].sum(), abs=1e-6)
 
 
 def test_smoother_is_the_least_squares_solution():

@@ -56,12 +56,8 @@ class Moving(NamedTuple):
         """Return bodies of which nothing is known."""
         spread = np.diag([UNKNOWN] * 3 + [START_SPEED**2] * 3)
         shape = (count, len(DENSITY))
-        return Moving(
-            np.zeros((*shape, 6)),
-            np.tile(spread, (*shape, 1, 1)),
-            np.zeros(shape, dtype=bool),
-            np.zeros(shape),
-        )
+        spreads, known = np.tile(spread, (*shape, 1, 1)), np.zeros(shape, dtype=bool)
+        return Moving(np.zeros((*shape, 6)), spreads, known, np.zeros(shape))
 
     def take(self, rows: NDArray[np.intp]) -> Moving:
         """Return some bodies."""
@@ -70,12 +66,8 @@ class Moving(NamedTuple):
     def after(self, seconds: float) -> Moving:
         """Let time pass."""
         F, noise = steps(seconds)
-        return Moving(
-            self.mean @ F.T,
-            F @ self.spread @ F.T + DENSITY[:, None, None] * noise,
-            self.known,
-            self.since + seconds,
-        )
+        spread = F @ self.spread @ F.T + DENSITY[:, None, None] * noise
+        return Moving(self.mean @ F.T, spread, self.known, self.since + seconds)
 
     def given(self, joints: Array, covariance: Array) -> Moving:
         """Measure joints (S, 14, 3), NaN where not seen, with covariances (S, 14, 3, 3)."""

@@ -56,9 +56,8 @@ def _picture(where: str, line: bytes, names: tuple[str, ...]) -> tuple[float, Ar
         if isinstance(given, dict):
             unknown = [name for name in given if name not in names]
             if unknown:
-                raise refusal(
-                    where, "points", shown(unknown[0]), "a point's name", nearest(unknown[0], names)
-                )
+                near = nearest(unknown[0], names)
+                raise refusal(where, "points", shown(unknown[0]), "a point's name", near)
             given = [given.get(name) for name in names]
         points = np.full((len(given), 3), np.nan)
         for row, point in zip(points, given, strict=True):
@@ -75,7 +74,6 @@ def _picture(where: str, line: bytes, names: tuple[str, ...]) -> tuple[float, Ar
 
 def _document(posture: TrackedPosture) -> dict[str, Any]:
     """Return an answer as JSON values: metres, joints by name, unknown ones left out."""
-    path = posture.path
     found: dict[str, Any] = {
         "frame": posture.frame,
         "time": posture.time,
@@ -84,19 +82,15 @@ def _document(posture: TrackedPosture) -> dict[str, Any]:
         "joints": _by_joint(posture.joints),
         "nearer": {},
         "reason": posture.reason,
-        "path": None,
+        "path": posture.path and posture.path._asdict() | {"joints": _by_joint(posture.path.joints)},
     }
     if posture.recovery is not None and posture.survivors:
         answer = posture.recovery.answer
-        sides = np.asarray(answer.nearer)[0].tolist()
-        sure = np.asarray(answer.nearer_sure)[0].tolist()
         found["nearer"] = {
-            segment_name(pair): [JOINTS[pair[1] if side > 0 else pair[0]], round(chance, DECIMALS)]
-            for pair, side, chance in zip(TREE_SEGMENTS, sides, sure, strict=True)
+            segment_name(pair): [JOINTS[pair[1] if side > 0 else pair[0]], round(float(chance), DECIMALS)]
+            for pair, side, chance in zip(TREE_SEGMENTS, answer.nearer[0], answer.nearer_sure[0], strict=True)
             if side
         }
-    if path is not None:
-        found["path"] = {"frame": path.frame, "time": path.time, "joints": _by_joint(path.joints)}
     return found
 
 

@@ -98,8 +98,6 @@ class Stage(NamedTuple):
     ----------
     survivor : int array (S,)
         Survivor of each; -1 where the frame is passed over.
-    parent : int array (S,)
-        End before, on the cheapest way.
     cost : array (P, S)
         Cost of every step, with the survivor's own; infinite where there is no step.
     forward : array (S,)
@@ -107,7 +105,6 @@ class Stage(NamedTuple):
     """
 
     survivor: NDArray[np.intp]
-    parent: NDArray[np.intp]
     cost: Array
     forward: Array
 
@@ -139,9 +136,9 @@ class Trellis:
         weight = NOISY_WEIGHT if covariance.any() else 1.0
         led = self.ends.after(seconds)
         ways = weight * step_costs(self.ends, led, joints, covariance) + own
-        skip = SKIP + (
-            weight * _usual_step(covariance[own.argmin()], known[chosen][own.argmin()]) if len(own) else 0.0
-        )
+        skip = SKIP
+        if len(own):
+            skip += weight * _usual_step(covariance[own.argmin()], known[chosen][own.argmin()])
         total = self.cheapest[:, None] + np.concatenate([ways, np.full((len(led.mean), 1), skip)], axis=1)
         parent, target, into = _kept(total)
         near = total <= total.min() + SLACK
@@ -153,15 +150,7 @@ class Trellis:
         self.forward = forward - forward.max()
         survivor = np.append(chosen, -1)[target]
         self.ends = led.take(parent).given(*frame.at(survivor))
-        self.stages.append(Stage(survivor, parent, step, self.forward))
-
-    def cheapest_path(self) -> NDArray[np.intp]:
-        """Return the survivors of the cheapest path (T,); -1 for frames that it passes over."""
-        end, path = int(np.argmin(self.cheapest)), []
-        for stage in reversed(self.stages):
-            path.append(int(stage.survivor[end]))
-            end = int(stage.parent[end])
-        return np.array(path[::-1], dtype=np.intp)
+        self.stages.append(Stage(survivor, step, self.forward))
 
     def marginals(self, at: int = -1, among: NDArray[np.bool_] | None = None) -> list[Array]:
         """Return the probability of every end (S,) of each frame, given all frames.
@@ -260,13 +249,9 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """
     time = np.asarray(recovery.frames.time)
     if not len(recovery.survivors):
-        raise refusal(
-            recovery.source, "follow", "no frame with a posture", "some", "recover with other settings"
-        )
+        raise refusal(recovery.source, "follow", "no frame with a posture", "at least one")
     if (np.diff(time) <= 1e-6).any():
-        raise refusal(
-            recovery.source, "time", "times that do not ascend", "one picture a time", "drop the others"
-        )
+        raise refusal(recovery.source, "time", "times that do not ascend", "one picture a time")
     frames = [candidates(recovery, k) for k in range(len(recovery))]
     trellis = Trellis()
     for frame in watched(frames, "following"):

@@ -137,17 +137,12 @@ class Tracker:
         lag: int = DEFAULT_LAG,
     ) -> None:
         if camera is None and size is None:
-            raise refusal(
-                "Tracker", "camera", "neither a camera nor a size", "one of them", "give size=(1280, 720)"
-            )
+            raise refusal("Tracker", "camera", "nothing", "a camera or a size", "give size=(1280, 720)")
         if isinstance(layout, str) and layout:
             # Layouts belong to the files, above this room; only a name given here needs them.
             layout = import_module("posekit.formats.layout").load_layout(layout)
         if layout and not layout.points:
-            expected = "a detector's layout, as coco_17"
-            raise refusal(
-                "Tracker", "layout", layout.name, expected, "choose a layout whose points have an order"
-            )
+            raise refusal("Tracker", "layout", layout.name, "points in an order, as in coco_17")
         self.settings = settings or RecoverSettings()
         self.camera = camera or camera_from_fov(size or (0, 0), WEBCAM_DEGREES, "diagonal")
         self.layout, self.lag = layout or None, lag
@@ -179,9 +174,7 @@ class Tracker:
             If the number of points is wrong or the time does not ascend: the picture then does not count.
         """
         if not (math.isfinite(time) and time > self._last + 1e-6):
-            raise refusal(
-                "Tracker", "time", f"{time:g}", f"seconds after {self._last:g}", "give every picture its time"
-            )
+            raise refusal("Tracker", "time", f"{time:g}", f"seconds after {self._last:g}")
         table = np.array(points, dtype=np.float64)
         counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
         if table.ndim != 2 or len(table) not in counts or table.shape[1] not in (2, 3):
@@ -194,15 +187,17 @@ class Tracker:
         except PosekitError as error:
             reason = str(error)
         frame = Candidates(time, np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS), 3, 3)), np.empty(0))
+        joints, sure = np.full((len(JOINTS), 3), np.nan), 0.0
         if recovery is not None:
             frame = candidates(recovery, 0)._replace(time=float(time))
+            joints, sure = recovery.answer.joints[0], float(np.nan_to_num(recovery.answer.sure[0]))
         self._trellis.push(frame)
         self._waiting.append((self._frame, frame))
         posture = TrackedPosture(
             frame=self._frame,
             time=float(time),
-            joints=np.full((len(JOINTS), 3), np.nan) if recovery is None else recovery.answer.joints[0],
-            sure=0.0 if recovery is None else float(np.nan_to_num(recovery.answer.sure[0])),
+            joints=joints,
+            sure=sure,
             reason=reason,
             path=self._oldest() if len(self._waiting) > self.lag else None,
             recovery=recovery,
