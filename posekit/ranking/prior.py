@@ -27,6 +27,9 @@ from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
 
 PRIORS: Final = DATA / "priors"
 
+#: Weights of coordinates in a sum that is the same for equal coordinates and for no others.
+UNEVEN: Final = np.sqrt(2.0 + np.arange(3 * len(DIRECTION_NAMES)))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StudentMixture(Record):
@@ -84,10 +87,11 @@ class StudentMixture(Record):
             rows = np.flatnonzero(code == pattern)
             columns = np.flatnonzero(known[rows[0]])
             if len(columns):
-                part = self if len(columns) == count else self.part(columns)
-                found[rows] = part._log_sum(x[np.ix_(rows, columns)], len(columns)) - part._usual(
-                    len(columns)
-                )
+                part, width = self if len(columns) == count else self.part(columns), len(columns)
+                some = x[np.ix_(rows, columns)]
+                # Exact postures of a frame share limbs: equal coordinates are judged once.
+                _, first, which = np.unique(some @ UNEVEN[:width], return_index=True, return_inverse=True)
+                found[rows] = (part._log_sum(some[first], width) - part._usual(width))[which]
         return found
 
     def _usual(self, count: int) -> float:
