@@ -12,7 +12,7 @@ from posekit.geometry import Array, Flags, Ints, cross, dot
 from posekit.robots.kinematics import Kinematics
 
 #: Configurations worked on at once: their squared distances stay in the processor's cache.
-BLOCK: Final = 128
+BLOCK: Final = 256
 #: Metres that hulls and capsules are taken larger, above the tolerance of coal's GJK.
 ROOM: Final = 1e-6
 #: Metres within which the depth of a penetration is computed.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-import numpy as np
 import pinocchio as pin
 
 from posekit.errors import cut, nearest, refusal, shown
@@ -48,7 +47,9 @@ def disabled_pairs(text: str, source: str, links: Collection[str], *, strict: bo
     return pairs
 
 
-def set_pairs(model: pin.Model, geometry: pin.GeometryModel, disabled: Pairs, parts: Pairs) -> None:
+def set_pairs(
+    model: pin.Model, geometry: pin.GeometryModel, neutral: Array, disabled: Pairs, parts: Pairs
+) -> None:
     """Set the pairs of bodies to check.
 
     With pairs that an SRDF disables, all other pairs of bodies on different joints. Without, all pairs but those of
@@ -64,7 +65,7 @@ def set_pairs(model: pin.Model, geometry: pin.GeometryModel, disabled: Pairs, pa
         near, joints = _neighbours(model, geometry), [body.parentJoint for body in bodies]
         names = [re.sub(r"_\d+$", "", body.name) for body in bodies]
         data, geometry_data = model.createData(), geometry.createData()
-        pin.computeCollisions(model, data, geometry, geometry_data, neutral_inside(model), False)
+        pin.computeCollisions(model, data, geometry, geometry_data, neutral, False)
         kept = []
         for (a, b), result in zip(pairs, geometry_data.collisionResults, strict=True):
             ends = frozenset((names[a], names[b]))
@@ -74,16 +75,6 @@ def set_pairs(model: pin.Model, geometry: pin.GeometryModel, disabled: Pairs, pa
     geometry.removeAllCollisionPairs()
     for a, b in kept:
         geometry.addCollisionPair(pin.CollisionPair(a, b))
-
-
-def neutral_inside(model: pin.Model) -> Array:
-    """Return the neutral configuration (nq,), each joint of one entry moved to its nearest limit if outside."""
-    q = np.array(pin.neutral(model))
-    for joint in range(1, model.njoints):
-        if model.nqs[joint] == 1:
-            k = model.idx_qs[joint]
-            q[k] = np.clip(q[k], model.lowerPositionLimit[k], model.upperPositionLimit[k])
-    return q
 
 
 def _neighbours(model: pin.Model, geometry: pin.GeometryModel) -> set[frozenset[int]]:

@@ -24,7 +24,7 @@ from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of,
 from posekit.robots.find import FIGURE, find
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics, entries_of
-from posekit.robots.pairs import Pairs, disabled_pairs, neutral_inside, set_pairs
+from posekit.robots.pairs import Pairs, disabled_pairs, set_pairs
 from posekit.robots.urdf import check_urdf, need, text_with
 from posekit.skeleton import JOINTS, POINTS
 
@@ -134,7 +134,7 @@ class Robot(Record):
         if self.srdf is not None:
             names = [link.get("name", "") for link in self.tree.findall("link")]
             disabled = disabled_pairs(self.srdf, f"{self.source}, SRDF", names, strict=not self.shared_srdf)
-        set_pairs(self.model, geometry, disabled, parts)
+        set_pairs(self.model, geometry, np.array(self.neutral), disabled, parts)
         return geometry
 
     @cached_property
@@ -155,7 +155,7 @@ class Robot(Record):
     @cached_property
     def neutral(self) -> Array:
         """The neutral configuration (nq,): zero, or the nearest limit, with mimicking joints in place."""
-        return read_only(self.with_mimics(neutral_inside(self.model)[None])[0])
+        return read_only(self.with_mimics(np.clip(pin.neutral(self.model), self.lower, self.upper)[None])[0])
 
     @cached_property
     def configuration_names(self) -> tuple[str, ...]:

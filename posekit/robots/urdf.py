@@ -181,7 +181,7 @@ def _check_tree(robot: Element, check: Need) -> None:
         check(ends[1] not in parents, place, got, "a tree", "remove one of the joints")
         parents[ends[1]] = ends[0]
     roots = sorted(known - parents.keys())
-    got = f"{len(roots)} links that hang on no joint ({', '.join(roots[:5]) or 'a cycle'})"
+    got = f"{len(roots)} links that hang on no joint ({', '.join(roots[:5]) or 'none, or a cycle'})"
     check(len(roots) == 1, "", got, "one root link", "join the parts to one tree")
     for link in parents:
         steps, above = 1, link
