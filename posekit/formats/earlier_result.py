@@ -23,6 +23,7 @@ UPPER: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 POSTURE_ARRAYS: Final = {
     **{"joints": "joints", "q": "q", "branches": "branches", "group": "groups"},
     **{"probability": "probability", "scale": "scales"},
+    **{"chi2": "refined/chi2", "covariance": "refined/covariance"},
 }
 ROOT_FIELDS: Final = ("method", "estimate", "deviation", "lower", "upper")
 
@@ -71,7 +72,7 @@ def document_of(root: Node) -> dict[str, Any]:
 
 def _add_radius(postures: list[dict[str, Any]]) -> None:
     """Give postures, in place, the fields of ``result/3``: chi2, radius, branch and inferred."""
-    refined = [one.get("refined") or {} for one in postures]
+    refined = [one.get("refined") or one for one in postures]
     rows = [[row or [0.0] * 6 for row in one.get("covariance") or [None] * len(JOINTS)] for one in refined]
     matrices = np.zeros((len(postures), len(JOINTS), 3, 3))
     entries = np.nan_to_num(np.array(rows, dtype=np.float64).reshape(-1, len(JOINTS), 6))
@@ -101,8 +102,6 @@ def _unpadded(root: Node) -> dict[str, Any]:
         return json_file.parse(root.at(name).text().encode(), root.source) if name in held else default
 
     of_posture = {ours: np.asarray(held[name]) for ours, name in POSTURE_ARRAYS.items() if name in held}
-    refined = [name for name in ("chi2", "covariance") if f"refined/{name}" in held]
-    of_refined = {name: held[f"refined/{name}"] for name in refined}
     margins = {name.removeprefix("margins/"): held[name] for name in held if name.startswith("margins/")}
     inferred, roots = (parsed(name, [None] * len(counts)) for name in ("inferred", "roots"))
     reasons = np.asarray(held["rejected/names"]).tolist()
@@ -110,7 +109,6 @@ def _unpadded(root: Node) -> dict[str, Any]:
     for k, count in enumerate(counts):
         postures = [{name: one[k, i].tolist() for name, one in of_posture.items()} for i in range(count)]
         for i, posture in enumerate(postures):
-            posture["refined"] = {name: values[k, i].tolist() for name, values in of_refined.items()}
             posture["margins"] = {name: float(values[k, i]) for name, values in margins.items()}
             posture["inferred"] = inferred[k][i] if inferred[k] else {}
         camera = {name: held[f"camera/{name}"][k] for name in ("f", "rotation", "position", "residual")}

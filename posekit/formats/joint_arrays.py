@@ -16,7 +16,7 @@ from posekit.formats.body_checks import UNIT_WORDS, points_motion
 from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options
-from posekit.formats.robot_tables import RATES, TIMES
+from posekit.formats.robot_tables import TIMES, time_and_rate
 from posekit.formats.tables import Table, by_row, columns_of_points, csv_text
 from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints
 from posekit.skeleton import HEAD_POINTS, JOINTS
@@ -35,9 +35,8 @@ POINTS: Final = (
 )
 NAMES: Final = ("joint_names", "names", "keypoint_names", "point_names", "marker_names", "labels")
 UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
-LONG_COLUMNS: Final = ("name", "x", "y", "z")
 #: Columns of caliscope's triangulated points, of which 0 to 32 are MediaPipe's (mprib/caliscope).
-CALISCOPE_COLUMNS: Final = ("point_id", "x_coord", "y_coord", "z_coord")
+CALISCOPE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
 #: Columns of the recording or person of a row.
 PEOPLE: Final = ("clip", "person", "person_id", "track_id", "subject")
 FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
@@ -46,7 +45,7 @@ FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
 def looks_like(document: Any) -> bool:
     """Tell whether a document holds points in space."""
     if isinstance(document, Table):
-        return _long_columns(document) is not None or bool(_wide_columns(document.names))
+        return set(CALISCOPE_COLUMNS) <= set(document.names) or bool(_wide_columns(document.names))
     return isinstance(document, Mapping) and _key(document) is not None
 
 
@@ -140,16 +139,15 @@ def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Int
 
 def _times(held: Held, clip: Ints | None, frames: int, path: str) -> tuple[float | None, Array | None]:
     """Return the file's rate and times; recordings that have each their own rate have times made of it."""
-    time = next((np.ravel(held[name]) for name in TIMES if name in held), None)
-    if time is not None and (time.dtype.kind not in "iuf" or len(time) != frames):
-        raise refusal(path, "time", f"{len(time)} of {time.dtype}", f"{frames} numbers", "correct the file")
-    rates = np.ravel(next((held[name] for name in ("clip_fps", *RATES) if name in held), ()))
-    rates = rates.astype(np.float64) if rates.dtype.kind in "iuf" else np.empty(0)
+    time, rate = time_and_rate(held)
+    if time is not None and len(time) != frames:
+        raise refusal(path, "time", f"{len(time)} of them", f"{frames} numbers", "correct the file")
+    rates = np.ravel(held.get("clip_fps", ())).astype(np.float64)
     if time is None and clip is not None and clip.max() < rates.size and len(np.unique(rates)) > 1:
         starts = np.array([np.argmax(clip == index) for index in range(rates.size)])
         with np.errstate(divide="ignore", invalid="ignore"):
             time = (np.arange(frames) - starts[clip]) / np.where(rates > 0, rates, np.nan)[clip]
-    return (float(rates[0]) if rates.size else None), None if time is None else time.astype(np.float64)
+    return (float(rates[0]) if rates.size else rate), time
 
 
 def _word(document: Held, key: str, known: Mapping[str, str], path: str) -> str:
@@ -157,11 +155,6 @@ def _word(document: Held, key: str, known: Mapping[str, str], path: str) -> str:
     if word and word not in known:
         raise refusal(path, key, shown(word), f"one of {', '.join(known)}", "correct the file")
     return known.get(word, "")
-
-
-def _long_columns(table: Table) -> tuple[str, ...] | None:
-    """Return the columns of a table with a row a frame and point: the point and its three coordinates."""
-    return next((one for one in (LONG_COLUMNS, CALISCOPE_COLUMNS) if set(one) <= set(table.names)), None)
 
 
 def _wide_columns(names: Sequence[str]) -> dict[str, list[str]]:
@@ -178,9 +171,10 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
     time_name = next((name for name in names if name.casefold() in TIMES), None)
     frame_name = next((name for name in FRAMES if name in names), None)
     who = next((table.texts(name) for name in PEOPLE if name in names), [])
-    long = _long_columns(table)
-    if long:
-        points, labels, rows = _long(table, long, frame_name or time_name, who, path)
+    caliscope = set(CALISCOPE_COLUMNS) <= set(names)
+    if caliscope:
+        labels = load_layout("mediapipe_33").points
+        points, rows = _caliscope(table, len(labels))
     else:
         columns = _wide_columns(names)
         labels = tuple(columns)
@@ -203,41 +197,20 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
     fields |= {name: table.about[name] for name in ("unit", "up") if name in table.about}
     if "in_world" in table.about:
         fields["in_world"] = table.about["in_world"] == "1"
-    if long is CALISCOPE_COLUMNS:
+    if caliscope:
         fields["layout"] = load_layout("mediapipe_33")
     if time_name:
         fields["time"] = table.checked(time_name)[rows]
     return points_motion(points, labels, path, options, **fields)
 
 
-def _long(
-    table: Table, columns: tuple[str, ...], frame_name: str | None, who: list[str], path: str
-) -> tuple[Array, tuple[str, ...], Ints]:
-    """Return points (T, P, 3) of a table with a row a frame and point, their names, the first row of each frame."""
-    if frame_name is None:
-        raise refusal(path, "columns", shown(", ".join(table.names)), "a column frame or time", "add it")
-    if columns is CALISCOPE_COLUMNS:
-        labels = load_layout("mediapipe_33").points
-        index = table.checked(columns[0])
-        used = (index >= 0) & (index < len(labels))
-        point = np.where(used, index, 0).astype(np.intp)
-    else:
-        words = table.texts(columns[0])
-        labels = tuple(dict.fromkeys(words))
-        place = {name: k for k, name in enumerate(labels)}
-        point, used = np.array([place[word] for word in words]), np.ones(len(words), dtype=bool)
-    frame = table.checked(frame_name)
-    used &= np.isfinite(frame)
-    order = {name: k for k, name in enumerate(dict.fromkeys(who))}
-    person = np.array([order[one] for one in who]) if who else np.zeros(len(frame))
-    if not used.any():
-        raise refusal(path, "", "no point of the body", "rows of points", "check how it was written")
-    pairs = np.stack([person, frame], axis=1)
-    if len(np.unique(np.column_stack([pairs, point])[used], axis=0)) < used.sum():
-        raise refusal(path, "", "a point twice in a frame", "each point once a frame", "remove one")
-    places = np.stack([table.checked(one) for one in columns[1:]], axis=1)
-    _, first, points = by_row(pairs[used], point[used], places[used], len(labels))
-    return points, labels, np.flatnonzero(used)[first]
+def _caliscope(table: Table, count: int) -> tuple[Array, Ints]:
+    """Return points (T, P, 3) of a table with a row a frame and point, and the first row of each frame."""
+    frame, index, *axes = (table.checked(name) for name in CALISCOPE_COLUMNS)
+    used = np.flatnonzero((index >= 0) & (index < count) & np.isfinite(frame))
+    places = np.stack(axes, axis=1)[used]
+    _, first, points = by_row(frame[used, None], index[used].astype(np.intp), places, count)
+    return points, used[first]
 
 
 def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:

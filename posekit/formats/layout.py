@@ -115,10 +115,7 @@ class Layout:
         Both are placed in the image: bent spines and perspective move them by a centimetre or two.
         """
         found = self.gather(values, names)
-        for part in ("shoulder", "hip"):
-            sides = [found.get(f"{side}_{part}") for side in ("right", "left")]
-            if f"mid_{part}s" not in found and sides[0] is not None and sides[1] is not None:
-                found[f"mid_{part}s"] = (sides[0] + sides[1]) / 2
+        found = {**_middles(found), **found}
         derived = []
         shoulders, hips = found.get("mid_shoulders"), found.get("mid_hips")
         if "neck" not in found and shoulders is not None:
@@ -128,9 +125,7 @@ class Layout:
             share = PELVIS_SHARE if values.shape[-1] > 1 else 0.5  # a confidence is the mean of both
             found["pelvis"] = shoulders + share * (hips - shoulders)
             derived.append("pelvis")
-        kept = tuple(name for name in NAMES if name in found)
-        empty = np.empty((len(values), 0, values.shape[-1]))
-        return kept, np.stack([found[name] for name in kept], axis=1) if kept else empty, tuple(derived)
+        return *_in_order(found, values), tuple(derived)
 
     def place(self, names: Sequence[str], points: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
         """Name a file's points in space as posekit does, with neck and pelvis placed if the file has none.
@@ -150,12 +145,8 @@ class Layout:
             The joints that no point of the file is.
         """
         found = self.gather(points, names)
-        for part in ("shoulder", "hip"):
-            sides = [found.get(f"{side}_{part}") for side in ("right", "left")]
-            if sides[0] is not None and sides[1] is not None:
-                middle, stated = (sides[0] + sides[1]) / 2, found.get(f"mid_{part}s")
-                unseen = middle if stated is None else stated
-                found[f"mid_{part}s"] = np.where(np.isnan(middle), unseen, middle)
+        for name, middle in _middles(found).items():
+            found[name] = np.where(np.isnan(middle), found.get(name, middle), middle)
         derived = tuple(name for name in ("pelvis", "neck") if name not in found)
         if not {"mid_shoulders", "mid_hips", "right_shoulder", "left_shoulder"} <= set(found):
             derived = ()
@@ -164,10 +155,22 @@ class Layout:
             found["pelvis"] = found["mid_shoulders"] + PELVIS_SHARE * spine
         if "neck" in derived:
             found["neck"] = _neck(found)
-        placed = tuple(name for name in NAMES if name in found)
-        if not placed:
-            return (), points[..., :0, :], ()
-        return placed, np.stack([found[name] for name in placed], axis=-2), derived
+        return *_in_order(found, points), derived
+
+
+def _middles(found: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the middles of the shoulders and of the hips, where both sides are among the landmarks."""
+    return {
+        f"mid_{part}s": (found[f"right_{part}"] + found[f"left_{part}"]) / 2
+        for part in ("shoulder", "hip")
+        if {f"right_{part}", f"left_{part}"} <= set(found)
+    }
+
+
+def _in_order(found: Mapping[str, Array], points: Array) -> tuple[tuple[str, ...], Array]:
+    """Stack landmarks in the order of `posekit.motion.motion.NAMES`, as the file's points are."""
+    placed = tuple(name for name in NAMES if name in found)
+    return placed, np.stack([found[name] for name in placed], axis=-2) if placed else points[..., :0, :]
 
 
 def _hips(right: Array, left: Array, back: Array) -> tuple[Array, Array]:

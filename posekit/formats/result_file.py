@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import refusal, shown
 from posekit.files import write_bytes
 from posekit.formats import json_file
 from posekit.formats.json_file import nullable
@@ -97,14 +96,14 @@ def read(document: Any, path: str | Path, options: Options) -> Recovery:
     """
     with undamaged(path, RESULT_SCHEMA), json_file.without_collection():
         if isinstance(document, Table):
-            return _of_columns(_table_columns(document), _parsed(document.about["posekit"], path), path)
+            return _of_columns(_table_columns(document), document.about["posekit"], path)
         root = Node(document, path)
         if check_schema(root, RESULT_SCHEMA, EARLIER_SCHEMA) == EARLIER_SCHEMA:
             from posekit.formats.earlier_result import document_of
 
             root = Node(document_of(root), path)
         if "about" in root.value:
-            return _of_columns(document, _parsed(root.at("about").text(), path), path)
+            return _of_columns(document, root.at("about").text(), path)
         return _of_json(root)
 
 
@@ -336,15 +335,10 @@ def _table_columns(table: Table) -> dict[str, Any]:
     return found | {f"margin.{name.removeprefix('margin_')}": table.column(name) for name in margins}
 
 
-def _parsed(text: str, path: str | Path) -> dict[str, Any]:
-    about = json_file.parse(text.encode(), f"{path}: about")
-    if not isinstance(about, dict):
-        raise refusal(path, "about", shown(about), "an object", "write the result again")
-    return about
-
-
-def _of_columns(columns: Mapping[str, Any], about: Mapping[str, Any], path: str | Path) -> Recovery:
-    """Make a recovery of arrays by name and of everything that is no array."""
+def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Recovery:
+    """Make a recovery of arrays by name and of everything that is no array, also as one JSON text."""
+    if isinstance(about, str):
+        about = json_file.parse(about.encode(), f"{path}: about")
     root, held = Node(about, path), {**dict(about.get("arrays") or {}), **columns}
     arrays = Node(held, path)
     frame = arrays.at("frame").array(None).astype(np.intp)

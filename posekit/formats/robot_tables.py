@@ -120,7 +120,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     columns = _columns(document)
     about = document.about if isinstance(document, Table) else columns
     layout, order = _stated_layout(columns, path, options)
-    time, rate = _time(columns)
+    time, rate = time_and_rate(columns)
     parts = layout.fields
     if "whole" in parts:
         place, turn, joints, labels, time = _of_whole(parts, columns, time, options)
@@ -243,7 +243,7 @@ def _joint_name(name: str) -> str:
     return re.sub(r"^dof_|_dof$|_pos$", "", re.sub(r"\s*[(\[](rad|deg)[)\]]$", "", name.strip()))
 
 
-def _time(columns: Mapping[str, Any]) -> tuple[Array | None, float | None]:
+def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | None]:
     """Return the file's times and its rate, where it has them."""
     name = next((name for name in columns if name.lower() in TIMES), None)
     key = next((name for name in RATES if name in columns), None)

@@ -19,7 +19,7 @@ from posekit.errors import refusal
 from posekit.formats.body_checks import points_motion
 from posekit.formats.layout import load_layout
 from posekit.formats.options import Options
-from posekit.formats.robot_tables import RATES
+from posekit.formats.robot_tables import time_and_rate
 from posekit.geometry import FARTHEST_COORDINATE, Array, rotation_from_vector
 
 if TYPE_CHECKING:
@@ -70,15 +70,13 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
     if not (np.abs(used) < FARTHEST_COORDINATE).all() or not (np.abs(place) < FARTHEST_COORDINATE).all():
         raise refusal(path, keys[0], "a number that is not finite", "finite numbers", "correct the file")
     rest = _rest(document, options)
-    held = {**outer, **document}
-    rate = next((np.ravel(held[name]) for name in RATES if name in held), np.empty(0))
     return points_motion(
         placed(rest, used, place),
         (),
         path,
         options,
         layout=load_layout("smpl_22"),
-        rate=float(rate[0]) if rate.size and rate.dtype.kind in "iuf" else None,
+        rate=time_and_rate({**outer, **document})[1],
         unit="m",
         up_by_custom="+z",
         in_world=True,
