@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.errors import InputError, refusal, shown
+from posekit.errors import refusal, shown
 from posekit.formats.body_checks import METRES, times
 from posekit.formats.layout import Layout, load_layout
 from posekit.formats.options import Options
@@ -118,14 +118,16 @@ def read(document: Any, path: str, options: Options) -> Motion:
         If arrays are missing or of other shapes, or a quaternion is none.
     """
     columns = _columns(document)
+    if isinstance(document, Table) and "" in columns:
+        columns = _without_counter(columns[""], options)
     about = document.about if isinstance(document, Table) else columns
     layout, order = _stated_layout(columns, path, options)
     time, rate = time_and_rate(columns)
     parts = layout.fields
-    if "whole" in parts:
-        place, turn, joints, labels, time = _of_whole(parts, columns, time, options)
-    else:
-        place, turn, joints, labels = _of_parts(parts, columns, path, options)
+    whole = "whole" in parts
+    place, turn, joints, labels = (
+        _of_whole(parts, columns) if whole else _of_parts(parts, columns, path, options)
+    )
     if labels and len(labels) != joints.shape[1]:
         got = f"{len(labels)} names"
         raise refusal(path, "joint names", got, f"{joints.shape[1]}, one a joint", "correct the file")
@@ -168,26 +170,31 @@ def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> t
     return own, options.layout if stated is not None and stated is not own else ""
 
 
-def _of_whole(
-    parts: Mapping[str, Any], columns: Mapping[str, Any], time: Array | None, options: Options
-) -> tuple[Array, Array, Array, tuple[str, ...], Array | None]:
-    """Part rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
-    labels = _labels(parts, columns)
-    values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
-    first = values[:, 0]
+def _without_counter(values: Array, options: Options) -> dict[str, Array]:
+    """Return rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
+    first, whole = values[:, 0], values[np.isfinite(values).all(axis=1)]
     even = len(first) > 2 and first[0] == 0 and np.allclose(np.diff(first), first[1], rtol=1e-3, atol=2e-6)
-    if "" not in parts["whole"]["arrays"] and "q" in columns and labels[: len(ROOT_NAMES)] != ROOT_NAMES:
-        return values[:, :0], values[:, :0], values, labels, time  # another root than a free flyer
-    labels = labels[len(ROOT_NAMES) :] if labels[: len(ROOT_NAMES)] == ROOT_NAMES else labels
-    whole = values[np.isfinite(values).all(axis=1)]
-    if not len(whole):
-        return values[:, :3], values[:, 3:7], values[:, 7:], labels, time
+    if not even or not first[1] > 0 or not len(whole):
+        return {"": values}
     off = [np.median(np.abs(np.linalg.norm(whole[:, k : k + 4], axis=1) - 1)) for k in (3, 4)]
-    if even and first[1] > 0 and off[1] < NO_QUATERNION and off[0] > UNIT_LENGTH_ERROR:
-        counts = first[1] % 1 == 0
-        options.note(f"the first column is {'frame numbers' if counts else 'seconds'}")
-        values, time = values[:, 1:], time if counts else first
-    return values[:, :3], values[:, 3:7], values[:, 7:], labels, time
+    if off[0] <= UNIT_LENGTH_ERROR or off[1] >= NO_QUATERNION:
+        return {"": values}
+    counts = first[1] % 1 == 0
+    options.note(f"the first column is {'frame numbers' if counts else 'seconds'}")
+    return {"": values[:, 1:]} if counts else {"": values[:, 1:], "time": first}
+
+
+def _of_whole(
+    parts: Mapping[str, Any], columns: Mapping[str, Any]
+) -> tuple[Array, Array, Array, tuple[str, ...]]:
+    """Part rows of place, quaternion and joints; those of another root than a free flyer are joints."""
+    labels, root = _labels(parts, columns), len(ROOT_NAMES)
+    values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
+    if labels[:root] == ROOT_NAMES:
+        labels = labels[root:]
+    elif "" not in parts["whole"]["arrays"] and "q" in columns:
+        return values[:, :0], values[:, :0], values, labels
+    return values[:, :3], values[:, 3:root], values[:, root:], labels
 
 
 def _of_parts(
@@ -203,9 +210,6 @@ def _of_parts(
         own = [one for one in columns if one.startswith(prefix) and one not in used]
         own = [one for one in own if one.lower() not in (*TIMES, *COUNTS)]
         stripped = [_joint_name(one.removeprefix(prefix)) for one in own]
-        if not own or len(set(stripped)) != len(stripped):
-            got = f"{len(own)} columns of joints, {len(set(stripped))} different"
-            raise refusal(path, "columns", got, "each joint once", "correct the names")
         signs = [joint_part.get("signs", {}).get(one, 1.0) for one in stripped]
         joints = _stacked(columns, own) * np.array(signs)
         labels = tuple(joint_part.get("renamed", {}).get(one, one) for one in stripped)
@@ -227,8 +231,6 @@ def _of_parts(
 def _stacked(columns: Mapping[str, Any], names: Sequence[str]) -> Array:
     """Return one array, or columns side by side (T, K)."""
     found = [_value(columns, name) for name in names]
-    if len({one.shape for one in found}) > 1:
-        raise InputError(f"{names[0]}: got columns of different lengths; expected one; correct the file")
     return found[0] if len(found) == 1 and found[0].ndim > 1 else np.stack(found, axis=1)
 
 
