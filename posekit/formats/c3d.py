@@ -21,7 +21,7 @@ from posekit.errors import InputError, refusal, shown
 from posekit.files import write_bytes
 from posekit.formats.body_checks import UNIT_WORDS, points_motion
 from posekit.formats.options import Options
-from posekit.formats.trc import one_recording, seconds
+from posekit.formats.trc import even_step, one_recording
 from posekit.geometry import UP_AXES, Array
 
 if TYPE_CHECKING:
@@ -225,13 +225,9 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
     InputError
         If the motion has no points, several recordings, uneven times, or too many frames.
     """
-    points, names, rate = one_recording(motion, "C3D"), motion.joint_names, motion.rate or 30.0
+    points, names, rate = one_recording(motion, "C3D"), motion.joint_names, 1 / even_step(motion, "C3D")
     if len(motion) > MAX_COUNT - 1 or 4 * points.shape[1] * len(motion) > MAX_VALUES:
         raise refusal(motion.source, "", f"{len(motion):,} frames", f"up to {MAX_COUNT - 1:,}", "cut it")
-    off: Array = np.abs(np.diff(seconds(motion)) * rate - 1)
-    if off.max(initial=0.0) > 0.01:
-        got = f"a step of {np.diff(seconds(motion))[int(np.argmax(off))]:.3g} s"
-        raise refusal(motion.source, "time", got, "even steps: C3D has no times", "write another format")
     group: dict[str, tuple[int, Any]] = {
         "USED": (2, [len(names)]),
         "SCALE": (4, [-1.0]),

@@ -18,7 +18,7 @@ from posekit.errors import refusal
 from posekit.files import write_bytes
 from posekit.formats.body_checks import METRES
 from posekit.formats.bvh import Bvh, holds
-from posekit.formats.trc import one_recording, seconds
+from posekit.formats.trc import even_step, one_recording
 from posekit.geometry import Array, rotation_from_quaternion, up_vector
 from posekit.geometry.rotations import coordinate_rotation, rotation_between, turned_near
 from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 #: Axes of the three angles of a joint.
 AXIS_ORDER: Final = (0, 2, 1)
-#: Share of a step by which a frame may lie beside its place in an even sequence of times.
-UNEVEN_STEP_SHARE: Final = 0.1
 #: Names of the figure's joints in BVH, by which animation programs find their own characters' joints. A file's Neck may
 #: lie anywhere between the shoulders and the head; NeckBase is the figure's.
 NAMES: Final = {
@@ -234,22 +232,9 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
     values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(q), -1)])
     values = np.round(values, 6) + 0.0  # no -0.000000
     hierarchy = "".join(_block(0, offsets(figure) * scale, 0))
-    head = f"HIERARCHY\n{hierarchy}MOTION\nFrames: {len(q)}\nFrame Time: {_even_step(motion, path):.10f}\n"
+    head = f"HIERARCHY\n{hierarchy}MOTION\nFrames: {len(q)}\nFrame Time: {even_step(motion, 'BVH'):.10f}\n"
     row = " ".join("%.6f" if column.any() else "%d" for column in values.T) + "\n"
     write_bytes(path, (head + "".join(row % tuple(one) for one in values.tolist())).encode("ascii"))
-
-
-def _even_step(motion: Motion, path: str | Path) -> float:
-    """Return the seconds from frame to frame; refuse times that are not even."""
-    time = seconds(motion)
-    if len(time) == 1:
-        return 1 / 30
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    beside = np.abs(time - time[0] - step * np.arange(len(time))) / (step or np.nan)
-    if not beside.max() <= UNEVEN_STEP_SHARE:
-        got = f"steps from {np.diff(time).min():.4g} to {np.diff(time).max():.4g} s"
-        raise refusal(path, "time", got, "even steps: BVH has no other", "write csv, npz or trc")
-    return step
 
 
 def _block(k: int, steps: Array, depth: int) -> list[str]:

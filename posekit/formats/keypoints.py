@@ -149,7 +149,12 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
         for one in _dicts(root.value.get("categories"))
         if isinstance(one.get("keypoints"), list)
     }
-    people = _of_bodies(root, people, names, rows)
+    # Animals and objects have points, too.
+    category = [str(one.value.get("category_id")) for one in people]
+    used = [names[key] for key in category if key in names] or list(names.values())
+    rows.names = next((one for one in used if "shoulder" in " ".join(one).lower()), used[0] if used else ())
+    kept = zip(people, category, strict=True)
+    people = [one for one, key in kept if names.get(key, rows.names) == rows.names]
     triples = [_by_three(one.at("keypoints")) for one in people]
     thirds = np.concatenate([one[:, 2] for one in triples]) if triples else np.empty(0)
     flags = bool(np.isin(thirds, (0, 1, 2)).all())
@@ -160,20 +165,6 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
         if flags:
             values[:, 2] = np.where(values[:, 2] > 0, np.nan, 0.0)
         rows.add(named.get(identity, identity), values, one.value.get("track_id"))
-
-
-def _of_bodies(root: Node, people: list[Node], names: dict[str, tuple[str, ...]], rows: Rows) -> list[Node]:
-    """Keep the people of the one category whose points are a body's; note the names of its points."""
-    category = [str(one.value.get("category_id")) for one in people]
-    kinds = {names[one] for one in category if one in names} or set(names.values())
-    if len(kinds) > 1:  # animals and objects have points, too
-        kinds = {kind for kind in kinds if "shoulder" in " ".join(kind).lower()}
-    if len(kinds) > 1:
-        remedy = "split the file by its categories"
-        raise root.at("categories").refused("one kind of people with the points of a body", remedy)
-    rows.names = next(iter(kinds), ())
-    kept = zip(people, category, strict=True)
-    return [one for one, which in kept if names.get(which, rows.names) == rows.names]
 
 
 def _results(root: Node, rows: Rows, label: str) -> None:

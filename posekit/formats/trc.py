@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from posekit.motion import Motion
 
 MAX_POINTS: Final = 10_000
+#: Share of a step by which a frame may lie beside its place in an even sequence of times.
+UNEVEN_STEP_SHARE: Final = 0.1
 
 
 def looks_like(document: Any) -> bool:
@@ -219,3 +221,18 @@ def seconds(motion: Motion) -> Array:
     """Return the times of a motion; frames a thirtieth of a second apart if they are not known."""
     time = np.asarray(motion.time)
     return time if np.isfinite(time).all() else np.arange(len(motion)) / 30.0
+
+
+def even_step(motion: Motion, format: str) -> float:
+    """Return the seconds from frame to frame; refuse uneven times for a format that has no others."""
+    time = seconds(motion)
+    if len(time) == 1:
+        return 1 / 30
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    beside = np.abs(time - time[0] - step * np.arange(len(time))) / (step or np.nan)
+    if not beside.max() <= UNEVEN_STEP_SHARE:
+        got = f"steps from {np.diff(time).min():.4g} to {np.diff(time).max():.4g} s"
+        raise refusal(
+            motion.source, "time", got, f"even steps: {format} has no other", "write csv, npz or trc"
+        )
+    return step
