@@ -165,7 +165,7 @@ class Settings(Record):
             if name not in known:
                 expected = f"a field of {type(self).__name__}"
                 raise refusal("settings", name, "an unknown field", expected, nearest(name, known))
-        return replace(self, **fields_given)
+        return replace(self, **fields_given) if fields_given else self
 
     @classmethod
     def from_toml(cls, path: str | Path, base: Self | None = None) -> Self:

@@ -57,7 +57,7 @@ class Gathering:
         )
         self.frames: dict[str, Any] = {name: list(values) for name, values in frames.columns().items()}
         self.answers: list[tuple[Ints, Callable[[], dict[str, Any]]]] = []
-        self.survivors = [Survivors(frame=np.empty(0, np.intp), joints=np.empty((0, len(JOINTS), 3)))]
+        self.survivors: list[Survivors] = []
 
     def close(self, *frames: int, **about: Any) -> None:
         """State what is known of frames, by columns of `Frames`; nothing more is sought in them."""
@@ -182,6 +182,8 @@ class Gathering:
         **about
             ``settings`` and ``tolerances`` of the result.
         """
+        if not self.survivors:
+            self.survivors = [Survivors(frame=np.empty(0, np.intp), joints=np.empty((0, len(JOINTS), 3)))]
         view, parts = self.view, [one.columns() for one in self.survivors]
         table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         if (np.diff(table["frame"]) < 0).any():
