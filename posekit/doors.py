@@ -191,7 +191,7 @@ def detected_view(
 ) -> View:
     """Make the view of one person from key points: see `view_of`."""
     from posekit.cameras import ScaledOrthographicCamera
-    from posekit.cameras.guesses import camera_from_fov
+    from posekit.cameras.pinhole import camera_from_fov
 
     size = size or detections.size
     taken: Any = camera

@@ -124,8 +124,7 @@ def test_a_mirrored_image_is_recognised():
 @pytest.mark.parametrize(
     ("act", "says"),
     [
-        (lambda: TABLE_A2.with_points({"nose": TABLE_A2.points[0]}), "coincide"),
-        (lambda: HeadPoints(names=TABLE_A2.names, points=TABLE_A2.points * [1, 1, 0]), "coincide|plane"),
+        (lambda: HeadPoints(names=TABLE_A2.names, points=TABLE_A2.points * [1, 1, 0]), "plane"),
         (lambda: solve_pose(TABLE_A2, np.ones((5, 2)), UNKNOWN), r"\(6, 2\)"),
         (lambda: solve_pose(TABLE_A2, np.ones((6, 2)), UNKNOWN), "one line"),
         (lambda: solve_pose(TABLE_A2, np.full((6, 2), np.inf), UNKNOWN), "infinite"),

@@ -53,9 +53,6 @@ BETTER_BEHIND: Final = 1e-4
 #: Probability that a head of sound points with normal errors has one of them named as a misfit.
 FALSE_ALARMS: Final = 5e-3
 
-#: Added to the squared extent of points of size 1, so that a flat head has a start.
-FLAT_EXTENT: Final = 1e-12
-
 BEHIND_CAMERA: Final = (
     "the points fit only a head behind the camera, as those of a mirrored image do: y must point down in the "
     "image, and left and right must be the person's own"
@@ -170,11 +167,8 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
     problem = _Problem(centred, plane[rows], to_image[rows] * seen[rows, :, None, None], free)
     x, cost, residual = problem.best()
     R, shift, scale, slope = _parts(x)
-    wrong = np.where(np.isfinite(cost), "", UNSETTLED)
-    if free:
-        wrong = np.where(slope <= ROUNDING_ERROR, WEAK, wrong)
-    else:
-        wrong = np.where(problem.behind(cost), BEHIND_CAMERA, wrong)
+    bad, why = (slope <= ROUNDING_ERROR, WEAK) if free else (problem.behind(cost), BEHIND_CAMERA)
+    wrong = np.where(np.isfinite(cost), np.where(bad, why, ""), UNSETTLED)
     point, chance = problem.misfits(cost)
     misfit: list[str | None] = [None] * len(points)
     for k, row in enumerate(rows):
@@ -347,9 +341,7 @@ class _Problem(NamedTuple):
         """Fit a scaled orthographic view: the limit of a distant camera (DeMenthon & Davis 1995)."""
         middle, size, offset = _centred(self.plane, self.seen)
         centre, extent, space = _centred(self.points, self.seen)
-        transposed = np.swapaxes(space, -1, -2)
-        normal = transposed @ space + FLAT_EXTENT * np.eye(3)
-        affine = np.swapaxes(np.linalg.solve(normal, transposed @ offset), -1, -2)
+        affine = np.swapaxes(np.linalg.pinv(space) @ offset, -1, -2)
         left, values, right = np.linalg.svd(affine, full_matrices=False)
         axes = left @ right
         R = np.concatenate([axes, cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)

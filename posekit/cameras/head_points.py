@@ -19,7 +19,7 @@ from posekit.skeleton import HEAD_POINTS
 #: Points that a camera's eleven unknowns need (Lee & Chen 1985, §2.1).
 MIN_POINTS: Final = 6
 
-#: Fraction of the head's size below which two points coincide, and a set of points is a plane.
+#: Fraction of a set's size below which it is a plane, or a line in the image.
 DEGENERATE_EXTENT: Final = 1e-3
 
 
@@ -37,7 +37,7 @@ class HeadPoints(Record):
     Raises
     ------
     HeadError
-        If there are fewer than six, a coordinate is not finite, two coincide, or all lie in one plane.
+        If there are fewer than six, a coordinate is not finite, or all lie in one plane.
 
     Examples
     --------
@@ -79,14 +79,6 @@ def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
         return f"{count} of {len(names)} head points are known, at least {MIN_POINTS} are needed{listed}"
     known = points[seen]
     size, _, thickness = np.linalg.svd(known - known.mean(axis=0), compute_uv=False) / np.sqrt(count)
-    gaps = np.linalg.norm(known[:, None] - known, axis=-1)
-    gaps[np.diag_indices(count)] = np.inf
-    if gaps.min() <= DEGENERATE_EXTENT * size:
-        first, second = np.flatnonzero(seen)[np.array(np.unravel_index(gaps.argmin(), gaps.shape))]
-        return (
-            f"head points {names[first]} and {names[second]} coincide ({gaps.min():.3g} m apart): "
-            "correct them or leave one out"
-        )
     if thickness <= DEGENERATE_EXTENT * size:
         return (
             f"the {count} head points lie in one plane (off it {thickness:.3g} m, along it {size:.3g} m): "

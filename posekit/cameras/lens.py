@@ -59,9 +59,11 @@ def undistort(distorted: Array, distortion: Array, *, fisheye: bool = False) -> 
     OpenCV's `undistortPoints`), the point itself, and a point near the optical axis are tried in turn.
     """
     target = distorted.reshape(-1, 2)
-    found = np.full_like(target, np.nan)
+    near, found = target, np.full_like(target, np.nan)
     with np.errstate(all="ignore"):  # iterations may diverge
-        for start in (_fixed_point(target, distortion, fisheye), target, 0.1 * target):
+        for _ in range(FIXED_POINT_STEPS):  # a quasi-Newton step with the slope on the axis, which is one
+            near = near + target - distort(near, distortion, fisheye=fisheye)
+        for start in (near, target, 0.1 * target):
             left = np.isnan(found[:, 0]) & np.isfinite(target).all(axis=-1)
             if left.any():
                 found[left] = _newton(start[left], target[left], distortion, fisheye)
@@ -145,14 +147,6 @@ def _tilt(tx: float, ty: float) -> Array:
     turned_y = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
     R = turned_y @ turned_x
     return np.asarray(np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R)
-
-
-def _fixed_point(target: Array, distortion: Array, fisheye: bool) -> Array:
-    """Iterate x <- x + target - distort(x): a quasi-Newton step with the slope on the axis, which is one."""
-    x = target
-    for _ in range(FIXED_POINT_STEPS):
-        x = x + target - distort(x, distortion, fisheye=fisheye)
-    return x
 
 
 def _newton(x: Array, target: Array, distortion: Array, fisheye: bool) -> Array:

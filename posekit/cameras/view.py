@@ -12,7 +12,7 @@ from posekit.cameras.lee_chen import LeeChenCamera
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera
 from posekit.errors import nearest, refusal, shown
-from posekit.geometry import FARTHEST_COORDINATE, Array, Ints, Record
+from posekit.geometry import FARTHEST_COORDINATE, Array, Ints, Record, read_only
 from posekit.settings import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
@@ -164,13 +164,12 @@ class View(Record):
         return replace(self, camera=self.camera.take(index), pictures=pictures, **taken)
 
     def _facts(self) -> list[str]:
-        seen = np.isfinite(self.image).all(axis=2).mean()
         known = [name for name in ("root", "truth") if np.isfinite(getattr(self, name)).any()]
         return [
             f"{len(self)} frame{'s' if len(self) > 1 else ''}",
             f"{self.time[0]:g} to {self.time[-1]:g} s",
             f"camera={type(self.camera).__name__}",
-            f"{seen:.0%} of joints seen",
+            f"{np.isfinite(self.image).all(axis=2).mean():.0%} of joints seen",
             *[f"with {name}" for name in known],
         ]
 
@@ -196,10 +195,9 @@ class View(Record):
             if not is_head_name(name):
                 expected = f"a name of up to {MAX_NAME_CHARACTERS} characters that no joint has"
                 raise refusal("view", "head_points", shown(name), expected, "give another name")
-            points[name] = point = np.array(value, dtype=np.float64)
+            points[name] = point = read_only(value)
             if point.shape != (3,) or not np.isfinite(point).all():
                 raise refusal("view", f"head_points.{name}", shown(point.tolist()), "three finite numbers")
-            point.flags.writeable = False
         self._set("head_points", points)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.cameras import PinholeCamera, View
-from posekit.cameras.guesses import camera_from_fov
+from posekit.cameras.pinhole import camera_from_fov
 from posekit.errors import PosekitError, refusal
 from posekit.following.detections import Detections
 from posekit.following.paths import Candidates, Trellis, candidates, expected_posture

@@ -24,9 +24,6 @@ from posekit.papers.rows import Row, printed, row
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 from posekit.synthesis import random_postures
 
-#: The paper's camera before f is known.
-UNKNOWN: Final = LeeChenCamera(f=None)
-
 #: Distance of the paper's image plane, metres (Table 2).
 F: Final = 0.05
 
@@ -74,7 +71,7 @@ def exact_image(head: HeadPoints = TABLE_A2) -> Array:
 @cache
 def table_2() -> dict[str, Array]:
     """Return Table 2(a) to (d) from exact projections, in the paper's frames, centimetres."""
-    pose = solve_pose(TABLE_A2, exact_image(), UNKNOWN)
+    pose = solve_pose(TABLE_A2, exact_image(), LeeChenCamera(f=None))
     R, t, f = pose.R_cam_head[0], pose.t_cam_head[0], float(pose.f[0])
     return {
         "T": transformation_matrix(R, 100 * t, 100 * f),
@@ -128,7 +125,7 @@ def _null_space(head: HeadPoints, image: Array) -> tuple[Array, float, Array, Ar
 def _noisy_error(head: HeadPoints) -> float:
     """Return the median error of the camera position from noisy head points, centimetres."""
     noise = IMAGE_NOISE * np.random.default_rng(0).normal(size=(N_PICTURES, 8, 2))[:, : len(head.points)]
-    pose = solve_pose(head, exact_image(head) + noise, UNKNOWN)
+    pose = solve_pose(head, exact_image(head) + noise, LeeChenCamera(f=None))
     position = camera_position(pose.R_cam_head, pose.t_cam_head, pose.f)
     return float(100 * np.median(np.linalg.norm(position - CAMERA, axis=1)))
 
@@ -158,7 +155,7 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
     """Return how far off the camera is, centimetres, and the head point that does not fit the others."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the misfit is returned
-        pose = solve_pose(head, image, UNKNOWN)
+        pose = solve_pose(head, image, LeeChenCamera(f=None))
     position = camera_position(pose.R_cam_head[0], pose.t_cam_head[0], float(pose.f[0]))
     return 100 * float(np.linalg.norm(position - CAMERA)), pose.misfit[0] or "no point"
 
