@@ -281,3 +281,19 @@ def test_a_velocity_of_zero_or_a_huge_one_is_no_limit(stated: str, asked: bool, 
         found = rows_of(report, "joint-velocity")
         assert set(found.place) == {name}
         assert found.value.to_numpy() == pytest.approx(0.5 / 19 * 100 / float(stated))
+
+
+@pytest.mark.parametrize(
+    ("frames", "way", "found"),
+    [(1, 0.1, True), (1, 0.3, True), (3, 0.1, False), (3, 0.2, True), (5, 0.15, False), (5, 0.3, True)],
+)
+def test_a_body_that_is_displaced_goes_farther_than_forces_can_push_it(
+    frames: int, way: float, found: bool
+) -> None:
+    """Twice gravity over half of a time T, and against it over the other half, explains a way of 20 T² / 4."""
+    share = np.clip((np.arange(120) - 59) / frames, 0, 1)
+    joints = gesture() + (way * share)[:, None, None] * [0.0, 1.0, 0.0]
+    rows = rows_of(judged(joints), "teleport")
+    rows = rows[rows.place == "body"]
+    assert rows.frame.tolist() == (span(60, 59 + frames) if found else [])
+    assert rows.value.to_numpy() == pytest.approx(way - 20.0 * (frames / RATE) ** 2 / 4)

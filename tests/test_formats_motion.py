@@ -918,3 +918,40 @@ def test_postures_relative_to_their_hips_are_no_motion_in_the_world(
     found = posekit.open(npz(tmp_path, joints, fps=RATE, up="+z"))
     assert found.in_world is in_world
     assert any("relative to its own hips" in note for note in found.notes) is not in_world
+
+
+MEDIAPIPE: dict[str, tuple[int, int]] = {
+    "shoulder": (12, 11),
+    "elbow": (14, 13),
+    "wrist": (16, 15),
+    "hip": (24, 23),
+    "knee": (26, 25),
+    "ankle": (28, 27),
+}
+"""Numbers of the right and the left joint among MediaPipe's 33 landmarks."""
+
+
+def test_a_row_a_landmark_is_read_by_its_number(tmp_path: Path) -> None:
+    """Caliscope's triangulated points: rows in any order, frames from any number, landmarks that are no body's."""
+    figure, frames = posekit.load_figure(), range(10, 14)
+    place = {
+        number: JOINTS.index(f"{side}_{joint}")
+        for joint, numbers in MEDIAPIPE.items()
+        for side, number in zip(("right", "left"), numbers, strict=True)
+    }
+    lines = ["sync_index,point_id,x_coord,y_coord,z_coord"]
+    joints = np.stack([figure.neutral_points[:14] + np.array([0.01 * frame, 0.0, 1.0]) for frame in frames])
+    for frame, body in zip(frames, joints, strict=True):
+        for number in (700, *reversed(place)):
+            x, y, z = body[place.get(number, 0)]
+            if (frame, number) != (12, 15):
+                lines.append(f"{frame},{number},{x:.6f},{y:.6f},{z:.6f}")
+    (tmp_path / "xyz.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = posekit.open(tmp_path / "xyz.csv", rate=30)
+    expected = np.array(joints)
+    expected[2, JOINTS.index("left_wrist")] = np.nan
+    known = list(place.values())
+    np.testing.assert_allclose(found.figure_joints[:, known], expected[:, known], atol=1e-6)
+    (tmp_path / "twice.csv").write_text("\n".join([*lines, lines[-1]]) + "\n", encoding="utf-8")
+    with pytest.raises(posekit.InputError, match="twice"):
+        posekit.open(tmp_path / "twice.csv", rate=30)
