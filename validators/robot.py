@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
@@ -46,7 +46,9 @@ def robot_travel(body: Body) -> Judgement:
 def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
     robot, q = _of(body)
     lower, upper = np.array(robot.lower), np.array(robot.upper)
-    names, limits = list(robot.configuration_names), _stated_limits(body)
+    names, table = list(robot.configuration_names), load_ranges(body.settings.ranges)
+    # Tables of another kind are of people.
+    limits = table["limits"] if table is not None and table["kind"] == "joints" else {}
     for name, ends in limits.items():
         if name in names:
             at = names.index(name)
@@ -66,16 +68,9 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
     )
 
 
-def _stated_limits(body: Body) -> dict[str, list[float]]:
-    """Return limits of a table of kind ``joints`` by joint, degrees; other tables are of people."""
-    table = load_ranges(body.settings.ranges)
-    return dict(table["limits"]) if table is not None and table["kind"] == "joints" else {}
-
-
 def _of(body: Body) -> tuple[Robot, Array]:
-    if body.robot is None or body.q is None:
-        raise NotAskedError("there are no configurations of a robot (--urdf)")
-    return body.robot, body.q
+    """Return the robot and its configurations: checks that read them are asked only if both are known."""
+    return cast("tuple[Robot, Array]", (body.robot, body.q))
 
 
 @check("mimic", unit="deg", reads=("q", "robot"))
