@@ -8,7 +8,6 @@ from posekit.validators.check import check as check
 from posekit.validators.judge import PostureJudge as PostureJudge
 from posekit.validators.judge import Validator as Validator
 from posekit.validators.judge import assert_valid as assert_valid
-from posekit.validators.judge import early_checks as early_checks
 from posekit.validators.judge import judge_postures as judge_postures
 from posekit.validators.judge import validate_motion as validate_motion
 from posekit.validators.report import Report as Report

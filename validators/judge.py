@@ -360,14 +360,7 @@ class Validator:
     ) -> None:
         changes = stated(checks=checks, ranges=ranges, profile=profile, ground=ground, strict=strict)
         self.settings = (settings or ValidateSettings()).changed(**changes)
-        self.figure: Figure | None = None
-        self.robot: Robot | None = None
-        if isinstance(urdf, Figure):
-            self.figure = urdf
-        elif not isinstance(urdf, str | Path):
-            self.robot = urdf
-        else:
-            self.figure, self.robot = _loaded(str(urdf), self.settings)
+        self.figure, self.robot = _loaded(urdf, self.settings)
         chosen_checks(self.settings, of_robot=self.robot is not None, in_time=True)
 
     def __repr__(self) -> str:
@@ -461,8 +454,11 @@ class Validator:
 MOST_METRES: Final = 1e6
 
 
-def _loaded(name: str, settings: ValidateSettings) -> tuple[Figure | None, Robot | None]:
+def _loaded(urdf: Any, settings: ValidateSettings) -> tuple[Figure | None, Robot | None]:
     """Load the body that judges: the figure, a figure's own URDF, or a robot."""
+    if not isinstance(urdf, str | Path):
+        return (urdf, None) if isinstance(urdf, Figure) else (None, urdf)
+    name = str(urdf)
     if name in ("figure", "stick_figure"):
         return load_figure(), None
     from posekit.robots import load_robot

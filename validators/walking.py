@@ -19,7 +19,7 @@ import numpy as np
 
 from posekit.body.frames import torso_frame
 from posekit.geometry import Array, cross, dot, perpendicular, unit
-from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, SIDES, TORSO
+from posekit.skeleton import JOINT, JOINTS, POINTS, SIDES, TORSO
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 
@@ -65,14 +65,10 @@ class WalkingRules:
     name = "walking"
     unit = "1"
     reads = ("joints",)
+    points = POINTS
 
     rules: tuple[int, ...] = ()
     heading: Array | None = None
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the points that are read."""
-        return (*JOINTS, *HEAD_POINTS)
 
     def judge(self, body: Body) -> Judgement:
         """Judge the rules; values are shares of their thresholds, positive where a rule is kept."""

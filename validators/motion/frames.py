@@ -297,15 +297,12 @@ def explained(body: Body) -> Explained:
     back = np.argsort(order)
     joints = body.joints[order]
     repeats = duplicates(joints)
-    joints = np.where((repeats > 0)[:, None, None], np.nan, joints) if repeats.any() else joints
     known = repeats == 0
     places = np.zeros(len(joints), dtype=np.intp)
     if not body.rate < ORDERED_RATE:
         places[known] = displaced(joints[known])
-    rearranged = stretches_of(places)
-    if places.any():
-        joints = np.where(rearranged[:, None, None], np.nan, joints)
-    kept = known & ~rearranged
+    kept = known & ~stretches_of(places)
+    joints = np.where(kept[:, None, None], joints, np.nan)
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
     noise = max(body.noise, usual_trembling(joints[kept]))
     follows = np.diff(timeline.slots[order][kept]) == 1
@@ -327,7 +324,7 @@ def explained(body: Body) -> Explained:
         displaced=places[back],
         exchanged=exchanged[back],
         jumps=jumps,
-        joints=np.where(jumped[..., None], np.nan, joints) if jumped.any() else joints,
+        joints=np.where(jumped[..., None], np.nan, joints),
         noise=body.noise,
     )
 

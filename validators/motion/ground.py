@@ -26,7 +26,7 @@ from posekit.geometry import Array, known_median, mean_known, norm, runs
 from posekit.ranking.standing import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
 from posekit.validators.body import LIMB_ROWS, Body, once
-from posekit.validators.motion.timeline import timeline_of
+from posekit.validators.motion.timeline import centred, spaced, timeline_of
 
 #: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
 TOE_METRES: Final = 0.02
@@ -167,13 +167,11 @@ def speeds(body: Body, points: Array, frames: int = 1) -> Array:
     """
     line = timeline_of(body)
     placed = line.spread(points)
-    fast = np.full(placed.shape[:2], np.nan)
-    if len(placed) > 2 * frames:
-        if body.rate < TURNING_RATE:
-            ways = norm(placed[frames:] - placed[:-frames]) / (frames * body.dt)
-            fast[frames:-frames] = np.maximum(ways[:-frames], ways[frames:])
-        else:
-            fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (2 * frames * body.dt)
+    if body.rate < TURNING_RATE:
+        ways = norm(placed[frames:] - placed[:-frames]) / (frames * body.dt)
+        fast = centred(np.maximum(ways[:-frames], ways[frames:]), len(placed), frames)
+    else:
+        fast = norm(spaced(placed, (-1.0, 0.0, 1.0), frames)) / (2 * frames * body.dt)
     return line.of_frames(fast)
 
 

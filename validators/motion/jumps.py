@@ -72,8 +72,7 @@ def jumps_of(joints: Array, step: float) -> Array:
         # Beside a displaced body a misfit is measured from where the body went.
         beside = sliding_window_view(np.pad(np.nan_to_num(displaced), SIDE_FRAMES), 2 * SIDE_FRAMES + 1)
         alone[alone < DISPLACED_SHARE * beside.max(axis=1)] = np.nan
-        if (alone > LEAST_JUMP).any():
-            displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
+        displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
     joint = norm(offset) - JOINT_MISFITS * misfit
     beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
     joint = np.where(moved[:, None], np.minimum(beside, joint), joint)

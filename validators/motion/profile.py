@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 from posekit.errors import cut, nearest, refusal, shown
 from posekit.files import read_table
@@ -40,18 +40,14 @@ def load_profile(name: str) -> Profile:
         If there is no such profile, or it is not as the schema says.
     """
     asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "--profile").get("checks", {})
-    for key in asked:
-        if key not in MOTION_CHECKS:
-            raise refusal(name, "checks", cut(key), "a check over time", nearest(key, MOTION_CHECKS))
-        _check_thresholds(MOTION_CHECKS[key], asked[key], name)
+    for check, thresholds in asked.items():
+        if check not in MOTION_CHECKS:
+            raise refusal(name, "checks", cut(check), "a check over time", nearest(check, MOTION_CHECKS))
+        known, field = MOTION_CHECKS[check].defaults, f"checks.{check}"
+        for key, value in thresholds.items():
+            if key not in known:
+                raise refusal(name, field, cut(key), f"some of {', '.join(known)}", nearest(key, known))
+            kind = type(known[key])
+            if type(value) is not kind and (kind is not float or type(value) is not int):
+                raise refusal(name, f"{field}.{key}", shown(value), f"a {kind.__name__}", "correct it")
     return tuple(one.with_thresholds(**asked[key]) for key, one in MOTION_CHECKS.items() if key in asked)
-
-
-def _check_thresholds(one: FunctionCheck, thresholds: dict[str, Any], source: str) -> None:
-    known, field = one.defaults, f"checks.{one.name}"
-    for key, value in thresholds.items():
-        if key not in known:
-            raise refusal(source, field, cut(key), f"some of {', '.join(known)}", nearest(key, known))
-        kind = type(known[key])
-        if type(value) is not kind and (kind is not float or type(value) is not int):
-            raise refusal(source, f"{field}.{key}", shown(value), f"a {kind.__name__}", "correct it")

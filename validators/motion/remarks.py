@@ -25,7 +25,7 @@ from posekit.skeleton import both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 from posekit.validators.motion.ground import BY_CHANCE, GRAVITY_ACCELERATION, ground_of, soles, up_of
-from posekit.validators.motion.timeline import timeline_of
+from posekit.validators.motion.timeline import spaced, timeline_of
 
 #: Jumping joints from which a frame is another posture, and no wrong joint.
 POSTURE_JOINTS: Final = 3
@@ -111,9 +111,7 @@ def rate_doubts(body: Body) -> list[str]:
     centre = timeline_of(body).spread(centre_of_mass(body.joints))
     if len(centre) <= 4 * span:
         return []
-    acceleration = np.full(centre.shape, np.nan)
-    acceleration[span:-span] = centre[2 * span :] - 2 * centre[span:-span] + centre[: -2 * span]
-    acceleration /= (span * body.dt) ** 2
+    acceleration = spaced(centre, (1.0, -2.0, 1.0), span) / (span * body.dt) ** 2
     factor, why = _by_falls(body, acceleration @ up_of(body) / GRAVITY_ACCELERATION, span)
     if not why:
         factor, why = _by_balance(body, centre, acceleration, span)
@@ -152,9 +150,7 @@ def _by_balance(body: Body, centre: Array, acceleration: Array, span: int) -> tu
     lever = perpendicular(acceleration, up) * (height / np.where(loaded, load, np.nan))[:, None]
 
     def velocity(points: Array) -> Array:
-        found = np.full(points.shape, np.nan)
-        found[span:-span] = (points[2 * span :] - points[: -2 * span]) / (2 * span * body.dt)
-        return found
+        return spaced(points, (-1.0, 0.0, 1.0), span) / (2 * span * body.dt)
 
     ankles, toes = joints[:, both("ankle")], feet[:, :2]
     hips = velocity(joints[:, both("hip")].mean(axis=1))

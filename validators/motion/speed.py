@@ -12,7 +12,7 @@ from posekit.skeleton import JOINTS, N_TRUNK_JOINTS
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.frames import explained
-from posekit.validators.motion.timeline import centred, filtered, timeline_of
+from posekit.validators.motion.timeline import spaced, timeline_of
 
 #: Least time over which differences are taken, seconds: more frames per second add noise.
 SHORTEST_SECONDS: Final = 1.0 / 60.0
@@ -54,11 +54,9 @@ def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement
     """Judge the difference of an order over a sixtieth of a second or a frame."""
     found = explained(body)
     stride = max(round(SHORTEST_SECONDS / body.dt), 1)
-    weights = np.zeros(order * stride + 1)
-    weights[::stride] = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
+    weights = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
     seconds = (stride * body.dt) ** order
-    values = norm(filtered(found.joints, weights)) / seconds
-    values = centred(values, found.timeline.count, (order * stride + 1) // 2)
+    values = norm(spaced(found.joints, weights, stride)) / seconds
     if order == 1:
         values = np.where(np.isnan(values), _over_gaps(found.joints) / body.dt, values)
     spread = float(np.sqrt(3.0 * comb(2 * order, order)) * body.noise / seconds)

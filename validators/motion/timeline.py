@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -93,6 +94,13 @@ def centred(values: Array, count: int, first: int) -> Array:
     found = np.full((count, *values.shape[1:]), np.nan)
     found[first : first + len(values)] = values[: max(count - first, 0)]
     return found
+
+
+def spaced(points: Array, weights: Sequence[float] | Array, apart: int) -> Array:
+    """Sum weights (K,) over K slots so many apart (S, ...), about each slot; NaN at the ends."""
+    spread = np.zeros((len(weights) - 1) * apart + 1)
+    spread[::apart] = weights
+    return centred(filtered(points, spread), len(points), len(spread) // 2)
 
 
 def median_of_five(values: Array) -> Array:

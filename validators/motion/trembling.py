@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.body.lengths import lengths_in_frames
 from posekit.geometry import Array, groups, known_median, norm
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.validators.motion.timeline import centred, filtered
+from posekit.validators.motion.timeline import centred, filtered, spaced
 
 #: Frames over which trembling is measured.
 TREMBLING_FRAMES: Final = 15
@@ -102,7 +102,7 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
     those of a third of the noise to those of the noise inside, by the likelihood of normal noise, all joints of the
     stretch together.
     """
-    rough = centred(norm(filtered(joints, _FOURTH)), len(joints), 2)
+    rough = norm(spaced(joints, _FOURTH, 1))
     exact = np.zeros(hot.shape, dtype=np.bool_)
     for part in groups(np.flatnonzero(hot.any(axis=1)), NEAR_FRAMES):
         first, last = int(part[0]), int(part[-1])
