@@ -4,7 +4,6 @@ from posekit.validators.body import Body as Body
 from posekit.validators.check import Check as Check
 from posekit.validators.check import Judgement as Judgement
 from posekit.validators.check import NotAskedError as NotAskedError
-from posekit.validators.check import check as check
 from posekit.validators.judge import PostureJudge as PostureJudge
 from posekit.validators.judge import Validator as Validator
 from posekit.validators.judge import assert_valid as assert_valid

@@ -104,11 +104,12 @@ class Body(Record):
 
     def __post_init__(self) -> None:
         count = len(self.joints)
-        for name, shape in (
-            ("head", (count, len(HEAD_POINTS), 3)),
-            ("feet", (count, len(FEET_POINTS), 3)),
-            ("time", (count,)),
-        ):
+        counted = {
+            "head": (count, len(HEAD_POINTS), 3),
+            "feet": (count, len(FEET_POINTS), 3),
+            "time": (count,),
+        }
+        for name, shape in counted.items():
             if getattr(self, name).shape != shape:
                 object.__setattr__(self, name, np.full(shape, np.nan))
 

@@ -163,21 +163,17 @@ class Check(Protocol):
     @property
     def name(self) -> str:
         """Name in reports and in ``--checks``: ``joint-range``."""
-        ...
 
     @property
     def unit(self) -> str:
         """Unit of its values: ``m``, ``deg``, ``m/s``, ``frames``, ``1``."""
-        ...
 
     @property
     def reads(self) -> Sequence[str]:
         """What it needs of a body: some of `READABLE`."""
-        ...
 
     def judge(self, body: Body) -> Judgement:
         """Judge all frames of one body; raise `NotAskedError` where the check does not apply."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

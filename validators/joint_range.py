@@ -258,12 +258,8 @@ def _pelvis(limits: Limits, body: Body) -> Judgement:
 
 def _neck(ik: ClosedForm, body: Body) -> Judgement:
     """Judge flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
-    value = np.full((len(body), 3), np.nan)
-    seen = np.isfinite(body.head).all(axis=(1, 2))
-    if seen.any():
-        joints = body.joints[seen]
-        R_torso = torso_frame(*(joints[:, JOINT[name]] for name in TORSO))
-        value[seen] = np.degrees(ik.neck(R_torso, joints[:, 0], body.head[seen]))
+    R_torso = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
+    value = np.degrees(ik.neck(R_torso, body.joints[:, 0], body.head))
     lower, upper = (np.degrees(one[:3]) for one in (ik.limits.lower, ik.limits.upper))
     return Judgement(DOFS[:3], value, lower, upper, body.angle_tolerance())
 

@@ -127,19 +127,13 @@ def of_person(table: Mapping[str, Any], forward: float, outward: float) -> Mappi
         Angle by which straight thighs lean inward because the hips are wider apart than people's, degrees.
     """
     moved = copy.deepcopy(dict(table))
-    for joint in ("pelvis", "hip"):
-        one = moved[joint]["flexion"]
+    ways = [(moved["hip"]["abduction"], -outward)]
+    for one in (moved["pelvis"]["flexion"], moved["hip"]["flexion"]):
         zero = one.get("zero", {})
         if zero.get("pelvis", 0.0) > 0:
             own = math.hypot(zero["spread"], math.degrees(math.atan(zero["pelvis"] / USUAL_PELVIS_METRES)))
             share = own**2 / (own**2 + MOSTLY_HELD_DEGREES**2)
-            moved_by = share * (forward - abs(zero["mean"]))
-            _move(one, moved_by if zero["mean"] > 0 else -moved_by)
-    _move(moved["hip"]["abduction"], -outward)
+            ways.append((one, share * (forward - abs(zero["mean"])) * (1 if zero["mean"] > 0 else -1)))
+    for one, degrees in ways:
+        one["lower" if degrees < 0 else "upper"]["mean"] += degrees
     return moved
-
-
-def _move(one: dict[str, Any], degrees: float) -> None:
-    """Move that end of a range outward on whose side its zero is moved."""
-    end = "lower" if degrees < 0 else "upper"
-    one[end]["mean"] += degrees

@@ -357,7 +357,6 @@ class Report(Record):
     def decision(self) -> str:
         """The decision in one line: ``keep 183 of 200 clips; 12 dropped by collision, 4 by teleport``."""
         counts = Counter((clip.decision, clip.reason) for clip in self.clips)
-        total = len(self.clips) + len(self.refused)
         kept = sum(clip.decision == "keep" for clip in self.clips)
         reasons = [
             words.format(count, reason)
@@ -366,7 +365,7 @@ class Report(Record):
             if decided == decision
         ]
         reasons += [f"{len(self.refused)} unreadable"] * bool(self.refused)
-        head = f"keep {kept} of {plural(total, 'clip')}"
+        head = f"keep {kept} of {plural(len(self.clips) + len(self.refused), 'clip')}"
         return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
@@ -513,8 +512,7 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
     """Return what reports say of checks: their rank among causes, whether repair helps, the user's next step."""
-    table: dict[str, Any] = tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
-    return table
+    return tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
 
 
 def rank_of(check: str) -> int:

@@ -9,7 +9,6 @@ right and left corrected, in slots of even time, NaN where another check has nam
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -270,8 +269,8 @@ class Explained:
         Jumps of the joints and of the body, metres; see `posekit.validators.motion.jumps.jumps_of`.
     joints : array (S, 14, 3)
         The motion that is left.
-    noise : float
-        Noise of the body, metres.
+    trembling : array (S, 14)
+        Standard deviation of trembling, metres.
     """
 
     timeline: Timeline
@@ -280,12 +279,7 @@ class Explained:
     exchanged: NDArray[np.bool_]
     jumps: Array
     joints: Array
-    noise: float
-
-    @cached_property
-    def trembling(self) -> Array:
-        """Standard deviation of trembling in slots (S, 14), metres."""
-        return trembling_of(self.joints, self.noise)
+    trembling: Array
 
 
 @once
@@ -318,14 +312,15 @@ def explained(body: Body) -> Explained:
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints, body.dt)
     jumped = (jumps[:, :-1] > LEAST_JUMP) | (jumps[:, -1:] > LEAST_JUMP)
+    joints = np.where(jumped[..., None], np.nan, joints)
     return Explained(
         timeline=timeline,
         repeats=repeats[back],
         displaced=places[back],
         exchanged=exchanged[back],
         jumps=jumps,
-        joints=np.where(jumped[..., None], np.nan, joints),
-        noise=body.noise,
+        joints=joints,
+        trembling=trembling_of(joints, body.noise),
     )
 
 

@@ -10,6 +10,7 @@ from posekit.geometry import Array, dot, unit
 from posekit.skeleton import JOINT, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
+from posekit.validators.motion.ground import up_of
 
 #: Frames of which a share tells the orientation.
 FEWEST_FRAMES: Final = 5
@@ -53,10 +54,10 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     upside_down, aligned : float
         Shares of the frames that show it.
     """
-    if not body.motion or len(body) < FEWEST_FRAMES or body.up is None:
+    if not body.motion or len(body) < FEWEST_FRAMES:
         raise NotAskedError(f"it needs {FEWEST_FRAMES} frames of motion")
     trunk = unit(body.joints[:, JOINT["neck"]] - body.joints[:, JOINT["pelvis"]])
-    cosine = dot(trunk, body.up)
+    cosine = dot(trunk, up_of(body))
     angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     wrong = _inverted(body, cosine, upside_down) or _lies(body, trunk, cosine, aligned)
     bound = np.degrees(np.arccos(LYING_COSINE)) if wrong else np.inf
@@ -84,16 +85,16 @@ def _lies(body: Body, trunk: Array, cosine: Array, share: float) -> bool:
         travel = float(np.linalg.norm(np.nanmax(across, axis=0) - np.nanmin(across, axis=0)))
         if travel > TRAVEL_METRES or _range(np.fmin.reduce(body.height, axis=1)) > LEVEL_METRES:
             return True
-    return not _stands(body, body.up, share) and any(
+    return not _stands(body, up_of(body), share) and any(
         _stands(body, way, share) and bool(np.nanmedian(trunk @ way) > 0)
         for way in (*np.eye(3), *-np.eye(3))
-        if body.up is not None and float(way @ body.up) < LYING_COSINE
+        if float(way @ up_of(body)) < LYING_COSINE
     )
 
 
-def _stands(body: Body, up: Array | None, share: float) -> bool:
+def _stands(body: Body, up: Array, share: float) -> bool:
     """Return whether ankles are the lowest joints along a direction, at one level on the plane through the origin."""
-    height = body.joints @ (np.zeros(3) if up is None else up)
+    height = body.joints @ up
     lowest = np.fmin.reduce(height, axis=1)
     ankles = np.fmin.reduce(height[:, both("ankle")], axis=1)
     level = SOLE_METRES[0] < float(np.nanmedian(lowest)) < SOLE_METRES[1]

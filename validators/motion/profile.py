@@ -26,13 +26,12 @@ MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
     if isinstance(one, FunctionCheck) and one.over_time
 }
 
-#: Checks over time with their thresholds, in the order of `MOTION_CHECKS`.
-Profile = tuple[FunctionCheck, ...]
-
 
 @lru_cache(maxsize=16)
-def load_profile(name: str) -> Profile:
+def load_profile(name: str) -> tuple[FunctionCheck, ...]:
     """Load a profile by its name, or from a TOML file of schema ``posekit.profile/1``.
+
+    Its checks over time have its thresholds, and the order of `MOTION_CHECKS`.
 
     Raises
     ------

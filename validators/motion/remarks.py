@@ -86,13 +86,12 @@ def hints(body: Body, found: Mapping[str, Judgement], frame: NDArray[np.intp]) -
                     f"Frame {frame[edge]} is another posture than the frames beside it, as of a skeleton at rest: "
                     "cut it off with --keep DIR --keep-spans SECONDS."
                 )
-    slides = found["sliding"].violated if "sliding" in found else np.zeros((1, 2), dtype=np.bool_)
-    if slides.any(axis=1).mean() > BELT_SHARE:
+    if "sliding" in found and found["sliding"].violated.any(axis=1).mean() > BELT_SHARE:
         hips, feet, up = body.joints[:, both("hip")], soles(body)[0], up_of(body)
         forward = unit(cross(-up, np.nanmedian(hips[:, 1] - hips[:, 0], axis=0)))
         backward = -dot(np.gradient(feet, body.dt, axis=0), forward)
         # Points of feet are right and left in turn.
-        speed = known_median(backward[np.tile(slides, feet.shape[1] // 2)])
+        speed = known_median(backward[np.tile(found["sliding"].violated, feet.shape[1] // 2)])
         middle = perpendicular(hips.mean(axis=1), up)
         travel = float(norm(np.nanmax(middle, axis=0) - np.nanmin(middle, axis=0)))
         if speed > BELT_SPEED and travel < IN_PLACE_SHARE * speed * len(body) * body.dt:
@@ -117,10 +116,8 @@ def rate_doubts(body: Body) -> list[str]:
         factor, why = _by_balance(body, centre, acceleration, span)
     if not why:
         return []
-    likely = body.rate * factor
-    return [
-        f"The frame rate of {body.rate:g} Hz is doubtful: {why}; about {likely:.3g} Hz would fit (--rate)."
-    ]
+    likely = f"about {body.rate * factor:.3g} Hz would fit (--rate)"
+    return [f"The frame rate of {body.rate:g} Hz is doubtful: {why}; {likely}."]
 
 
 def _by_falls(body: Body, rise: Array, span: int) -> tuple[float, str]:

@@ -12,9 +12,8 @@ from typing import Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-from posekit.geometry import Array, norm, perpendicular, runs
+from posekit.geometry import Array, Flags, norm, perpendicular, runs
 from posekit.skeleton import SIDES, both
 from posekit.validators.body import Body
 from posekit.validators.check import Judgement, check
@@ -84,12 +83,11 @@ def sliding(
     placed = line.spread(feet)
     count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
     noise = 3 * np.sqrt(2) * body.noise / body.dt
+    bounds = fastest, uneven, rising, noise
     value = np.zeros((len(placed), len(SIDES)))
     for side, foot in enumerate(FOOT_POINTS):
         points = placed[:, foot]
-        for start, stop in runs(
-            _slides(body, points, down[:, foot], count, (fastest, uneven, rising), noise)
-        ):
+        for start, stop in runs(_slides(body, points, down[:, foot], count, bounds)):
             known = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
             along = perpendicular((known[stop - 1] - known[start]).mean(axis=0), up)
             speed = float(norm(along)) / ((stop - 1 - start) * body.dt)
@@ -107,15 +105,13 @@ def sliding(
 
 
 def _slides(
-    body: Body,
-    points: Array,
-    down: NDArray[np.bool_],
-    count: int,
-    bounds: tuple[float, float, float],
-    noise: float,
-) -> NDArray[np.bool_]:
-    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for so many slots."""
-    fastest, uneven, rising = bounds
+    body: Body, points: Array, down: Flags, count: int, bounds: tuple[float, float, float, float]
+) -> Flags:
+    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for so many slots.
+
+    The bounds are those of `sliding` for speed, unevenness and rise, and the noise of a speed, metres a second.
+    """
+    fastest, uneven, rising, noise = bounds
     up = up_of(body)
     known = np.isfinite(points).all(axis=(0, 2))
     slides = np.zeros(len(points), dtype=np.bool_)
