@@ -226,7 +226,8 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
     points = world_points(document, absolute=absolute)
     frames = len(document.values)
     counted = f"Frames is {document.frames}, but the file has {frames}: it may be cut off"
-    if absolute and _moves(document):
+    held = zip(document.parents, document.channels, strict=True)
+    if absolute and any(parent >= 0 and not all(turns for turns, _ in own) for parent, own in held):
         options.note("position channels stand in place of the offsets")
     if frames != document.frames:
         options.warn(counted)
@@ -268,11 +269,6 @@ def with_values(document: Bvh, values: Array) -> Bvh:
     for place in np.flatnonzero((values != document.values).ravel()).tolist():
         parts[2 * place + 1] = f"{values.flat[place]:.6f}"
     return replace(document, text=document.text[:start] + "".join(parts), values=values)
-
-
-def _moves(document: Bvh) -> bool:
-    held = zip(document.parents, document.channels, strict=True)
-    return any(parent >= 0 and not all(r for r, _ in channels) for parent, channels in held)
 
 
 def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -156,9 +157,7 @@ def as_numbers(value: Any) -> Array | None:
     return array.astype(np.float64) if array.dtype.kind in "iuf" else None
 
 
-def points_by_name(
-    nodes: Sequence[Node], names: Sequence[str], axes: int, kind: str, most: float = FARTHEST_COORDINATE
-) -> Array:
+def points_by_name(nodes: Sequence[Node], names: Sequence[str], axes: int, kind: str) -> Array:
     """Gather objects ``{name: [x, y, …]}`` into an array (F, len(names), axes); absent names are NaN.
 
     Parameters
@@ -172,7 +171,7 @@ def points_by_name(
     kind : str
         Kind of thing that the names name, for errors: ``joint``.
     """
-    place = {name: column for column, name in enumerate(names)}
+    place, most = {name: column for column, name in enumerate(names)}, FARTHEST_COORDINATE
     found = np.full((len(nodes), len(names), *([axes] if axes else [])), np.nan)
     for k, node in enumerate(nodes):
         if node.value is None or node.value == {}:
@@ -206,7 +205,10 @@ def undamaged(source: str | Path, schema: str) -> Iterator[None]:
 
 
 def schema_of(document: Any) -> str:
-    """Return the schema that a JSON or NPZ document states; empty if it states none."""
+    """Return the schema that a JSON or NPZ document states, or a table in its metadata; empty if it states none."""
+    about = getattr(document, "about", {}).get("posekit", "")
+    if about:
+        return next(iter(re.findall(r'^\{"schema": "([^"]*)"', about[:200])), "")
     stated = document.get("schema") if isinstance(document, Mapping) else None
     if isinstance(stated, np.ndarray) and stated.ndim == 0:
         stated = stated.item()

@@ -39,8 +39,6 @@ MAPPINGS: Final = ("messages", "not_asked", "settings")
 
 def looks_like(document: Any) -> bool:
     """Tell whether a JSON document, NPZ arrays or a Parquet table hold a report."""
-    if isinstance(document, Table):
-        return REPORT_SCHEMA in document.about.get("posekit", "")[:200]
     return schema_of(document).startswith("posekit.report/")
 
 

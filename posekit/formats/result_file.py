@@ -81,8 +81,6 @@ ANSWER_LISTS: Final = ("sure_of", "representatives", "represented")
 
 def looks_like(document: Any) -> bool:
     """Tell whether a JSON document, NPZ arrays or a Parquet table hold a result."""
-    if isinstance(document, Table):
-        return "posekit" in document.about and RESULT_SCHEMA in document.about["posekit"][:200]
     return schema_of(document).startswith("posekit.result/")
 
 
