@@ -174,7 +174,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
     caliscope = set(CALISCOPE_COLUMNS) <= set(names)
     if caliscope:
         labels = load_layout("mediapipe_33").points
-        points, rows = _caliscope(table, len(labels))
+        points, rows = _caliscope(table, path, len(labels))
     else:
         columns = _wide_columns(names)
         labels = tuple(columns)
@@ -204,10 +204,12 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
     return points_motion(points, labels, path, options, **fields)
 
 
-def _caliscope(table: Table, count: int) -> tuple[Array, Ints]:
+def _caliscope(table: Table, path: str, count: int) -> tuple[Array, Ints]:
     """Return points (T, P, 3) of a table with a row a frame and point, and the first row of each frame."""
     frame, index, *axes = (table.checked(name) for name in CALISCOPE_COLUMNS)
     used = np.flatnonzero((index >= 0) & (index < count) & np.isfinite(frame))
+    if len(np.unique(np.stack([frame, index], axis=1)[used], axis=0)) < len(used):
+        raise refusal(path, "", "a point twice in a frame", "each point once a frame", "remove one")
     places = np.stack(axes, axis=1)[used]
     _, first, points = by_row(frame[used, None], index[used].astype(np.intp), places, count)
     return points, used[first]
