@@ -12,7 +12,7 @@ import pytest
 import posekit
 from posekit.errors import InputError
 from posekit.motion import Motion
-from posekit.motion.validation import keep_clips, save_clips
+from posekit.motion.validation import keep_clips
 from posekit.validators.report import joined
 
 FIGURE = posekit.load_figure()
@@ -142,8 +142,6 @@ def test_reports_in_files_have_equal_findings(name: str, folder: Path, tmp_path:
     assert again.decision == report.decision and again.verdicts == report.verdicts
     for column, values in report.table().items():
         np.testing.assert_array_equal(again.table()[column], values)
-    save_clips(report, tmp_path / "clips.csv")
-    assert len((tmp_path / "clips.csv").read_text(encoding="utf-8").splitlines()) == 4
 
 
 def test_joined_reports_match_checks_and_places_by_name() -> None:

@@ -27,20 +27,7 @@ if TYPE_CHECKING:
     from posekit.recovery import Recovery
 
 #: Endings of files in folders that hold no motion.
-SKIPPED: Final = (
-    ".md",
-    ".py",
-    ".png",
-    ".jpg",
-    ".jpeg",
-    ".gif",
-    ".mp4",
-    ".avi",
-    ".html",
-    ".pdf",
-    ".log",
-    ".lock",
-)
+SKIPPED: Final = ".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .lock".split()
 
 #: Name of the table of clips in a folder of kept clips.
 CLIP_TABLE: Final = "clips.csv"
@@ -302,19 +289,15 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
     skipped: list[str] = []
     for path in watched(paths, "judging"):
         try:
-            held: Any = posekit.open(
-                path,
-                **facts,
-                urdf=judge.name,
-            )
-            if _holds_postures(held):
-                _refuse_without_joints(held, path)
-                reports.append(_called(judge.report(held), str(path)))
+            held: Any = posekit.open(path, **facts, urdf=judge.name)
+            if isinstance(held, Motion) or hasattr(held, "survivors"):
+                refuse_without_joints(held, path)
+                report = judge.report(held)
+                reports.append(replace(report, files=(str(path),) * len(report.files)))
             elif len(paths) == 1:
+                got = OTHERS.get(type(held).__name__, "no motion")
                 remedy = f"recover postures first: posekit recover {path} -o RESULT"
-                raise refusal(
-                    path, "", OTHERS.get(type(held).__name__, "no motion"), "postures or motion", remedy
-                )
+                raise refusal(path, "", got, "postures or motion", remedy)
             else:
                 skipped.append(path.name)
         except InputError as error:
@@ -322,17 +305,14 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
                 raise
             (skipped if _is_view(path) else refused).append(path.name if _is_view(path) else str(error))
     if not reports:
-        raise InputError(
-            f"none of {plural(len(paths), 'file')} can be judged; the first: {[*refused, *skipped][0]}"
-        )
+        first = [*refused, *skipped][0]
+        raise InputError(f"none of {plural(len(paths), 'file')} can be judged; the first: {first}")
     if len(reports) > 1:
         reports = [replace(one, notes=_of_file(one)) for one in reports]
     report = joined(reports, refused=refused) if len(reports) > 1 or refused else reports[0]
     if skipped:
-        more = ", …" if len(skipped) > MOST_NAMED else ""
-        said = (
-            f"{plural(len(skipped), 'file')} without motion left out: {', '.join(skipped[:MOST_NAMED])}{more}"
-        )
+        named = ", ".join([*skipped[:MOST_NAMED], *["…"] * (len(skipped) > MOST_NAMED)])
+        said = f"{plural(len(skipped), 'file')} without motion left out: {named}"
         report = replace(report, notes=(*report.notes, said))
     return report
 
@@ -358,22 +338,12 @@ def _is_view(path: Path) -> bool:
     return path.suffix.lower() == ".json" and b"posekit.view/1" in path.read_bytes()[:200]
 
 
-def _refuse_without_joints(held: Any, path: Path) -> None:
+def refuse_without_joints(held: Any, path: Path) -> None:
     """Refuse motion whose points are no joints of a body."""
     if isinstance(held, Motion) and held.q is None and not np.isfinite(held.figure_joints).any():
-        got, remedy = (
-            "no joint of a body among its points",
-            "say which point is which joint with --layout FILE.toml",
-        )
+        got = "no joint of a body among its points"
+        remedy = "say which point is which joint with --layout FILE.toml"
         raise refusal(path, "", got, "named joints or markers", remedy)
-
-
-def _holds_postures(held: Any) -> bool:
-    return isinstance(held, Motion) or hasattr(held, "survivors")
-
-
-def _called(report: Report, file: str) -> Report:
-    return replace(report, files=(file,) * len(report.files))
 
 
 def new_folder(folder: str | os.PathLike[str]) -> Path:
@@ -493,24 +463,3 @@ def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer.writeheader()
     writer.writerows(rows)
     path.write_text(text.getvalue(), encoding="utf-8")
-
-
-def save_clips(report: Report, path: str | Path) -> None:
-    """Write the table of clips as ``.csv`` or ``.parquet``.
-
-    Raises
-    ------
-    InputError
-        If the name ends otherwise.
-    """
-    rows, name = clip_rows(report), str(path).lower()
-    if name.endswith(".csv"):
-        _write_table(Path(path), rows)
-    elif name.endswith(".parquet"):
-        from posekit.files import write_bytes
-        from posekit.formats.parquet import packed_table
-
-        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-        write_bytes(path, packed_table(columns, {}))
-    else:
-        raise refusal(path, "", shown(Path(path).suffix), ".csv or .parquet", "rename it")

@@ -22,7 +22,15 @@ from posekit.motion.repair.clip import Clip, RobotClip
 from posekit.motion.repair.own_bvh import in_bvh
 from posekit.motion.repair.own_file import in_own_file
 from posekit.motion.repair.remedies import mended
-from posekit.motion.validation import Judge, are_paths, files_of, in_order, names_below, new_folder
+from posekit.motion.validation import (
+    Judge,
+    are_paths,
+    files_of,
+    in_order,
+    names_below,
+    new_folder,
+    refuse_without_joints,
+)
 from posekit.progress import watched
 from posekit.settings import ValidateSettings, stated
 from posekit.skeleton import JOINTS
@@ -173,6 +181,7 @@ def _opened(path: Path, facts: dict[str, Any]) -> Motion:
     held = posekit.open(path, **facts)
     if not isinstance(held, Motion):
         raise refusal(path, "", f"a {type(held).__name__}", "postures or motion", "give a file of motion")
+    refuse_without_joints(held, path)
     return held
 
 
@@ -235,34 +244,32 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
     kind: type[Clip] = Clip if of_points else RobotClip
     given = clips = [kind.of(recording, validator) for _, recording in motion.recordings()]
     now, whole = motion, clips
+    of_bvh = isinstance(motion.document, Bvh)
     tried: list[Repaired] = []
     with tempfile.TemporaryDirectory() as folder:
         for number in watched(range(ROUNDS), "repairing"):
             clips = [mended(clip, filled=number % 2 > 0) for clip in clips]
             whole = [clip.following(first) for clip, first in zip(clips, whole, strict=True)]
             after = _joined(clips, now)
-            report = judge.report(after)
             data, lost = _in_its_file(now, after, clips, facts)
+            notes = [note for one, clip in zip(given, whole, strict=True) for note in _told(one, clip)]
+            refused = f"the columns of {Path(motion.source).name} cannot hold the repair; joints are written"
+            held = [(after, b"", [refused] if data else [])]
             if data:
                 place = Path(folder) / f"{number}{Path(motion.source).name}"
                 write_bytes(place, data)
-                again = _opened(place, facts)
-                own = replace(judge.report(again), files=before.files)
-                if isinstance(motion.document, Bvh) or own.ok.sum() >= report.ok.sum():
-                    after, report = again, own
-                else:
-                    name = Path(motion.source).name
-                    data, lost = b"", [f"the columns of {name} cannot hold the repair; joints are written"]
-            notes = [note for one, clip in zip(given, whole, strict=True) for note in _told(one, clip)]
-            said = _with_left([*notes, *lost], report)
-            shown = replace(after, source=motion.source)
-            tried.append(Repaired(motion=shown, before=before, report=report, notes=said, data=data))
-            if report.ok.all():
+                held = [*([] if of_bvh else held), (_opened(place, facts), data, lost)]
+            for one, data, more in held:
+                report = replace(judge.report(one), files=before.files)
+                said, shown = _with_left([*notes, *more], report), replace(one, source=motion.source)
+                tried.append(Repaired(motion=shown, before=before, report=report, notes=said, data=data))
+            if any(one.report.ok.all() for one in tried):
                 break
-            now = after if of_points else in_order(after, validator)
+            now = one if of_bvh or report.ok.sum() > before.ok.sum() else after
+            now = now if of_points else in_order(now, validator)
             parts = zip(now.recordings(), clips, strict=True)
             clips = [replace(kind.of(part, validator), done=clip.done) for (_, part), clip in parts]
-    return max(tried, key=lambda one: int(one.report.ok.sum()))
+    return max(tried, key=lambda one: (one.report.ok.sum(), bool(one.data)))
 
 
 def _joined(clips: Sequence[Clip], motion: Motion) -> Motion:
