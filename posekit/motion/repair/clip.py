@@ -247,9 +247,9 @@ class Clip:
         body = Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
         every, limbs = range(3 * N_PIECES), range(3 * HEAD_PIECE, 3 * N_PIECES)
         state, joints = placed(vectors)[rows], range(3 * len(JOINTS))
-        state = pushed(state, moved, joints, partial(self.margins, body, rigid=True))
+        state = pushed(state, moved, len(joints), joints, partial(self.margins, body, rigid=True))
         for free in (limbs, every):
-            state = pushed(state, turned, free, partial(self.margins, body, rigid=False))
+            state = pushed(state, turned, 3 * N_PIECES, free, partial(self.margins, body, rigid=False))
         return state
 
     def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
@@ -339,6 +339,7 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
 def pushed(
     state: Array,
     moved: Callable[[Array, Array], Array],
+    size: int,
     free: Sequence[int],
     margins: Callable[[Array], Array],
 ) -> Array:
@@ -349,12 +350,13 @@ def pushed(
     state : array (n, …)
     moved : callable
         From states and steps (n, size) to states.
+    size : int
+        Number of entries of a step.
     free : sequence of int
-        Entries of a step that may change; the size is the last of them and one.
+        Entries that may change.
     margins : callable
         From states to margins (n, K), metres, negative where violated. Their slopes are differences.
     """
-    size = free[-1] + 1
     for _ in range(PUSHES):
         margin = margins(state) - INSIDE_METRES
         worst = np.argsort(margin, axis=1)[:, :MOST_BOUNDS]
@@ -477,7 +479,10 @@ class RobotClip(Clip):
         return np.concatenate([self.state[rows, :root], state[:, root:]], axis=1)
 
     def pushed(self, rows: Ints, report: Report) -> Array:
-        """Bring joints within the limits of the URDF, and move bodies apart; the root stays."""
+        """Bring joints within the limits of the URDF, and move bodies apart.
+
+        The root stays, and so do joints that the motion never moves: a file may lack them.
+        """
         robot, model = self.robot, self.robot.model
         lower, upper = robot.lower + INSIDE_METRES, robot.upper - INSIDE_METRES
         settings = self.validator.settings
@@ -494,6 +499,12 @@ class RobotClip(Clip):
             out[found.frame, found.pair] = found.distance - margin - DEPTH_METRES
             return out
 
-        free = range(6 if robot.free_flyer else 0, model.nv)
+        moving = np.ptp(self.state[self.placed()], axis=0) > 0 if self.motion.in_time else np.ones(model.nq)
+        used = [
+            joint
+            for joint in range(2 if robot.free_flyer else 1, model.njoints)
+            if moving[model.idx_qs[joint] : model.idx_qs[joint] + model.nqs[joint]].any()
+        ]
+        free = [model.idx_vs[joint] + k for joint in used for k in range(model.nvs[joint])]
         state = moved(self.state[rows], np.zeros((len(rows), model.nv)))
-        return pushed(state, moved, free, margins)
+        return pushed(state, moved, model.nv, free, margins)

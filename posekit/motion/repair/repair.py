@@ -263,9 +263,9 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
                 report = replace(judge.report(one), files=before.files)
                 said, shown = _with_left([*notes, *more], report), replace(one, source=motion.source)
                 tried.append(Repaired(motion=shown, before=before, report=report, notes=said, data=data))
-            if any(one.report.ok.all() for one in tried):
-                break
             now = one if of_bvh or report.ok.sum() > before.ok.sum() else after
+            if any(one.report.ok.all() for one in tried) and (report.ok.all() or now is after):
+                break
             now = now if of_points else in_order(now, validator)
             parts = zip(now.recordings(), clips, strict=True)
             clips = [replace(kind.of(part, validator), done=clip.done) for (_, part), clip in parts]
