@@ -322,6 +322,17 @@ def test_limbs_have_the_inertia_of_the_literature(link):
     np.testing.assert_allclose(np.diag(inertia.inertia), moments, rtol=5e-3)
 
 
+@any_figure
+def test_a_scaled_figure_has_the_points_and_capsules_of_its_urdf(figure):
+    again = Figure(urdf=figure.urdf, srdf=figure.srdf)
+    np.testing.assert_allclose(figure.neutral_points, again.neutral_points, atol=1e-12)
+    assert figure.capsule_pairs == again.capsule_pairs
+    for one, other in zip(figure.capsules, again.capsules, strict=True):
+        assert one.link == other.link
+        for size in ("center", "half_length", "radius"):
+            assert getattr(one, size) == pytest.approx(getattr(other, size), abs=1e-12)
+
+
 def test_capsules_are_pinocchios():
     q = configurations(FIGURE, 10)
     points = FIGURE.forward_kinematics(q)
