@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from posekit.errors import refusal
-from posekit.geometry import Array, Flags
+from posekit.geometry import Array
 from posekit.recovery.objects.family import LinkageFamily
 from posekit.recovery.objects.linkage import read_nearer
 
@@ -44,13 +45,16 @@ class Check(NamedTuple):
     reason : str
     rows : array (R, S)
         Depths that it reads, by signed foreshortenings.
-    bad : callable
-        Depths (N, R) to a bool array (N,).
+    measure : callable
+        Depths (N, R) to an error (N,), units of length.
+    most : float
+        Largest error that is allowed.
     """
 
     reason: str
     rows: Array
-    bad: Callable[[Array], Flags]
+    measure: Callable[[Array], Array]
+    most: float
 
 
 def grow_best(
@@ -117,7 +121,7 @@ def grow(
         for check in checks:
             depends = set(np.flatnonzero(check.rows.any(axis=0)))
             if k in depends and depends <= ready:
-                bad = check.bad(signed @ check.rows.T)
+                bad = check.measure(signed @ check.rows.T) > check.most
                 rejected[check.reason] += int(bad.sum()) << later
                 signed = signed[~bad]
         if len(signed) > MAX_POSTURES:
@@ -148,48 +152,45 @@ def _checks(
     across = tree[ends[:, 1]] - tree[ends[:, 0]]
     between = np.abs(across) @ off  # error of the depth between the ends of each segment
     for k in np.setdiff1d(np.flatnonzero(family.seen), family.incidence.basis).tolist():
-
-        def open_loop(depths: Array, k: int = k) -> Flags:
-            far = np.hypot(extent[k] + 2 * beside, np.abs(depths[:, 0]) + between[k])
-            near_depth = np.maximum(np.abs(depths[:, 0]) - between[k], 0.0)
-            near = np.hypot(max(extent[k] - 2 * beside, 0.0), near_depth)
-            return np.asarray((lengths[k] < near - allowed.rigid) | (lengths[k] > far + allowed.rigid))
-
-        yield Check(f"closure/{names[k]}", across[[k]], open_loop)
+        measure = partial(_gap, extent[k], lengths[k], 2 * beside, between[k])
+        yield Check(f"closure/{names[k]}", across[[k]], measure, allowed.rigid)
     hand = read_nearer(linkage, nearer)
     for k in np.flatnonzero(hand & family.seen).tolist():
         slack = 1e-6 + float(between[k]) * (k not in family.incidence.basis)
-
-        def other_way(depths: Array, slack: float = slack) -> Flags:
-            return np.asarray(depths[:, 0] < -slack)
-
-        yield Check(f"nearer/{names[k]}", hand[k] * across[[k]], other_way)
+        yield Check(f"nearer/{names[k]}", -hand[k] * across[[k]], np.ravel, slack)
     groups = [("coplanar", group, 2) for group in linkage.coplanar]
     groups += [("collinear", group, 1) for group in linkage.collinear]
     for kind, group, rank in groups:
         nodes = list(group)
-        shifts = np.abs(tree[nodes][:, None] - tree[nodes]) @ off
-        most_off = allowed.rigid + beside + float(np.sqrt((shifts**2).mean(axis=1)).min())
-
-        def bent(depths: Array, nodes: list[int] = nodes, rank: int = rank, most: float = most_off) -> Flags:
-            flat = np.broadcast_to(place[nodes], (*depths.shape, 2))
-            points = np.concatenate([flat, depths[..., None]], axis=-1)
-            sizes = np.linalg.svd(points - points.mean(axis=1, keepdims=True), compute_uv=False)
-            return np.asarray(np.sqrt((sizes[:, rank:] ** 2).sum(axis=1) / len(nodes)) > most)
-
         if np.isfinite(place[nodes]).all():
-            yield Check(
-                f"{kind}/{'-'.join(linkage.nodes[k] for k in nodes)}", tree[nodes] - tree[nodes[0]], bent
-            )
-    for first, second in linkage.perpendicular:
-        pair = [first, second]
-        one, two = place[ends[pair, 1]] - place[ends[pair, 0]]
-        most_off = allowed.rigid + float(between[pair].sum()) + 4 * beside
-
-        def skew(depths: Array, one: Array = one, two: Array = two, most: float = most_off) -> Flags:
-            a, b = depths.T
-            longer = np.sqrt(np.maximum(one @ one + a * a, two @ two + b * b))
-            return np.asarray(np.abs(one @ two + a * b) > most * longer)
-
+            shifts = np.abs(tree[nodes][:, None] - tree[nodes]) @ off
+            most_off = allowed.rigid + beside + float(np.sqrt((shifts**2).mean(axis=1)).min())
+            reason = f"{kind}/{'-'.join(linkage.nodes[k] for k in nodes)}"
+            yield Check(reason, tree[nodes] - tree[nodes[0]], partial(_bend, place[nodes], rank), most_off)
+    for pair in map(list, linkage.perpendicular):
         if family.seen[pair].all():
-            yield Check(f"perpendicular/{names[first]}_{names[second]}", across[pair], skew)
+            most_off = allowed.rigid + float(between[pair].sum()) + 4 * beside
+            measure = partial(_skew, *(place[ends[pair, 1]] - place[ends[pair, 0]]))
+            yield Check(f"perpendicular/{names[pair[0]]}_{names[pair[1]]}", across[pair], measure, most_off)
+
+
+def _gap(extent: float, length: float, beside: float, off: float, depths: Array) -> Array:
+    """Return by how much a segment that closes a loop is too long or too short for any place of its ends."""
+    depth = np.abs(depths[:, 0])
+    far = np.hypot(extent + beside, depth + off)
+    near = np.hypot(max(extent - beside, 0.0), np.maximum(depth - off, 0.0))
+    return np.maximum(near - length, length - far)
+
+
+def _bend(place: Array, rank: int, depths: Array) -> Array:
+    """Return the root mean square distance of points from their best plane (rank 2) or line (rank 1)."""
+    points = np.concatenate([np.broadcast_to(place, (*depths.shape, 2)), depths[..., None]], axis=-1)
+    sizes = np.linalg.svd(points - points.mean(axis=1, keepdims=True), compute_uv=False)
+    return np.asarray(np.sqrt((sizes[:, rank:] ** 2).sum(axis=1) / len(place)))
+
+
+def _skew(one: Array, two: Array, depths: Array) -> Array:
+    """Return the product of two segments, which is zero at a right angle, over the longer one."""
+    a, b = depths.T
+    longer = np.sqrt(np.maximum(one @ one + a * a, two @ two + b * b))
+    return np.asarray(np.abs(one @ two + a * b) / longer)

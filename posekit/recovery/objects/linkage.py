@@ -164,13 +164,12 @@ class Linkage(Record):
         InputError
             If there is none of that name.
         """
-        names = self.segment_names
         turned = [f"{self.nodes[b]}-{self.nodes[a]}" for a, b in self.segments]
-        if name in names:
-            return names.index(name)
-        if name in turned:
-            return turned.index(name)
-        raise self._wrong("segment", shown(name), "one of its segments", nearest(name, names))
+        for names in (self.segment_names, turned):
+            if name in names:
+                return names.index(name)
+        near = nearest(name, self.segment_names)
+        raise self._wrong("segment", shown(name), "one of its segments", near)
 
     def place_nodes(self, points: Array) -> Array:
         """Add the midpoints to points or to their images: (..., P, D) to (..., N, D)."""
@@ -286,17 +285,11 @@ def load_linkage(name: str | Path) -> Linkage:
         return linkage_of_robot(load_robot(str(name), bodies="none"))
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        table |= table.pop("constraints", {})
+        table.pop("schema", "")
+        return Linkage.from_names(**{"name": path.stem} | table)
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise refusal(name, "", shown(str(error)), "a TOML file of posekit.linkage/1", "correct it") from None
-    held = ("segments", "points", "midpoints", "unit", "height", "urdf", "source")
-    about = {key: table[key] for key in held if key in table}
-    groups = table.get("constraints", {})
-    about |= {kind: groups[kind] for kind in ("coplanar", "perpendicular", "collinear") if kind in groups}
-    try:
-        return Linkage.from_names(name=table.get("name", path.stem), **about)
-    except (KeyError, TypeError, ValueError) as error:
-        expected = "the entries of posekit.linkage/1"
-        raise refusal(name, "", shown(str(error)), expected, "complete it") from None
 
 
 #: Distance from all joints below which the base or the end of a limb is no point of its own.
