@@ -358,17 +358,13 @@ def _robot_frames(robot: Any) -> tuple[list[str], Array]:
     used = {frame.parentFrame for frame in model.frames}
     bodies = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     last = [k for k in bodies if k not in used and model.frames[k].parentJoint in turning - {0}]
-    base = bodies[:1]
-    names = [model.frames[k].name for k in base]
-    names += [model.names[k] for k in joints] + [model.frames[k].name for k in last]
+    ids = bodies[:1] + [model.getFrameId(model.names[k], pin.FrameType.JOINT) for k in joints] + last
     data, places = model.createData(), []
     for _ in range(6):
         q = pin.randomConfiguration(model, lower, upper) if robot.free_flyer else rng.uniform(lower, upper)
         pin.framesForwardKinematics(model, data, q)
-        at = [data.oMf[k].translation for k in base]
-        at += [data.oMi[k].translation for k in joints] + [data.oMf[k].translation for k in last]
-        places.append(np.array(at))
-    return names, np.array(places)
+        places.append([data.oMf[k].translation.copy() for k in ids])
+    return [model.frames[k].name for k in ids], np.array(places)
 
 
 def read_nearer(linkage: Linkage, choices: Mapping[str, str]) -> NDArray[np.int8]:
