@@ -215,11 +215,6 @@ def _values(document: str, start: int, width: int, source: str) -> Array:
     raise refusal(source, "MOTION", "no frames", "a line of values a frame", "the file is cut off")
 
 
-def looks_like(document: Any) -> bool:
-    """Tell whether a document is a parsed BVH file."""
-    return isinstance(document, Bvh)
-
-
 def read(document: Bvh, path: str, options: Options) -> Motion:
     """Make a motion of a BVH file: points are its joints and the End Sites that have a length."""
     absolute = positions_are_absolute(document)

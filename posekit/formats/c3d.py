@@ -184,11 +184,6 @@ def _value(kind: int, dimensions: tuple[int, ...], data: bytes, processor: int) 
     return np.frombuffer(data, f"{'>' if processor == 86 else '<'}u{kind}").astype(np.float64)
 
 
-def looks_like(document: Any) -> bool:
-    """Tell whether a document is a parsed C3D file."""
-    return isinstance(document, C3d)
-
-
 def read(document: C3d, path: str, options: Options) -> Motion:
     """Make a motion of a C3D file's points; analogue channels are left out, and time begins at 0."""
     count = document.points.shape[1]

@@ -1,4 +1,4 @@
-"""Key points that detectors wrote: COCO, MMPose, OpenPose, Halpe, MediaPipe as JSON; see `keypoint_tables` for tables.
+"""Key points that detectors wrote: COCO, MMPose, OpenPose, Halpe, MediaPipe as JSON.
 
 Sources: cocodataset.org, "Data format" and "Results format"; jin-s13/COCO-WholeBody; MMPose 1.x,
 ``demo/topdown_demo_with_mmdet.py --save-predictions`` and ``MMPoseInferencer``; OpenPose, ``doc/02_output.md``;
@@ -20,7 +20,6 @@ from posekit.formats import json_file
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.node import Node
 from posekit.formats.options import Options
-from posekit.formats.tables import Table
 from posekit.geometry import Array
 
 #: Fields of a person's points in OpenPose's files; the second in files older than 2018.
@@ -35,11 +34,7 @@ SECONDS: Final = {"time": 1, "timestamp": 1, "timestamp_s": 1, "timestamp_ms": 1
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document, a folder of them, or a table holds key points in pictures."""
-    if isinstance(document, Table):
-        from posekit.formats import keypoint_tables
-
-        return keypoint_tables.looks_like(document)
+    """Tell whether a JSON document, or a folder of them, holds key points in pictures."""
     if isinstance(document, Path):
         return any(True for _ in document.glob("*.json"))
     return bool(_kind(document))
@@ -51,7 +46,7 @@ def read(document: Any, path: str | Path, options: Options) -> Detections:
     Parameters
     ----------
     document : object
-        Parsed JSON; a `Table`; or the path of a folder with one JSON file a picture.
+        Parsed JSON, or the path of a folder with one JSON file a picture.
     path : path
         The file or the folder.
     options : Options
@@ -62,10 +57,6 @@ def read(document: Any, path: str | Path, options: Options) -> Detections:
     InputError
         If the file is malformed, or it is not clear which points its points are.
     """
-    if isinstance(document, Table):
-        from posekit.formats import keypoint_tables
-
-        return keypoint_tables.read(document, path, options)
     rows = Rows(source=str(path))
     if isinstance(document, Path):
         files = sorted(document.glob("*.json"), key=lambda file: _counted(file.name))

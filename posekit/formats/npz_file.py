@@ -301,15 +301,10 @@ def _torch(archive: zipfile.ZipFile, member: str, source: str) -> Any:
         return values
 
     def tensor(values: NDArray[Any], offset: int, size: Any, stride: Any, *_: Any) -> NDArray[Any]:
-        size, stride = (tuple(operator.index(one) for one in given) for given in (size, stride))
-        last = offset + sum((extent - 1) * step for extent, step in zip(size, stride, strict=True))
-        if min((offset, *size, *stride)) < 0 or last >= max(len(values), 1):
-            raise ValueError("a tensor beyond its storage")
-        if 0 in size:
-            return np.zeros(size, values.dtype)
-        width = values.itemsize
-        strides = [step * width for step in stride]
-        return np.lib.stride_tricks.as_strided(values[offset:], tuple(size), strides).copy()
+        shape, steps = (tuple(map(operator.index, given)) for given in (size, stride))
+        width = values.itemsize  # NumPy refuses steps that leave the storage
+        strides = [step * width for step in steps]
+        return np.ndarray(shape, values.dtype, values.tobytes(), offset * width, strides).copy()
 
     def parameter(values: Any, *_: Any) -> Any:
         return values

@@ -41,7 +41,7 @@ READERS: Final[dict[str, tuple[str, ...]]] = {
         *("view_file", "postures_file", "result_file", "report_file", "cameras_file"),
         *("smpl", "robot_tables", "joint_arrays"),
     ),
-    "table": ("trc", "report_file", "keypoints", "robot_tables", "joint_arrays"),
+    "table": ("trc", "report_file", "keypoint_tables", "robot_tables", "joint_arrays"),
     "bvh": ("bvh",),
     "c3d": ("c3d",),
     "parquet": ("result_file", "report_file", "robot_tables", "joint_arrays"),
@@ -50,6 +50,8 @@ READERS: Final[dict[str, tuple[str, ...]]] = {
     "xml": ("cameras_file",),
     "folder": ("keypoints",),  # a folder's document is its Path; `parsed` reads one of its files
 }
+#: Containers whose files hold one thing.
+ONE_CONTENT: Final = ("bvh", "c3d")
 #: Endings of pictures and films, which detectors read.
 PICTURES: Final = ".png .jpg .jpeg .tif .tiff .webp .bmp .gif .heic .mp4 .mov .avi".split()
 #: Endings of files with bodies that other programs show.
@@ -161,7 +163,7 @@ def open(  # the door's name, as in `gzip.open`
         return load_robot(Path(path))
     container, document = parsed(path)
     for module in READERS[container]:
-        if named(f"{module}:looks_like")(document):
+        if container in ONE_CONTENT or named(f"{module}:looks_like")(document):
             with undamaged(Path(path), f"the parts of {container} that {module} reads"):
                 found = named(f"{module}:read")(document, str(path), options)
             if type(found).__name__ == "Motion" and not len(found):
