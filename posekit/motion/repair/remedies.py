@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
+from scipy.ndimage import binary_dilation
 
 from posekit.geometry import Array, Ints, runs
 from posekit.motion.motion import NAMES
@@ -29,14 +29,10 @@ AROUND_FRAMES: Final = (0, 3, 10)
 LASTING_SHARE: Final = 0.5
 #: Share of the largest displacement below which a body that stepped aside and back is where it was.
 SAME_PLACE_SHARE: Final = 0.15
-#: Frames a second of motion whose rate is not known.
-USUAL_RATE: Final = 30.0
 #: Frames before and after a span over which a length may have drifted there.
 RAMP_FRAMES: Final = 6
 #: Share of a length below which it has not drifted.
 SEEN_SHARE: Final = 2e-3
-#: Seconds over which the height by which a body is shifted changes.
-SMOOTH_SECONDS: Final = 0.3
 #: Largest shift, metres: a body that is farther from the ground is not meant to stand on it.
 MOST_SHIFT_METRES: Final = 0.5
 #: Distance inside its bound to which a body is lifted or lowered.
@@ -200,7 +196,7 @@ def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Lift and lower the body by what it is below or above the ground, evenly over time or frame by frame."""
+    """Lift and lower the body by what it is below or above the ground, evenly or frame by frame."""
     up = clip.motion.up_vector
     low, high = (_numbers(report, check, "lowest") for check in ("penetration", "floating"))
     beyond = [_numbers(report, check, "lowest", "margin") for check in ("penetration", "floating")]
@@ -208,15 +204,13 @@ def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
     if up is None or not height.any():
         return
     excess = np.where(low != 0, beyond[0], -beyond[1])
-    width = max(int(SMOOTH_SECONDS * (clip.motion.rate or USUAL_RATE)) | 1, 1)
-    ways = np.zeros((4, len(clip)))
+    ways = np.zeros((3, len(clip)))
     for start, stop in runs(height != 0):
         span = height[start:stop]
         if np.abs(np.median(span)) <= MOST_SHIFT_METRES:
-            smooth = uniform_filter1d(median_filter(span, width, mode="nearest"), width, mode="nearest")
             even = np.full(len(span), span[np.argmax(np.abs(span))])
             over = excess[start:stop] + CLEARANCE_METRES * np.sign(excess[start:stop])
-            ways[:, start:stop] = -np.stack([smooth, even, span, over])
+            ways[:, start:stop] = -np.stack([even, span, over])
     whole = -height[np.argmax(np.abs(height))]
     if abs(whole) <= MOST_SHIFT_METRES:
         ways = np.vstack([ways, np.full(len(clip), whole)])

@@ -126,9 +126,9 @@ def repair(
 
     Over time, frames are put in order, sides exchanged back, lengths of limbs restored, jumps and frozen frames
     interpolated, trembling smoothed by as little as helps, the body shifted to the ground, and standing feet held. Then
-    each posture that is rejected goes toward a good one between its neighbours as far as it must, first by the parts of
-    the body that findings name. Joints of a robot beyond their limits are set on these. A first frame from which the
-    body jumps, such as a T-pose, is replaced by one from which the motion goes on as it does after it.
+    each posture that is rejected is pushed inside its bounds by the shortest steps, else brought toward the nearest
+    good frames, as far as it must. A first frame from which the body jumps, such as a T-pose, is replaced by one from
+    which the motion goes on as it does after it.
 
     Frames that need no change stay as they are, byte for byte in BVH files and in tables. A file that is written is
     judged as it is read again.
