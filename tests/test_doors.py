@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio
 import pytest
 
 import posekit
@@ -88,6 +89,13 @@ def test_configurations_are_judged_by_their_urdf_and_by_ranges_where_they_are_as
     assert by_urdf.ok.all() and not asked.ok.all()
     again = posekit.Validator(ranges="anatomical", checks=["joint-range"]).check(q)
     assert np.array_equal(asked.ok, again.ok)
+
+
+@pytest.mark.parametrize("body", ["figure", "g1"])
+def test_a_validator_has_the_model_that_judges(body: str) -> None:
+    validator = posekit.Validator(body)
+    assert isinstance(validator.model, pinocchio.Model)
+    assert validator.model.nq == len(validator.configuration_names)
 
 
 @pytest.mark.parametrize("name", ["jump.bvh", "walk.npz"])

@@ -372,6 +372,11 @@ class Validator:
         return self.figure or self.robot  # type: ignore[return-value]
 
     @property
+    def model(self) -> Any:
+        """Pinocchio's model of the figure or robot."""
+        return self.body.model
+
+    @property
     def configuration_names(self) -> tuple[str, ...]:
         """Name of each entry of q."""
         return self.body.configuration_names
