@@ -19,7 +19,7 @@ from posekit.cameras.lee_chen import (
     rotation_to_paper,
     transformation_matrix,
 )
-from posekit.geometry import Array
+from posekit.geometry import Array, best_rotation
 from posekit.papers.rows import Row, printed, row
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 from posekit.synthesis import random_postures
@@ -98,8 +98,11 @@ def _figure_rows() -> Iterator[Row]:
 
 
 def _null_space_rows() -> Iterator[Row]:
-    singular, f, R, position = _null_space(TABLE_A2, exact_image())
-    x, y, z = position
+    singular, S = _null_space(100 * TABLE_A2.points, exact_image() * [100.0, -100.0])
+    S *= np.sign(S[3, 2]) / np.linalg.norm(S[:3, 0])  # the sign of a camera that has the head in front of it
+    f = 1 / float(np.linalg.norm(S[:3, 2]))
+    R = np.stack([S[:3, 0], S[:3, 1], -f * S[:3, 2]], axis=1)
+    x, y, z = R @ [-S[3, 0], -S[3, 1], (S[3, 2] - 1) * f]
     rank = int((singular > 1e-9 * singular[0]).sum())
     yield row("rank", f"rank {rank} of 12 unknowns", rank == 11)
     here = f"{f:.6f} and ({x:.6f}, {abs(y):.6f}, {abs(z):.6f}) cm"
@@ -108,18 +111,14 @@ def _null_space_rows() -> Iterator[Row]:
     yield row("rotation", f"{off:.0e} off", off < 1e-6)
 
 
-def _null_space(head: HeadPoints, image: Array) -> tuple[Array, float, Array, Array]:
-    """Solve eqs. (2)-(5): singular values, f, the axes of the camera, and its position, centimetres."""
+def _null_space(points: Array, image: Array) -> tuple[Array, Array]:
+    """Solve eqs. (2)-(5): the singular values, and the matrix (4, 3) of the smallest."""
     rows = []
-    for (x, y, z), (u, v) in zip(100 * head.points, image * [100.0, -100.0], strict=True):
+    for (x, y, z), (u, v) in zip(points, image, strict=True):
         rows.append([x, 0, -u * x, y, 0, -u * y, z, 0, -u * z, 1, 0, -u])
         rows.append([0, x, -v * x, 0, y, -v * y, 0, z, -v * z, 0, 1, -v])
     _, singular, axes = np.linalg.svd(np.array(rows))
-    S = axes[-1].reshape(4, 3)
-    S *= np.sign(S[3, 2]) / np.linalg.norm(S[:3, 0])  # the sign of a camera that has the head in front of it
-    f = 1 / float(np.linalg.norm(S[:3, 2]))
-    R = np.stack([S[:3, 0], S[:3, 1], -f * S[:3, 2]], axis=1)
-    return singular, f, R, R @ [-S[3, 0], -S[3, 1], (S[3, 2] - 1) * f]
+    return singular, axes[-1].reshape(4, 3)
 
 
 def _noisy_error(head: HeadPoints) -> float:
@@ -135,11 +134,8 @@ def _table_2_rows() -> Iterator[Row]:
     gap = float(np.abs(image * [100, -100] - tables["image"]).max())
     yield row("image", f"{gap:.0e} cm off at most", gap < 1e-3)
     rounded = image_from_paper(tables["image"] / 100)
-    eye = TABLE_A2.points[TABLE_A2.names.index("right_eye")] * [0, 1, 1] + [
-        _tables()["misprinted_eye_x"] / 100,
-        0,
-        0,
-    ]
+    eye = TABLE_A2.points[TABLE_A2.names.index("right_eye")].copy()
+    eye[0] = float(tables["misprinted_eye_x"]) / 100
     misprinted = TABLE_A2.with_points({"right_eye": eye})
     _, misfit = _refined(misprinted, rounded)
     yield row("eye", "-31.168 cm", False, off=_linear(misprinted, rounded), misfit=misfit.replace("_", " "))
@@ -161,8 +157,16 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
 
 
 def _linear(head: HeadPoints, image: Array) -> float:
-    """Return how far off the camera of the linear solution is, centimetres."""
-    return float(np.linalg.norm(_null_space(head, image)[3] - 100 * CAMERA))
+    """Return how far off the camera of the linear solution is, centimetres; data are normalised (Hartley 1997)."""
+    centre, middle = head.points.mean(axis=0), image.mean(axis=0)
+    sizes = [np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean()) for at in (head.points, image)]
+    P = _null_space((head.points - centre) / sizes[0], (image - middle) / sizes[1])[1].T
+    P[:2] = sizes[1] * P[:2] + middle[:, None] * P[2]
+    P *= np.sign(np.linalg.det(P[:, :3])) / np.linalg.norm(P[2, :3])
+    f = float(np.sqrt((P[:2, :3] ** 2).sum() / 2))
+    P[:2] /= f
+    R = best_rotation(P[:, :3])[0]
+    return 100 * float(np.linalg.norm(camera_position(R, sizes[0] * P[:, 3] - R @ centre, f) - CAMERA))
 
 
 def _body_rows() -> Iterator[Row]:
@@ -175,11 +179,8 @@ def _body_rows() -> Iterator[Row]:
         apart = 100 * np.linalg.norm(points[:, a] - points[:, b], axis=-1)
         worst = max(worst, float(np.abs(apart - length).max()))
     yield row("tableA1", f"{worst:.0e} cm off at most", worst < 1e-6, n=len(lengths), postures=N_BODIES)
-    neck, spine, half = (
-        lengths["neck-right_shoulder"],
-        lengths["neck-pelvis"],
-        lengths["right_shoulder-left_shoulder"] / 2,
-    )
+    neck, spine = lengths["neck-right_shoulder"], lengths["neck-pelvis"]
+    half = lengths["right_shoulder-left_shoulder"] / 2
     below = (neck**2 - lengths["right_shoulder-pelvis"] ** 2 + spine**2) / (2 * spine)
     ahead = float(np.sqrt(neck**2 - half**2 - below**2))
     here = f"not flat: the middle of the shoulders is {ahead:.3f} cm in front of the line from neck to pelvis"
