@@ -134,8 +134,7 @@ def _table_2_rows() -> Iterator[Row]:
     gap = float(np.abs(image * [100, -100] - tables["image"]).max())
     yield row("image", f"{gap:.0e} cm off at most", gap < 1e-3)
     rounded = image_from_paper(tables["image"] / 100)
-    eye = TABLE_A2.points[TABLE_A2.names.index("right_eye")].copy()
-    eye[0] = float(tables["misprinted_eye_x"]) / 100
+    eye = [tables["misprinted_eye_x"] / 100, *TABLE_A2.points[TABLE_A2.names.index("right_eye"), 1:]]
     misprinted = TABLE_A2.with_points({"right_eye": eye})
     _, misfit = _refined(misprinted, rounded)
     yield row("eye", "-31.168 cm", False, off=_linear(misprinted, rounded), misfit=misfit.replace("_", " "))
