@@ -51,7 +51,6 @@ INTRINSICS: Final = re.compile(
 )
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
-MAX_CAMERAS: Final = 100_000
 #: Largest distance of a camera from the world's origin at which a file without a unit is taken as metres.
 METRES_UP_TO: Final = 100.0
 #: Smallest distance at which it is taken as millimetres; below it, it could be centimetres as well.
@@ -95,17 +94,14 @@ def read(document: Any, path: str | Path, options: Options) -> dict[str, Pinhole
         If there is no camera, or one that is impossible.
     """
     fields = {"cameras": document} if isinstance(document, list) else dict(document)
-    stem = Path(path).name.partition(".")[0]
     held: list[tuple[str, Mapping[str, Any], str]] = []
     if suffixes := _suffixes(fields):
-        name = str(_value(fields, "name") or stem)
+        name = str(_value(fields, "name") or Path(path).name.partition(".")[0])
         held = [(suffix or name, fields, suffix) for suffix in suffixes]
-    else:
-        for key, entry in fields.items():
-            many = enumerate(entry[:MAX_CAMERAS]) if isinstance(entry, list) else [(key, entry)]
-            for number, one in many:
-                if isinstance(one, Mapping) and "" in _suffixes(one):
-                    held.append((str(_value(one, "name") or number), one, ""))
+    for key, entry in fields.items() if not suffixes else ():
+        for number, one in enumerate(entry) if isinstance(entry, list) else [(key, entry)]:
+            if isinstance(one, Mapping) and "" in _suffixes(one):
+                held.append((str(_value(one, "name") or number), one, ""))
     if not held:
         there = one_line(", ".join(cut(str(key)) for key in list(fields)[:6])) or "nothing"
         expected = f"one of {', '.join(FIELDS['K'].split())}"

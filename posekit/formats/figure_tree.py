@@ -144,7 +144,7 @@ def placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
     angles : array (T, 21, 3)
         Angles of each node against its parent (the first against the world), about x, z and y, radians.
     """
-    W = up_turn(up or "+z")
+    W = rotation_between(up_vector(up or "+z"), up_vector("+y"))
     R_torso = W @ rotation_from_quaternion(q[:, 3:7]) @ TO_Y_UP.T
     pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
     own = dict(zip(DOFS, (q[:, figure.angle_index] * figure.limits.sign).T, strict=True))
@@ -159,14 +159,6 @@ def placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
     angles[:, 1] = euler_angles(R_hips.transpose(0, 2, 1))
     angles[:, 0] = euler_angles(R_torso @ R_hips)
     return q[:, :3] @ W.T + R_torso @ pelvis, angles
-
-
-def up_turn(up: str) -> Array:
-    """Return the rotation (3, 3) that turns an up axis into +y, as `Motion.rotated` does."""
-    start, end = up_vector(up), up_vector("+y")
-    if np.allclose(start, -end):
-        return np.diag([1.0, -1.0, -1.0])
-    return np.asarray(np.round(rotation_between(start[None], end[None])[0]))
 
 
 def euler_rotation(angles: Array) -> Array:

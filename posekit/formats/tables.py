@@ -157,7 +157,7 @@ def numbers(cells: list[str]) -> Array:
 def checked(cells: list[str], source: str, place: Callable[[int], str]) -> Array:
     """Turn cells into numbers (N,), or refuse one that is neither a number nor empty, by its place in the file."""
     values = numbers(cells)
-    for k in np.flatnonzero(np.isnan(values)).tolist():
+    for k in np.flatnonzero(~np.isfinite(values)).tolist():
         if cells[k].casefold() not in MISSING:
             raise refusal(source, place(k), shown(cells[k]), "a number, or nothing", "correct the cell")
     return values

@@ -137,9 +137,6 @@ def _rows(table: Table, start: int, width: int, path: str) -> Array:
     values = checked(cells, path, lambda k: f"line {lines[k // width]}, column {k % width + 1}").reshape(
         -1, width
     )
-    if np.isinf(values).any():
-        where = f"line {lines[int(np.argmax(np.isinf(values).any(axis=1)))]}"
-        raise refusal(path, where, "an infinite number", "finite numbers, or nothing", "correct the cell")
     return values
 
 
