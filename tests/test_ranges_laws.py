@@ -111,6 +111,7 @@ ELBOW = "[elbow]\nflexion = [0.0, 160.0]"
     [
         ("posekit.ranges/1", "posekit.ranges/2", "schema"),
         ('"rotation"', '"bent"', "kind"),
+        ('kind = "rotation"', 'kind = "anatomical"\nspreads = 1.0', "neck.flexion.lower.mean"),
         (ELBOW, "[elbow]\nflexion = [160.0, 0.0]", "elbow.flexion"),
         (ELBOW, "[elbow]\nflexion = [0.0]", "elbow.flexion"),
         (ELBOW, "[elbow]\nflexing = [0.0, 160.0]", "elbow.flex"),

@@ -84,11 +84,11 @@ def _check_limits(limits: Any, source: str, field: str) -> None:
 
 
 def _check_anatomical(table: Mapping[str, Any], source: str) -> None:
-    numbers = {"spreads": table.get("spreads")}
+    numbers, angles = {"spreads": table.get("spreads")}, _angles(table)
     for dof in dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS):
-        joint, angle = dof.split(".")
         for end in ("lower", "upper"):
-            one = table.get(joint, {}).get(angle, {}).get(end, {})
+            ends = angles.get(dof)
+            one = ends.get(end, {}) if isinstance(ends, dict) else {}
             numbers |= {f"{dof}.{end}.{name}": one.get(name) for name in ("mean", "spread")}
     for field, number in numbers.items():
         if not _is_number(number):
