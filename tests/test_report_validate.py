@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 
 import posekit
@@ -132,6 +133,16 @@ def test_kept_clips_are_copied_unchanged_or_cut(folder: Path, tmp_path: Path) ->
     assert rows[1]["reason"] == report.clips[1].reason
     with pytest.raises(InputError, match="new or empty folder"):
         keep_clips(report, tmp_path / "kept")
+
+
+@pytest.mark.parametrize("read", ["csv", "parquet"])
+def test_the_clips_of_a_report_are_a_table(folder: Path, read: str) -> None:
+    report = posekit.validate(folder)
+    report.save(folder / f"clips.{read}", clips=True)
+    table = getattr(pandas, f"read_{read}")(folder / f"clips.{read}")
+    assert table.decision.tolist() == [one.decision for one in report.clips]
+    assert table.invalid.tolist() == [one.invalid for one in report.clips]
+    assert [Path(name).stem for name in table.file] == ["a", "b", "c"]
 
 
 @pytest.mark.parametrize("name", ["report.json", "report.npz", "report.parquet"])

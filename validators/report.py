@@ -274,11 +274,15 @@ class Report(Record):
 
         return pandas.DataFrame(self.table())
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the report: ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md``."""
+    def save(self, path: str | PathLike[str], *, clips: bool = False) -> None:
+        """Write the report: ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md``.
+
+        With `clips`, ``.csv`` and ``.parquet`` have a row a clip, with its decision, in place of a row a finding.
+        """
         import posekit
 
-        posekit.save(self, path)
+        options: dict[str, Any] = {"clips": True} if clips else {}
+        posekit.save(self, path, **options)
 
     @cached_property
     def clips(self) -> list[ClipDecision]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.files import write_bytes
 from posekit.formats import json_file
@@ -98,19 +99,27 @@ def write_npz(path: str | Path, report: Report) -> None:
     write_bytes(path, packed(arrays))
 
 
-def write_csv(path: str | Path, report: Report) -> None:
-    """Write the table of findings as CSV."""
-    write_bytes(path, csv_text(report.table()).encode())
+def write_csv(path: str | Path, report: Report, *, clips: bool = False) -> None:
+    """Write the table of findings, or that of clips, as CSV."""
+    write_bytes(path, csv_text(_clip_table(report) if clips else report.table()).encode())
 
 
-def write_parquet(path: str | Path, report: Report) -> None:
-    """Write the table of findings, everything else in its metadata."""
+def write_parquet(path: str | Path, report: Report, *, clips: bool = False) -> None:
+    """Write the table of findings, everything else in its metadata; or that of clips."""
     from posekit.formats.parquet import packed_table
 
     held = _about(report) | {key: nullable(values) for key, values in _arrays(report).items()}
-    table = report.table().items()
+    about = {} if clips else {"posekit": json.dumps(held, allow_nan=False)}
+    table = (_clip_table(report) if clips else report.table()).items()
     columns = {key: one.astype(np.str_) if one.dtype == object else one for key, one in table}
-    write_bytes(path, packed_table(columns, {"posekit": json.dumps(held, allow_nan=False)}))
+    write_bytes(path, packed_table(columns, about))
+
+
+def _clip_table(report: Report) -> dict[str, NDArray[Any]]:
+    from posekit.validators.report import clip_rows
+
+    rows = clip_rows(report)
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def write_md(path: str | Path, report: Report) -> None:

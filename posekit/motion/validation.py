@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -378,13 +376,16 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     InputError
         If the folder holds something, or a file cannot be read or written.
     """
+    from posekit.formats.tables import csv_text
+
     folder = new_folder(folder)
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
     try:
         rows = list(_kept(report, part, spans))
-        _write_table(part / CLIP_TABLE, rows)
+        table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        (part / CLIP_TABLE).write_text(csv_text(table), encoding="utf-8")
         if folder.exists():
             folder.rmdir()
         part.rename(folder)
@@ -455,11 +456,3 @@ def names_below(files: Iterable[str]) -> dict[str, Path]:
     absolute = {file: Path(os.path.normpath(Path(file).absolute())) for file in files}
     common = os.path.commonpath([path.parent for path in absolute.values()]) if absolute else ""
     return {file: path.relative_to(common) for file, path in absolute.items()}
-
-
-def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    path.write_text(text.getvalue(), encoding="utf-8")
