@@ -263,7 +263,7 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
     elsewhere = elsewhere[:, np.isfinite(elsewhere).any(axis=0)]
     usual = np.nanmedian(elsewhere, axis=0)
     slack = np.nanmax(elsewhere, axis=0) - np.nanmin(elsewhere, axis=0) + RIGID_SHARE * usual
-    rigid = np.argsort(slack / usual)[:RIGID_NEIGHBOURS]
+    rigid = np.argsort(slack / np.maximum(usual, 1e-12))[:RIGID_NEIGHBOURS]
     if len(rigid) < RIGID_NEIGHBOURS or (slack > RIGID_MOST * usual)[rigid].any():
         return np.zeros(len(points), dtype=np.bool_)
     off = (np.abs(apart - usual) - slack)[:, rigid]
