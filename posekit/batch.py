@@ -96,7 +96,7 @@ def batch(
     Raises
     ------
     InputError
-        If a path does not exist, or the output is no folder. A broken input is an entry of ``failed``.
+        If a path does not exist, or the output is not a folder. A broken input is an entry of ``failed``.
 
     Examples
     --------

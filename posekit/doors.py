@@ -22,7 +22,7 @@ Source = Any
 
 
 def opened(source: Source, layout: str = "", **facts: Any) -> Any:
-    """Return what a path, or an array in the order of a layout, holds; other objects as they are."""
+    """Return the content of a path or of an array in the order of a layout; other objects unchanged."""
     from posekit.formats import open as open_file
     from posekit.motion.validation import has_layout
 

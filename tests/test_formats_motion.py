@@ -684,7 +684,7 @@ def test_a_person_on_the_head_is_said_in_formats_with_a_custom(tmp_path: Path) -
     lines = trc_of(replace(walking().rotated("-y"), up=""), tmp_path)
     assert lines
     found = posekit.open(tmp_path / "walk.trc")
-    assert found.up == "-y" and any("against +y by custom" in warning for warning in found.warnings)
+    assert found.up == "-y" and any("against +y by convention" in warning for warning in found.warnings)
 
 
 def test_frames_that_were_left_out_keep_their_place(tmp_path: Path) -> None:

@@ -253,7 +253,7 @@ def test_a_first_frame_at_rest_becomes_part_of_the_motion(clean: posekit.Motion)
 def test_points_that_are_no_joints_keep_their_columns(
     clean: posekit.Motion, tmp_path: Path, ending: str
 ) -> None:
-    """Of a file in millimetres with a sword only the joints move, and only where they jumped."""
+    """In a file in millimetres with a sword only the joints move, and only where they jumped."""
     path, target = tmp_path / f"given.{ending}", tmp_path / f"repaired.{ending}"
     names = [*JOINTS, "sword"]
     joints = jumped(np.asarray(clean.joints))

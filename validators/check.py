@@ -76,7 +76,7 @@ class Judgement(Record):
     lower, upper : array broadcastable to (T, K)
         Bounds.
     tolerance : array broadcastable to (T, K)
-        Distance beyond a bound that is no violation.
+        Distance beyond a bound that is not yet a violation.
     scale : array broadcastable to (T, K), optional
         Size of one whole share of margin, in the check's unit. By default half the range or, where it has one end, the
         size of that bound.
@@ -170,7 +170,7 @@ class Check(Protocol):
 
     @property
     def reads(self) -> Sequence[str]:
-        """What it needs of a body: some of `READABLE`."""
+        """Data of a body that the check needs: names from `READABLE`."""
 
     def judge(self, body: Body) -> Judgement:
         """Judge all frames of one body; raise `NotAskedError` where the check does not apply."""

@@ -79,7 +79,7 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
     Raises
     ------
     InputError
-        If a name is no check.
+        If a name is not that of a check.
     """
     own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
     profile = load_profile(settings.profile) if isinstance(settings, ValidateSettings) else ()

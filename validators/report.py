@@ -20,14 +20,14 @@ from posekit.geometry import Array, Record, runs
 if TYPE_CHECKING:
     import pandas
 
-#: Frames by which an effect may lie off its cause: trembling is measured over so many.
+#: Largest distance between a cause and its effect, frames: the window in which trembling is measured.
 NEAR_FRAMES: Final = 15
 
 #: Gap within one span at most, seconds; the same in frames where the rate is not known, and the least.
 MERGED_SECONDS, MERGED_FRAMES = 0.1, 3
 
 #: Excess that counts as slight, in a check's unit: the flesh of a body, the spread of people's ranges, and the sway of
-#: measured feet. Of another unit a tenth of the bound.
+#: measured feet. For other units it is a tenth of the bound.
 SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
 
 #: Next step of the user where none is known that fits better.
@@ -126,7 +126,7 @@ class ClipDecision:
 
     @property
     def title(self) -> str:
-        """File and name, as they are printed."""
+        """File and name, as printed."""
         return _title(self.file, self.name)
 
 

@@ -34,7 +34,7 @@ class RigidParts:
     segments : tuple of (int, int)
         Pairs of joints whose distance is judged.
     torso : bool
-        Judge the torso's shape too. Of exact postures the figure's torso is laid onto the posture's, as the
+        Judge the torso's shape too. For exact postures the figure's torso is superimposed on the posture's, as the
         configuration q will be, and points are compared. Otherwise the side of the line from neck to pelvis is judged
         on which the shoulders lie, which distances do not determine.
     """

@@ -6,7 +6,7 @@ paper takes the head's facing direction (walkers ``paper-printed``): a person wh
 degrees then swings arm and leg of one side together, and breaks Rule 2.
 
 The *swing* of a joint is its displacement out of the body plane, less the one it has when the figure stands at
-neutral. A swing that is not clearly other than zero is no evidence: rules about it are undecided.
+neutral. A swing that does not clearly differ from zero is not evidence: rules about it are undecided.
 """
 
 from __future__ import annotations

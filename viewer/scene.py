@@ -205,7 +205,7 @@ class Stage:
 
 
 def _coloured(figure: Figure) -> pin.GeometryModel:
-    """Return the figure's capsules by side, with the girdle and the neck that its collision bodies leave open."""
+    """Return the figure's capsules, coloured by side, with a girdle and a neck, which have no collision bodies."""
     bodies = pin.GeometryModel(figure.geometry)
     points, data = figure.neutral_points, figure.model.createData()
     pin.forwardKinematics(figure.model, data, figure.neutral)

@@ -332,7 +332,7 @@ def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subj
 
 
 def as_motion(source: Any) -> Any:
-    """Return an array (T, 14, 3) or (14, 3), or the truth of a view, as a motion; other objects as they are."""
+    """Return an array (T, 14, 3) or (14, 3), or the truth of a view, as a motion; other objects unchanged."""
     if isinstance(source, View):
         return Motion(joints=source.truth, time=source.time, up="-y", source=source.source)
     if isinstance(source, Sequence | np.ndarray):

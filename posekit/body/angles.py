@@ -71,7 +71,7 @@ class Limits:
         return Limits(sign=self.sign[part], lower=self.lower[part], upper=self.upper[part])
 
     def take(self, rows: Flags) -> Limits:
-        """Return the limits of some of N limbs."""
+        """Return the limits of the limbs that a mask (N,) selects."""
         return Limits(sign=self.sign[rows], lower=self.lower[rows], upper=self.upper[rows])
 
     def clip(self, k: int, angle: Array | float) -> Array:

@@ -432,7 +432,7 @@ class Figure(Robot):
 
 
 def with_head(joints: ArrayLike, head: Array | None = None) -> Array:
-    """Append head points (N, 5, 3), unknown by default, to postures (N, 14, 3); leave (N, 19, 3) as they are."""
+    """Append head points (N, 5, 3), unknown by default, to postures (N, 14, 3); leave (N, 19, 3) unchanged."""
     joints = np.asarray(joints, dtype=np.float64)
     if joints.ndim != 3 or joints.shape[1] not in (len(JOINTS), len(POINTS)) or joints.shape[2] != 3:
         expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"

@@ -41,7 +41,7 @@ HIPS_LENGTHS: Final = ("pelvis-right_hip", "pelvis-left_hip", "right_hip-left_hi
 #: Largest relative change of a length that is made to close.
 #:
 #: Adults' segments vary beside their size with a standard deviation of 5 % (`posekit.body.uncertainty.UNKNOWN_ADULT`):
-#: beyond four of them the lengths are no body's.
+#: beyond four of them they are not the lengths of a person.
 MAX_MOVED: Final = 0.2
 
 #: Smallest distance of a starting point from the middle, as a fraction of the breadth: on the line itself no distance

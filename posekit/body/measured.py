@@ -145,10 +145,10 @@ def _shoulders_behind(joints: Array) -> bool | None:
 
 @lru_cache(maxsize=8)
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
-    """Return a figure with the lengths of a person, as far as they are a person's.
+    """Return a figure with the lengths of a person, as far as they are plausible.
 
-    Lengths that nobody has are left to the figure at the person's size; if no body is near the lengths, all but the
-    limbs are. Clips of one skeleton share a figure.
+    Implausible lengths are replaced by those of the figure at the person's size; if no plausible body is near the
+    lengths, all are replaced except the limbs'. Clips of one skeleton share a figure.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ FIT_PRECISION: Final = 1e-10
 #: The same for a fit without one point: enough to judge it.
 MISFIT_PRECISION: Final = 1e-3
 
-#: Slope d of a head seen from half a metre, where the scaled orthographic view is no start.
+#: Slope d of a head seen from half a metre, too near for a start from the scaled orthographic view.
 NEAR_SLOPE: Final = 0.15
 
 #: First, smallest and largest damping, as a fraction of the normal equations' diagonal; beyond the largest no step
@@ -47,10 +47,10 @@ DAMPING: Final = (1e-4, 1e-13, 1e8)
 #: Error of an image point, as a fraction of the head's size in the image, that is rounding.
 ROUNDING_ERROR: Final = 1e-10
 
-#: Chance below which a better fit of a head behind the camera is no accident.
+#: p-value below which the better fit of a head behind the camera is not due to chance.
 BETTER_BEHIND: Final = 1e-4
 
-#: Probability that a head of sound points with normal errors has one of them named as a misfit.
+#: Probability that a point of a correct head with normal errors is reported as a misfit.
 FALSE_ALARMS: Final = 5e-3
 
 BEHIND_CAMERA: Final = (
@@ -62,7 +62,7 @@ UNSETTLED: Final = "no pose was found from any start: check the image points and
 
 
 class HeadWarning(UserWarning):
-    """A head point does not fit the others, in one frame or in more frames than accident explains."""
+    """A head point does not fit the others, in one frame or in more frames than chance explains."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -88,8 +88,8 @@ class HeadPose(Record):
     rms : array (F,)
         Root of the mean squared residual of the seen points.
     misfit : tuple of str or None
-        The point that does not fit the others, None if all do. Of sound heads with normal errors one in
-        two hundred has one by accident; a warning is given only for more than that.
+        The point that does not fit the others, None if all do. With normal errors, one correct head in two hundred has
+        a misfit by chance; only a higher share causes a warning.
     """
 
     head: HeadPoints
@@ -263,7 +263,7 @@ class _Problem(NamedTuple):
         return np.asarray(ROUNDING_ERROR**2 * (spread**2).sum(axis=(1, 2)))
 
     def take(self, rows: Ints) -> _Problem:
-        """Return some of the heads."""
+        """Return the selected heads."""
         return _Problem(self.points[rows], self.plane[rows], self.to_image[rows], self.free)
 
     def look(self, x: Array) -> tuple[Array, Array, Array]:
@@ -357,12 +357,12 @@ class _Problem(NamedTuple):
         return np.asarray(ratio ** (self.freedom / 2) < BETTER_BEHIND)
 
     def misfits(self, cost: Array) -> tuple[Ints, Array]:
-        r"""Return the point (F,) that fits the others least, and the chance (F,) of an error as large.
+        r"""Return the point (F,) that fits the others worst, and the p-value (F,) of its error.
 
-        A head is fitted again without each of its points j, which leaves a squared error :math:`S_j` of S. For normal
-        errors of unknown size, and one point chosen beforehand, the chance is :math:`(S_j/S)^{m/2}`, m the degrees of
-        freedom without the point (the mean-shift outlier test of Cook & Weisberg 1982, for a pair of observations). All
-        P points are examined, hence the factor P (Bonferroni).
+        The head is fitted again without each of its points j, which reduces the squared error S to :math:`S_j`. For
+        normal errors of unknown variance, and one point chosen beforehand, the p-value is :math:`(S_j/S)^{m/2}`, where
+        m is the number of degrees of freedom without the point (the mean-shift outlier test of Cook & Weisberg 1982,
+        for a pair of observations). All P points are examined, hence the factor P (Bonferroni).
         """
         frames, points = np.nonzero(self.seen & (np.isfinite(cost) & (cost > self.rounding))[:, None])
         without = self.take(frames)
@@ -377,10 +377,10 @@ class _Problem(NamedTuple):
 
 
 def _warn(pose: HeadPose, chance: Array, rows: Ints) -> None:
-    """Warn once of every point that does not fit in more frames than accident explains, with its worst frame.
+    """Warn once for each point that misfits in more frames than chance explains; name its worst frame.
 
-    The k smallest of the chances count, for the largest k with the k-th at most k / F of `FALSE_ALARMS` (Benjamini &
-    Hochberg 1995).
+    The k smallest p-values are reported, for the largest k whose k-th p-value is at most k / F of `FALSE_ALARMS`
+    (Benjamini & Hochberg 1995).
     """
     ordered = np.sort(chance)
     below = ordered[ordered <= FALSE_ALARMS * np.arange(1, len(chance) + 1) / max(len(chance), 1)]

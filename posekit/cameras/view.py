@@ -157,7 +157,7 @@ class View(Record):
         return own_names(self.head_points or ())
 
     def take(self, rows: Ints | Sequence[int] | slice) -> View:
-        """Return some of its frames, by index or slice."""
+        """Return the view of the selected frames, by index or slice."""
         index = np.arange(len(self))[rows]
         taken = {name: getattr(self, name)[index] for name in FRAME_ARRAYS}
         pictures = tuple(self.pictures[k] for k in index) if self.pictures else ()

@@ -227,8 +227,8 @@ class Detections(Record):
         Returns
         -------
         View
-            Of a film it has a frame for every picture, also for pictures without the person, so that numbers and
-            times are the film's. Of unrelated photographs, those that show any joint of the person.
+            For a film it has a frame for every picture, also for pictures without the person, so that numbers and times
+            are the film's. For unrelated photographs it has a frame for each that shows any joint of the person.
 
         Raises
         ------

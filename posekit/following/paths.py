@@ -1,10 +1,10 @@
 """One person through a sequence: the likeliest paths through the survivors of its frames.
 
 Every end of a path carries where the body is and how fast it moves, and goes on to every survivor of the next frame, or
-passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. Of several paths
-that end in the same survivor only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278)
-with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths
-give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. If several paths
+end in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with
+a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the
+probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
 """
 
 from __future__ import annotations
@@ -228,7 +228,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     ----------
     recovery : Recovery
     paths : int
-        Number of paths; fewer are found if there are not so many.
+        Number of paths; fewer are returned if fewer exist.
 
     Returns
     -------

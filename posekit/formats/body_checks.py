@@ -166,12 +166,12 @@ def _layout_of(
 
 
 def unnamed(points: Array, source: str, options: Options) -> Layout:
-    """Find the layout of points (T, P, 3) without names, by their number and by how the body hangs together.
+    """Find the layout of points (T, P, 3) without names, by their number and by whether they form a body.
 
     Raises
     ------
     InputError
-        If no layout has so many points, or the body hangs together in none that has.
+        If no layout has P points, or the points form a body in none of those that have.
     """
     candidates = by_order(points.shape[1])
     fits = [one for one in candidates if _misfit(one, points) < 1.0]
@@ -182,12 +182,12 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
         counts = sorted({(len(one.points), one.name) for k in range(1, 200) for one in by_order(k)})
         known = ", ".join(f"{name} ({count})" for count, name in counts)
         named = ", ".join(one.name for one in candidates)
-        why = " in which no body hangs together" if candidates else ""
+        why = ", which form a body in none of the layouts of this size" if candidates else ""
         got = f"{points.shape[1]} points without names{why}"
         remedy = f"name their order with --layout {named or 'NAME'}, or a TOML file of your own"
         raise refusal(source, "points", got, named or f"as many as {known}", remedy)
     layout = min(fits, key=lambda one: _misfit(one, points))
-    options.note(f"points are in the order of {layout.name}: so the body hangs together")
+    options.note(f"points are in the order of {layout.name}, in which they form a body")
     return layout
 
 
@@ -246,15 +246,16 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
 
 
 def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
-    """Tell in which frames (T,) a point of the trunk is as far as elsewhere from its rigid neighbours.
+    """Tell in which frames (T,) a point of the trunk has its usual distances from its rigid neighbours.
 
     Parameters
     ----------
     points : array (T, P, 3)
     k : int
-        The point; one at a limb has fewer rigid neighbours than are asked, and hangs together nowhere.
+        The point. A point of a limb has too few rigid neighbours; the result is False in every frame.
     unsure : bool array (T, P)
-        Points that may be missing: they are no neighbours, and the distances elsewhere are those of other frames.
+        Points that may be missing: they do not count as neighbours, and the usual distances are taken from frames
+        without them.
     """
     others = np.arange(points.shape[1]) != k
     apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]
@@ -370,7 +371,7 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
     if stands and not (rise[stands] > STEEP_METRES and min(rise.values()) < FLAT_METRES):
         finding = f"{stands} is up by how bodies stand"
         if custom and stands != custom:
-            options.warn(f"{finding}, against {custom} by custom: if people lie, state the axis (--up)")
+            options.warn(f"{finding}, against {custom} by convention: if people lie, state the axis (--up)")
         elif stands[0] == "-":
             options.warn(f"{finding}: the head is below the feet along +{stands[1]}")
         elif stands != custom:

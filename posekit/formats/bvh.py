@@ -2,7 +2,8 @@
 
 Three sections of text: HIERARCHY with ROOT, JOINT and End Site, each with OFFSET and CHANNELS; MOTION with Frames and
 Frame Time; a line of values a frame, degrees. Meredith & Maddock 2001, *Motion Capture File Formats Explained*
-(University of Sheffield, CS-01-11). The file names no unit and no axis: y is up by custom, centimetres are frequent.
+(University of Sheffield, CS-01-11). The file names no unit and no axis: by convention y is up, centimetres are
+frequent.
 """
 
 from __future__ import annotations

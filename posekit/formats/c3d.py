@@ -211,7 +211,7 @@ def read(document: C3d, path: str, options: Options) -> Motion:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write the points of one recording as C3D: 32-bit floats in metres, axes as they are.
+    """Write the points of one recording as C3D: 32-bit floats in metres, axes unchanged.
 
     The up axis goes into ``POINT:Y_SCREEN``; a missing point has the residual -1. Times become frames at the rate.
 

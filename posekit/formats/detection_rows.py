@@ -20,7 +20,7 @@ from posekit.skeleton import HEAD_POINTS
 #: Share of the numbers of a film's pictures that a detector lists at least, in steps of their common divisor; pictures
 #: of a collection have numbers far apart.
 DENSE: Final = 0.5
-#: Numbers a listed picture of a film over which its numbers may spread; beyond, they are no picture numbers.
+#: Largest range of the numbers in a film, per listed picture; above it they are not picture numbers.
 MOST_SPREAD: Final = 20
 #: Median motion of a person between pictures of a film, in units of the square root of the body's area; between
 #: unrelated photographs it is about 1 and more.

@@ -1,7 +1,7 @@
-"""``posekit.result/2``, which earlier versions wrote: its JSON and NPZ are turned into a document of ``result/3``.
+"""``posekit.result/2``, the format of earlier versions: its JSON and NPZ are converted to a document of ``result/3``.
 
-It has no answer in joints: the first of its representatives stands for it. Its postures are sorted by falling
-probability, and its covariances become the radius of each joint.
+``result/2`` stores no joints of the answer; the joints of the first representative are used. Postures are sorted by
+decreasing probability, and the covariance of each joint becomes its radius.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def document_of(root: Node) -> dict[str, Any]:
 
 
 def _add_radius(postures: list[dict[str, Any]]) -> None:
-    """Give postures, in place, the fields of ``result/3``: chi2, radius, branch and inferred."""
+    """Add the fields of ``result/3`` to postures, in place: chi2, radius, branch, group and inferred."""
     refined = [one.get("refined") or one for one in postures]
     rows = [[row or [0.0] * 6 for row in one.get("covariance") or [None] * len(JOINTS)] for one in refined]
     matrices = np.zeros((len(postures), len(JOINTS), 3, 3))

@@ -84,14 +84,14 @@ NODES: Final = _nodes()
 def figure_of(motion: Motion) -> tuple[Figure, Array]:
     """Return a figure of the person's lengths and the configurations (T, nq) of a motion.
 
-    Stored configurations of the figure are used as they are; otherwise they are computed from the joints in closed
+    Stored configurations of the figure are used unchanged; otherwise they are computed from the joints in closed
     form. An unknown angle keeps the value of the nearest frame that has it; one that is never known stands at zero, or
     at its limit next to zero.
 
     Raises
     ------
     InputError
-        If a frame has no torso: then nothing hangs together.
+        If a frame has no torso, to which head and limbs are attached.
     """
     from posekit.body import load_figure, scaled_to, segment_lengths
 

@@ -11,7 +11,7 @@ import yaml
 from posekit.errors import cut, one_line, refusal, shown
 from posekit.files import text
 
-#: Words that are no text.
+#: Words that are not read as text, and their values.
 WORDS: Final[dict[str, Any]] = {
     **{"true": True, "false": False, "null": None, "~": None, "": None},
     **{".nan": float("nan"), ".inf": float("inf"), "-.inf": float("-inf")},

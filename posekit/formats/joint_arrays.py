@@ -113,7 +113,7 @@ def _shaped(values: Any, path: str, key: str) -> Array:
         points = np.where(points[..., 3:] > 0, points[..., :3], np.nan)
     if points.ndim != 3 or points.shape[2] != 3 or not len(points):
         near = ", ".join(layout.name for count in points.shape[1:] for layout in by_order(count))
-        expected = "(frames, points, 3)" + (f"; {near} have so many points" if near else "")
+        expected = "(frames, points, 3)" + (f"; {near} have this number of points" if near else "")
         flat = points.shape[-1:] == (2,)
         remedy = "these are points in pictures: recover them" if flat else "name them with --layout"
         raise refusal(path, key or "array", f"shape {points.shape}", expected, remedy)

@@ -58,7 +58,7 @@ def read(table: Table, path: str | Path, options: Options) -> Detections:
     Raises
     ------
     InputError
-        If a cell is no number, or the names of the points fit no layout.
+        If a cell is not a number, or the names of the points fit no layout.
     """
     rows = Rows(source=str(path))
     if table.head and table.head[0][:1] == ["scorer"]:

@@ -19,7 +19,7 @@ from posekit.motion.motion import NAMES
 from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side
 
 FOLDER: Final = DATA / "layouts"
-#: Landmarks that are no joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
+#: Landmarks that are not joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
 MIDDLES: Final = ("mid_shoulders", "mid_hips")
 LANDMARKS: Final = (*POINTS, *MIDDLES)
 #: Landmarks that every layout of a body places.
@@ -288,7 +288,7 @@ def _parts(table: Any, title: str, order: Sequence[str], points: Sequence[str], 
 
 
 def by_order(count: int) -> list[Layout]:
-    """List the layouts of points whose files have so many points and do not name them."""
+    """List the layouts whose files have `count` points and do not name them."""
     every = map(_built_in, layout_names())
     return [one for one in every if one.points and count in one.fields.get("counts", [len(one.points)])]
 

@@ -78,7 +78,7 @@ class Node:
         return self.value
 
     def list(self, least: int = 0) -> Iterator[Node]:
-        """Go through the members of a list of at least so many."""
+        """Iterate over the members of a list; refuse a list with fewer than `least`."""
         if not isinstance(self.value, list | tuple) or len(self.value) < least:
             raise self.refused(f"a list of {least} or more" if least else "a list")
         return (Node(value, self.source, f"{self.place}[{k}]") for k, value in enumerate(self.value))

@@ -29,7 +29,7 @@ def looks_like(document: Any) -> bool:
 
 
 def read(document: Any, path: str | Path, options: Options) -> Motion:
-    """Read postures; without times they are no recording.
+    """Read postures; without times they are not a recording.
 
     Parameters
     ----------

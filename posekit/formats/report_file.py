@@ -128,7 +128,7 @@ def write_md(path: str | Path, report: Report) -> None:
 
 
 def _about(report: Report) -> dict[str, Any]:
-    """Return everything that is no array."""
+    """Return everything that is not an array."""
     about: dict[str, Any] = {"schema": REPORT_SCHEMA}
     about |= {name: list(getattr(report, name)) for name in TEXTS}
     return about | {name: plain(dict(getattr(report, name))) for name in MAPPINGS}

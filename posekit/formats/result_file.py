@@ -267,7 +267,7 @@ def _stacked(holders: Sequence[Mapping[str, Any]], name: str, *shape: int) -> Ar
 
 
 def _about(recovery: Recovery) -> dict[str, Any]:
-    """Return everything that is no array."""
+    """Return everything that is not an array."""
     return {
         "schema": RESULT_SCHEMA,
         **plain({name: getattr(recovery, name) for name in ABOUT}),
@@ -334,7 +334,7 @@ def _table_columns(table: Table) -> dict[str, Any]:
 
 
 def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Recovery:
-    """Make a recovery of arrays by name and of everything that is no array, also as one JSON text."""
+    """Make a recovery from arrays by name and from all other fields, a mapping or one JSON text."""
     if isinstance(about, str):
         about = json_file.parse(about.encode(), f"{path}: about")
     root, held = Node(about, path), {**dict(about.get("arrays") or {}), **columns}

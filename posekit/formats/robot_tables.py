@@ -241,7 +241,7 @@ def _value(columns: Mapping[str, Any], name: str) -> Array:
 
 
 def _joint_name(name: str) -> str:
-    """Take from a column's name what is no part of the joint's: ``dof_elbow(rad)``, ``elbow_dof`` are ``elbow``."""
+    """Strip prefix, suffix and unit from a column's name: ``dof_elbow(rad)``, ``elbow_dof`` become ``elbow``."""
     return re.sub(r"^dof_|_dof$|_pos$", "", re.sub(r"\s*[(\[](rad|deg)[)\]]$", "", name.strip()))
 
 
@@ -328,8 +328,8 @@ def root_quaternion(
     """Bring quaternions into the order x, y, z, w, and find the axis along which the robot stands.
 
     Without a stated order both are compared, in this order: by how upright the robot stands, by whether it heads where
-    it travels (its x axis points forward), and by custom (x, y, z, w). The length of each step of the rotation is the
-    same in both orders, so continuity decides nothing more.
+    it travels (its x axis points forward), and by convention (x, y, z, w). The length of each step of the rotation is
+    the same in both orders, so continuity decides nothing more.
 
     Parameters
     ----------
@@ -391,7 +391,7 @@ def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
         by = f"the robot leans {lean[first]:.0f} degrees by this order, {lean[second]:.0f} by the other"
         options.note(f"{reading} {SPELT[first]}: {by}")
         return first
-    options.note(f"{reading} x, y, z, w, by custom: the robot stands by both orders")
+    options.note(f"{reading} x, y, z, w, by convention: the robot stands upright with both orders")
     return "xyzw"
 
 

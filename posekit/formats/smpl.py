@@ -2,7 +2,7 @@
 
 Keys: ``poses`` (T, 3 K), rotation vectors of the joints in the model's order, or ``root_orient`` (T, 3) and
 ``pose_body`` (T, 63), or ``global_orient`` and ``body_pose``; ``trans`` or ``transl`` (T, 3), metres; ``betas`` (B,); a
-frame rate (Mahmood et al. 2019, *AMASS: Archive of Motion Capture as Surface Shapes*). z is up by custom.
+frame rate (Mahmood et al. 2019, *AMASS: Archive of Motion Capture as Surface Shapes*). By convention z is up.
 
 Joints at rest are those of the neutral SMPL model's mean shape unless the file has its own: shapes (``betas``) need the
 model's own files, which are not free to be shared. They change lengths by some per cent and no angle.

@@ -52,7 +52,7 @@ class Table:
 
     @classmethod
     def of_columns(cls, columns: dict[str, Any], about: dict[str, str], source: str) -> Table:
-        """Make a table of named arrays, as binary containers hold them."""
+        """Make a table from arrays by column name, such as the columns of a Parquet file."""
         table = cls([], ",", source)
         table.about, table.columns, table.names = about, columns, tuple(columns)
         return table

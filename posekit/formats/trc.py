@@ -1,9 +1,10 @@
 """TRC: tables of marker positions of OpenSim, Pose2Sim and Motion Analysis; MOT and STO: OpenSim's joint angles.
 
-TRC has five lines of header: ``PathFileType``; names of the trial's numbers; the numbers (``DataRate``, ``NumFrames``,
-``Units``, …); ``Frame#``, ``Time`` and the markers' names, one in three columns; ``X1``, ``Y1``, ``Z1``, …. Then a row
-a frame, with empty cells where a marker is missing (OpenSim documentation, *Marker (.trc) Files*). y is up by
-custom. MOT and STO have a header that ends in ``endheader`` (*Motion (.mot) Files*).
+TRC has five header lines: ``PathFileType``; the names of the trial's parameters (``DataRate``, ``NumFrames``,
+``Units``, …); their values; ``Frame#``, ``Time`` and the markers' names, each for three columns; the coordinates' names
+(``X1``, ``Y1``, ``Z1``, …). Each further line is a frame; the cells of a missing marker are empty (OpenSim
+documentation, *Marker (.trc) Files*). By convention y is up. MOT and STO have a header that ends in ``endheader``
+(*Motion (.mot) Files*).
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def _title_cells(table: Table, line: str) -> list[str]:
 
 
 def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
-    """Return the markers' names: one in three columns by custom, one a column in some files, doubled tabs in others."""
+    """Return the markers' names: usually one for three columns; some files have one for each, some doubled tabs."""
     every_third = tuple(cells[::3])
     if all(every_third) and not any(cells[1::3]) and not any(cells[2::3]):
         return every_third

@@ -177,7 +177,7 @@ def _head_points(node: Node, unit: str) -> dict[str, Array] | None:
 
 
 def _refuse_objects(image: Node) -> None:
-    """Refuse the view of an object that is no person: none of its points is a joint."""
+    """Refuse the view of an object that is not a person: none of its points is a joint of a body."""
     names = image.object()
     if len(names) > 1 and not any(name in POINTS for name in names):
         raise image.refused("the joints of a person", "recover another articulated object with --linkage")

@@ -57,5 +57,5 @@ def runs(which: Flags) -> list[tuple[int, int]]:
 
 
 def groups(at: Ints, apart: int) -> list[Ints]:
-    """Split ascending frames (N,) where two are more than so many frames apart."""
+    """Split ascending frame numbers (N,) where two neighbours differ by more than `apart`."""
     return np.split(at, np.flatnonzero(np.diff(at) > apart) + 1) if len(at) else []

@@ -182,7 +182,7 @@ class Motion(Record):
 
     @property
     def in_time(self) -> bool:
-        """Whether every frame of a recording has one posture: alternative postures are no motion."""
+        """Whether every frame of a recording has one posture: alternative postures are not a motion."""
         pairs = np.column_stack([np.asarray(self.clip), np.asarray(self.frame)])
         return len(self) > 1 and len(np.unique(pairs, axis=0)) == len(self)
 
@@ -216,7 +216,7 @@ class Motion(Record):
         return up_vector(self.up) if self.up else None
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice | Sequence[int]) -> Motion:
-        """Return some of the frames."""
+        """Return the motion of the selected frames."""
         kept = {name: getattr(self, name) for name in PER_FRAME if getattr(self, name) is not None}
         return replace(self, document=None, **{name: values[rows] for name, values in kept.items()})
 

@@ -337,7 +337,7 @@ def _is_view(path: Path) -> bool:
 
 
 def refuse_without_joints(held: Any, path: Path) -> None:
-    """Refuse motion whose points are no joints of a body."""
+    """Refuse motion whose points are not joints of a body."""
     if isinstance(held, Motion) and held.q is None and not np.isfinite(held.figure_joints).any():
         got = "no joint of a body among its points"
         remedy = "say which point is which joint with --layout FILE.toml"
@@ -355,7 +355,8 @@ def new_folder(folder: str | os.PathLike[str]) -> Path:
 def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None) -> str:
     """Write the clips that pass into a new folder, whole or not at all, with a table of all clips.
 
-    A file that passes whole is copied unchanged. Of others the frames that pass are written in the file's own format.
+    A file in which every frame passes is copied unchanged. From other files, the frames that pass are written in the
+    file's own format.
 
     Parameters
     ----------

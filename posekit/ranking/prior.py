@@ -142,7 +142,7 @@ class Prior(Record):
         Directions that are judged together, and whether only `up` is judged, given the others.
     temperature : float
         Metres: for exact postures the log-density of directions is divided by 1 + deviation / temperature. A posture
-        that is a centimetre off is no draw from a distribution that is sharp to a degree.
+        that is a centimetre off is not a draw from a distribution that is sharp to a degree.
     weights, noisy : mapping of str to float
         Weight of each term for exact postures, and for modes under noise.
     balance, contact : (float, float)

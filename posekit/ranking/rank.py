@@ -22,7 +22,7 @@ LEVEL_WITHIN_DEGREES: Final = 20.0
 #: Degrees of freedom of a misfit's t distribution: torsos give now and then by more than they mostly do.
 MISFIT_DEGREES_OF_FREEDOM: Final = 4.0
 
-#: Least deviation of a distance inside torso and hips: a real torso is no more rigid (CMU motion capture).
+#: Least deviation of a distance inside torso and hips: a real torso is not more rigid (CMU motion capture).
 MIN_DEVIATION_METRES: Final = 0.006
 
 #: Tolerance of rigid distances over the deviation of the survivors, as the weights were fitted.

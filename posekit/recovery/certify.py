@@ -60,11 +60,11 @@ def certified(
 def noisy_judge(
     figure: Figure, settings: RecoverSettings, lengths: LengthUncertainty, up: Array, *, photograph: bool
 ) -> PostureJudge:
-    """Return the judge of postures under noise.
+    """Return a judge of postures whose tolerances allow for noise.
 
-    The solver only pulls at limits: a posture may be beyond them by three of their deviations. Lengths may be off by
-    three of their own deviations, and by the common size unless the solver fits it, as it does before an uncalibrated
-    camera. Bodies may overlap, and the side of the shoulders may be open.
+    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. The error of a
+    length may also be three standard deviations. It includes the error of the body size, except in a photograph, where
+    the solver fits the size. Bodies may overlap, and the side on which the shoulders lie may be undetermined.
     """
     deviation = {name: lengths.own[name] if photograph else lengths.total(name) for name in figure.lengths}
     off = max(deviation[name] * length for name, length in figure.lengths.items())

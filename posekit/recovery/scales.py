@@ -139,7 +139,7 @@ LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
 
 
 def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
-    r"""Find the scale at which a body's segments look as long as they are seen, and the deviation of its logarithm.
+    r"""Find the scale at which a body's segments match their lengths in the image, and its log's deviation.
 
     Taylor's bound (2000, eq. 3) is the least scale at which no segment is too short: one segment would set the scale of
     all. Here each has its say. A segment of length l whose direction is spread evenly is seen as

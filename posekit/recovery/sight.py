@@ -205,7 +205,7 @@ def _head_pose(
     image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
     enough = np.isfinite(image).all(axis=2).sum(axis=1) >= ENOUGH_HEAD_POINTS
     unknown = isinstance(model, LeeChenCamera) and model.f is None
-    # A neck that was put between the shoulders is no point of the head.
+    # A neck that was placed between the shoulders is not a point of the head.
     if "neck" in view.derived or settings.root == "torso" or not enough.any():
         if unknown:
             raise refusal(view.source, "camera.f", "null", "six head points in head_image", "give them, or f")

@@ -97,7 +97,7 @@ def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple
             f"{len(left)} of {len(entries)} entries have no column and are neutral: {_listed(left)}."
         )
     if ignored:
-        notes.append(f"Columns that are no joint of {robot.name} are ignored: {_listed(ignored)}.")
+        notes.append(f"Columns that are not a joint of {robot.name} are ignored: {_listed(ignored)}.")
     return q, tuple(notes)
 
 

@@ -81,9 +81,9 @@ def find_joint_map(model: pin.Model, source: str = "") -> JointMap:
 def _derived(model: pin.Model) -> JointMap | None:
     """Derive a map from the names of the moving joints; None if an elbow, a knee, a shoulder or a hip is missing.
 
-    Of several joints at a shoulder or a hip the middle one is taken, near which all axes pass; elsewhere the first one
-    with such a name. The neck is the middle between the shoulders on the body that carries the arms, the pelvis the
-    body that carries the legs.
+    If a shoulder or a hip has several joints, the middle one is used, near which all axes pass; elsewhere the first
+    joint with such a name is used. The neck is the middle between the shoulders on the body that carries the arms, the
+    pelvis the body that carries the legs.
     """
     chains: dict[str, list[int]] = {}
     for joint in range(1, model.njoints):

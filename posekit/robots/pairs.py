@@ -52,9 +52,9 @@ def set_pairs(
 ) -> None:
     """Set the pairs of bodies to check.
 
-    With pairs that an SRDF disables, all other pairs of bodies on different joints. Without, all pairs but those of
-    neighbours, and those that touch in the neutral configuration. Of capsules that stand for a humanoid's parts, only
-    the pairs in `parts` are checked.
+    If an SRDF disables pairs, all other pairs of bodies on different joints are checked. Without one, all pairs are
+    checked except neighbours and pairs that touch in the neutral configuration. For capsules that stand for a
+    humanoid's parts, only the pairs in `parts` are checked.
     """
     geometry.addAllCollisionPairs()
     pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects

@@ -203,7 +203,7 @@ class Robot(Record):
         Raises
         ------
         InputError
-            If the robot is no humanoid, or the given map does not fit.
+            If the robot is not a humanoid, or the given map does not fit.
         """
         if self.joint_map_file:
             return load_joint_map(self.joint_map_file, self.model)

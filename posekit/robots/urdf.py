@@ -192,7 +192,7 @@ def _check_tree(robot: Element, check: Need) -> None:
 
 
 def _check_numbers(part: Element, place: str, check: Need) -> None:
-    """Refuse what is no number in a joint or a link; visual bodies are only drawn."""
+    """Refuse values of joints and links that are not numbers; visual bodies are exempt, as they are only drawn."""
     for element in (one for child in part if child.tag != "visual" for one in child.iter()):
         check("quat_xyzw" not in element.attrib, place, "a rotation as quat_xyzw", "rpy", "write it as rpy")
         for attribute, text in element.items():

@@ -91,7 +91,7 @@ class Normal:
         self.matrix[:, columns, columns] += d.transpose(0, 2, 1) @ d
 
     def put(self, rows: Ints, other: Normal, of: Flags | Ints | slice = slice(None)) -> None:
-        """Replace some postures by some of another's."""
+        """Overwrite the postures `rows` with the postures `of` of another instance."""
         for name, own in vars(self).items():
             own[rows] = getattr(other, name)[of]
 
@@ -150,7 +150,7 @@ def _length_terms(out: Normal, problems: Records, x: Array, free: Flags, sized: 
     r = w * (0.5 * np.log(q) - problems["log_length"][:, some] - x[:, SIZE:])
     bend = np.sqrt(np.maximum(w * r, 0.0) / q)[..., None, None]
     across = np.eye(3) - line[..., None] * line[..., None, :] / q[..., None, None]
-    # Of each segment: its own derivative, and its turns in three directions.
+    # For each segment: its own derivative, and its turns in three directions.
     rows = np.concatenate([(w / q)[..., None, None] * line[..., None, :], bend * across], axis=2)
     d = np.zeros((*rows.shape[:3], WIDTH))
     d[..., :SIZE] = np.einsum("sj,nski->nskji", INCIDENCE[some] * free, rows).reshape(*rows.shape[:3], SIZE)

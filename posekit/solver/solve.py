@@ -162,7 +162,7 @@ def _combined(
 ) -> tuple[Ints, Array, Array]:
     """Put limbs on trunks in all combinations that can pass: trunks (B,), unknowns (B, 43), and predicted chi2.
 
-    With `most`, only so many positions of each limb on a trunk, the best ones.
+    With `most`, keep only the `most` best positions of each limb on a trunk.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2

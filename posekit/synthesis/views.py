@@ -180,7 +180,7 @@ def walker_view(
     phase0: float = 0.0,
     carried: bool = True,
 ) -> View:
-    """View a walker with the camera of Lee & Chen 1985.
+    """Project a walker into the camera of Lee & Chen 1985.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def mocap_view(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> View:
-    """View one clip with one camera that stands still; the person has the median lengths of the frames shown.
+    """Project one clip into one static camera; the person has the median segment lengths of the chosen frames.
 
     Parameters
     ----------

@@ -325,7 +325,7 @@ def explained(body: Body) -> Explained:
 
 
 def duplicates(joints: Array) -> NDArray[np.intp]:
-    """Return the length of the run of duplicates that each frame is in (T,): 0 where it is no copy of the one before.
+    """Return the length of the run of duplicates around each frame (T,); 0 if it does not copy the frame before.
 
     A run counts where the body moves by more than a millimetre a frame shortly before and shortly after it, at an end
     of the clip on one side. Otherwise rounding is enough to make two frames one.
@@ -391,7 +391,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
 
 
 def _without_sides(joints: Array) -> Array:
-    """Return a posture without sides (T, 20, 3), metres, so that flickering labels are no wrong order.
+    """Return a posture without sides (T, 20, 3), metres, so that flickering labels are not treated as a wrong order.
 
     Neck, pelvis and the middles of pairs; and the vector d between a pair as its outer product with itself over its
     length, which is that of -d.

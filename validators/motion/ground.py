@@ -161,9 +161,9 @@ def soles(body: Body) -> tuple[Array, Array]:
 
 
 def speeds(body: Body, points: Array, frames: int = 1) -> Array:
-    """Return how fast points (T, P, 3) move, metres a second, from so many frames before to after; NaN at ends.
+    """Return the speeds of points (T, P, 3) from `frames` frames before to as many after, m/s; NaN at ends.
 
-    Under `TURNING_RATE` frames a second it is the faster of the way before and of that after a frame.
+    Below `TURNING_RATE` frames a second it is the larger of the speeds before and after the frame.
     """
     line = timeline_of(body)
     placed = line.spread(points)

@@ -28,7 +28,7 @@ DISPLACED_SHARE: Final = 0.5
 SIDE_FRAMES: Final = 3
 
 #: Multiples of the neighbours' own misfit that are subtracted from a jump: of one that comes back, and at an end of the
-#: clip. Fast motion at few frames per second fits no smooth curve, and is no jump.
+#: clip. Fast motion at few frames per second fits no smooth curve, and is not a jump.
 JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 
 
@@ -48,7 +48,7 @@ _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
 def jumps_of(joints: Array, step: float) -> Array:
-    """Measure the jumps of joints in slots of even time (S, 14, 3), so many seconds each (NaN where not known).
+    """Measure the jumps of joints (S, 14, 3) in slots of `step` seconds (NaN where not known).
 
     Returns
     -------
@@ -167,7 +167,7 @@ def displaced_by(joints: Array, step: float) -> Array:
 def _beyond(
     joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
 ) -> Array:
-    """Return the unexplained displacement (S,) within so many slots after each; 0 where all is explained.
+    """Return the unexplained displacement (S,) in the `count` slots after each slot; 0 if all is explained.
 
     It needs the joints, their mean (S, 3), and the number of empty slots before each (S + 1,).
     """

@@ -69,7 +69,7 @@ def exchanged_pairs(
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, one after the other in time; NaN is no evidence.
+        Metres, one after the other in time; NaN gives no evidence.
     feet : array (T, 4, 3)
         Right and left toe, right and left heel.
     head : array (T, 5, 3)

@@ -107,7 +107,7 @@ def sliding(
 def _slides(
     body: Body, points: Array, down: Flags, count: int, bounds: tuple[float, float, float, float]
 ) -> Flags:
-    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for so many slots.
+    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for at least `count` slots.
 
     The bounds are those of `sliding` for speed, unevenness and rise, and the noise of a speed, metres a second.
     """
@@ -128,7 +128,7 @@ def _slides(
     share = EVEN_SHARE if known.sum() > 1 else 0.0
     steady = differs < np.maximum(uneven, share * norm(even)) + noise
     steady &= sliding_window_view(flat, count).all(axis=1)
-    # Where noise lets feet differ by more than they slide, evenness is no evidence.
+    # Where noise lets feet differ by more than they slide, evenness is not evidence.
     steady &= norm(even) > max(fastest, noise / EVEN_SHARE)
     if noise > uneven:
         steady &= norm(even) < SWINGING_SPEED
@@ -191,7 +191,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
 
 
 def _ends(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
-    """Move the ends of a slide, by at most so many slots outward, to where what it gains (S - 1,) sums to most."""
+    """Move the ends of a slide, outward by at most `most` slots, to where its summed gain (S - 1,) is largest."""
     middle = (start + stop) // 2
     before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
     after = np.cumsum(gained[middle : stop + most])

@@ -151,7 +151,7 @@ def balance_still(
 
 def _stands(body: Body, slower: float, lasting: float) -> NDArray[np.bool_]:
     """Return the frames (T,) in which the body stands, and is still for long enough."""
-    # Over so many frames that noise is slow beside what is still.
+    # Over this number of frames, noise moves more slowly than the bound for standing still.
     noise = STILL_DEVIATIONS * body.noise / (np.sqrt(2) * body.dt)
     frames = len(body) if noise >= slower * len(body) else max(int(np.ceil(noise / slower)), 1)
     fast = np.nan_to_num(speeds(body, body.joints, frames), nan=0.0).max(axis=1)

@@ -97,7 +97,7 @@ def centred(values: Array, count: int, first: int) -> Array:
 
 
 def spaced(points: Array, weights: Sequence[float] | Array, apart: int) -> Array:
-    """Sum weights (K,) over K slots so many apart (S, ...), about each slot; NaN at the ends."""
+    """Return weighted sums of K slots, `apart` slots apart and centred on each slot (S, ...); NaN at the ends."""
     spread = np.zeros((len(weights) - 1) * apart + 1)
     spread[::apart] = weights
     return centred(filtered(points, spread), len(points), len(spread) // 2)

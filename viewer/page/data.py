@@ -94,7 +94,7 @@ def page_data(
 
 
 def _judged(motion: Motion, urdf: str) -> Report:
-    """Judge a motion by the usual checks; frames of a robot that is no humanoid one by one, without time."""
+    """Judge a motion by the default checks; without a joint map, each configuration of the robot by itself."""
     robot, q = drawn.configured(motion, urdf)
     if isinstance(robot, Figure):
         return Validator().check(motion)

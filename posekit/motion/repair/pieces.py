@@ -125,8 +125,8 @@ def carried(start: Array, end: Array, share: Array) -> Array:
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
     """Return bad frames, the good ones before and after each, and the share (n,) of the way between them.
 
-    At an end of the clip the two nearest good ones have shares below 0 or above 1. Of fewer than two good frames there
-    are none.
+    At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
+    frames the result is empty.
     """
     good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
     if len(good) < 2:

@@ -292,15 +292,15 @@ def load_linkage(name: str | Path) -> Linkage:
         raise refusal(name, "", shown(str(error)), "a TOML file of posekit.linkage/1", "correct it") from None
 
 
-#: Distance from all joints below which the base or the end of a limb is no point of its own.
+#: Minimum distance from all joints; nearer than this, the base or the end of a limb is not a separate point.
 MIN_POINT_DISTANCE_METRES: Final = 5e-3
 
 
 def linkage_of_robot(robot: Any) -> Linkage:
     """Make the linkage of a robot: origins of its turning joints, its base and the ends of its limbs.
 
-    Points that keep their distance in every configuration are joined, so that a body of three or more points is a
-    rigid triangle. They are found by their distances in random configurations.
+    Two points that keep their distance in every configuration are joined by a segment, so that a body of three or more
+    points is a rigid triangle. Such pairs are found by comparing their distances over random configurations.
 
     Parameters
     ----------

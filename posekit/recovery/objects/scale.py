@@ -24,8 +24,8 @@ from posekit.recovery.objects.linkage import read_nearer
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
 
-#: Largest number of assignments of flips that are tried. Of independent blocks of constraints the smallest determine
-#: the scale, as many as can be; one block alone may have more assignments.
+#: Largest number of assignments of flips that are tried. If constraints form independent blocks, the smallest blocks
+#: determine the scale, up to this number together; a single block may have more assignments.
 MAX_FLIPS, MAX_BLOCK_FLIPS = 1 << 15, 1 << 20
 
 #: Distance (rad) from the right angle at which the search ends: a thousand times the bound.
