@@ -298,8 +298,9 @@ def render(
 
     Parameters
     ----------
-    source : path, Motion, Recovery, View, Report or array
-        An array is joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
+    source : path, Motion, Recovery, View, Report, Robot or array
+        A robot is drawn at its neutral configuration. An array is joints (T, 14, 3), or (T, J, 3) in the order of the
+        `layout`.
     target : path
     layout, urdf, rate
         As in `posekit.open`.

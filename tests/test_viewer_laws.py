@@ -14,6 +14,7 @@ from PIL import Image
 
 import posekit
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
+from posekit.motion import Motion
 from posekit.skeleton import DOFS, JOINT, TREE_SEGMENTS
 from posekit.viewer.scene import Stage, camera_lines
 from posekit.viewer.subjects import subjects_of
@@ -152,6 +153,18 @@ CHAIN = """<robot name="chain"><link name="base"/><link name="right_arm"/><link 
 <joint name="b" type="fixed"><parent link="right_arm"/><child link="right_hand"/><origin xyz="0 0 0.3"/></joint>
 <joint name="c" type="revolute"><parent link="base"/><child link="left_arm"/><origin xyz="0 0.01 0"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_a_urdf_is_drawn_at_its_neutral_configuration(folder: Path) -> None:
+    path = folder / "figure.urdf"
+    path.write_text(FIGURE.urdf, encoding="utf-8")
+    robot = posekit.load_robot(path)
+    posekit.render(path, folder / "urdf.html")
+    posekit.render(robot, folder / "robot.html")
+    neutral = Motion(q=robot.neutral[None], q_names=robot.configuration_names, robot=str(path))
+    posekit.render(neutral, folder / "neutral.html")
+    pages = [data_of(folder / f"{name}.html") for name in ("urdf", "robot", "neutral")]
+    assert pages[0]["packed"] == pages[1]["packed"] == pages[2]["packed"]
 
 
 def test_a_page_of_a_robot_joins_each_link_to_its_parent(folder: Path) -> None:

@@ -332,7 +332,9 @@ def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subj
 
 
 def as_motion(source: Any) -> Any:
-    """Return an array (T, 14, 3) or (14, 3), or the truth of a view, as a motion; other objects unchanged."""
+    """Return an array (T, 14, 3) or (14, 3), the truth of a view, or a robot at neutral as a motion; others as is."""
+    if isinstance(source, Robot):
+        return Motion(q=source.neutral[None], q_names=source.configuration_names, robot=source.source)
     if isinstance(source, View):
         return Motion(joints=source.truth, time=source.time, up="-y", source=source.source)
     if isinstance(source, Sequence | np.ndarray):
