@@ -153,6 +153,7 @@ def test_guessed_cameras():
     assert camera.K[0, 0] == pytest.approx(320)
     assert camera.guessed
     assert camera.fields()["deviation"] == camera.deviation
+    assert camera.K[:2, 2] == pytest.approx([319.5, 239.5])  # the middle of pixels 0 to 639 and 0 to 479
 
 
 def test_pose_and_fields():

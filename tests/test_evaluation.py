@@ -180,6 +180,9 @@ def test_motion_becomes_the_truth_of_a_view_in_other_axes(late: float) -> None:
         with_truth(seen, upside_down)
     with pytest.raises(InputError, match="R and t"):
         with_truth(builtin_view("seq1"), motion)
+    hidden = Motion(joints=np.full_like(other.joints, np.nan), joint_names=POINTS, time=motion.time)
+    with pytest.raises(InputError, match="no frame"):
+        with_truth(seen, hidden)
 
 
 def test_motion_becomes_the_truth_of_a_result() -> None:

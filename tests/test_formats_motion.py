@@ -237,6 +237,14 @@ def test_a_damaged_bvh_file_is_refused_with_the_reason(
         posekit.open(tmp_path / "bad.bvh")
 
 
+def test_a_damaged_bvh_file_is_refused_with_its_line(tmp_path: Path) -> None:
+    lines = bvh_of(walking(), tmp_path).split("\n")
+    lines[-5] = "1.0 2.0"
+    (tmp_path / "bad.bvh").write_text("\n".join(lines))
+    with pytest.raises(posekit.InputError, match=f"line {len(lines) - 4}: .*2 values"):
+        posekit.open(tmp_path / "bad.bvh")
+
+
 def test_a_bvh_file_with_fewer_frames_than_it_states_says_so(tmp_path: Path) -> None:
     text = bvh_of(walking(), tmp_path)
     (tmp_path / "cut.bvh").write_text(text[: text.rstrip().rfind("\n") + 1])

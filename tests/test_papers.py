@@ -161,6 +161,11 @@ def test_rows_are_written_for_people_and_programs(rows: Rows, tmp_path: Path) ->
     assert all(one.place in text for one in rows) and f"{len(rows)} rows" in text
 
 
+def test_rows_are_counted_by_verdict() -> None:
+    few = Rows(row("leaves", "2^13", agrees) for agrees in (True, True, False))
+    assert few.counts() == "3 rows: 2 agree, 1 differ, 0 are open."
+
+
 def test_a_row_that_agrees_needs_no_reason() -> None:
     assert row("leaves", "2^13 = 8196", True).why == ""
     assert row("leaves", "2^13 = 8192", False).why == "misprint"

@@ -91,6 +91,16 @@ def test_an_angle_is_rejected_beyond_the_end_of_its_range(table: str, dof: str, 
             assert row.margin == pytest.approx(-1.0, abs=ROUNDING)
 
 
+@pytest.mark.parametrize("raised", [60.0, 100.0, 125.0])
+def test_an_elbow_bends_about_the_axis_that_the_arm_carries(raised: float) -> None:
+    validator = posekit.Validator(checks=["joint-range"], ranges="table1", strict=True)
+    for side in ("right", "left"):
+        pose = {f"{side}_shoulder__abduction": raised, f"{side}_elbow__flexion": 161.0}
+        found = validator.check(posed(**pose)).to_pandas()
+        (row,) = found[found.place == f"{side}_elbow.flexion"].itertuples()
+        assert row.value == pytest.approx(161.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [70.5, 120.0])
 def test_an_arm_is_raised_by_less_backward_than_forward(degrees: float) -> None:
     validator = posekit.Validator(checks=["joint-range"], strict=True)
