@@ -340,6 +340,20 @@ def test_what_is_no_check_is_refused_with_a_remedy(given: Any, words: str) -> No
         posekit.Validator(checks=[given])
 
 
+@pytest.mark.parametrize(("nearer", "invalid"), [(0.03, 0), (0.07, 15)])
+def test_shoulders_come_nearer_by_as_much_as_clavicles_turn(nearer: float, invalid: int) -> None:
+    joints = np.repeat(FIGURE.points(FIGURE.neutral[None]), 60, axis=0)
+    joints += np.random.default_rng(0).normal(0, 0.002, joints.shape)
+    right, left = JOINT["right_shoulder"], JOINT["left_shoulder"]
+    across = joints[45:, left] - joints[45:, right]
+    inward = nearer / 2 * across / np.linalg.norm(across, axis=1, keepdims=True)
+    joints[45:, right] += inward
+    joints[45:, left] -= inward
+    found = posekit.Validator(checks=["rigid-parts"]).check(joints).to_pandas()
+    # 2 · 0.8 · 20 cm · (1 - cos 30°) = 4.3 cm, and the tolerance of measured bones.
+    assert (found.place == "right_shoulder-left_shoulder").sum() == invalid
+
+
 def test_a_function_becomes_a_check_and_says_what_it_lacks() -> None:
     @posekit.check("low-feet", unit="m", reads=("joints", "up"))
     def low_feet(body: Body, *, most: float = 1.0) -> Judgement:

@@ -88,6 +88,13 @@ def test_the_stored_configurations_are_the_ones_written_as_bvh(tmp_path: Path) -
     assert np.abs(head - figure.forward_kinematics(q)[:, 14:]).max() < 2e-7
 
 
+def test_an_arm_on_a_fixed_base_has_joints_only(tmp_path: Path) -> None:
+    q, names = np.random.default_rng(0).uniform(-0.3, 0.3, (5, 9)), tuple(f"joint_{k}" for k in range(9))
+    np.savez(tmp_path / "arm.npz", q=q, configuration_names=names)
+    arm = posekit.open(tmp_path / "arm.npz")
+    assert arm.q_names == names and np.array_equal(arm.q, q)
+
+
 @pytest.mark.parametrize("ending", [".npz", ".csv", ".tsv", ".parquet"])
 def test_a_robots_configurations_are_read_again(tmp_path: Path, ending: str) -> None:
     motion = squatting()
