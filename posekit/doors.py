@@ -24,7 +24,7 @@ Source = Any
 def opened(source: Source, layout: str = "", **facts: Any) -> Any:
     """Return the content of a path or of an array in the order of a layout; other objects unchanged."""
     from posekit.formats import open as open_file
-    from posekit.motion.validation import has_layout
+    from posekit.formats.arrays import has_layout
 
     if isinstance(source, str | PathLike) or has_layout(source, layout):
         return open_file(source, layout, **facts)
@@ -332,7 +332,9 @@ def render(
     from posekit.viewer import draw
 
     name = source if isinstance(source, str | PathLike) else "render"
-    source, view = opened(source, layout, rate=rate, urdf=urdf), opened(view)
+    source = opened(source, layout, rate=rate, urdf=urdf)
+    if isinstance(view, str | PathLike):
+        view = opened(view)
     if isinstance(source, dict | Detections):
         expected = "postures, motion, a result, a view or a report"
         raise refusal(name, "", kind_of(source), expected, "recover key points first")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,19 @@ def test_configurations_are_judged_by_their_urdf_and_by_ranges_where_they_are_as
     assert by_urdf.ok.all() and not asked.ok.all()
     again = posekit.Validator(ranges="anatomical", checks=["joint-range"]).check(q)
     assert np.array_equal(asked.ok, again.ok)
+
+
+@pytest.mark.parametrize("values", [[[1.0, 2.0], [3.0]], np.array([["a", "b"]])])
+def test_a_list_that_is_no_array_is_refused_by_every_door(values: Any, tmp_path: Path) -> None:
+    def refused(door: Callable[..., Any], *arguments: Any) -> None:
+        with pytest.raises(posekit.InputError, match=r"^(?!.*\n)"):
+            door(values, *arguments)
+
+    for door in (posekit.open, posekit.validate, posekit.repair, posekit.recover):
+        refused(door)
+    refused(posekit.convert, tmp_path / "a.npz")
+    refused(posekit.render, tmp_path / "a.html")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("body", ["figure", "g1"])

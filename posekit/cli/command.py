@@ -122,10 +122,6 @@ def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return joined
 
 
-#: Options of everything that reads a file, by the names of `posekit.open`.
-READING: Final = ("layout", "unit", "up", "rate", "urdf")
-
-
 def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Declare the options by which key points become a view."""
     calibration = "Calibration of the camera. Default: none is known."

@@ -13,6 +13,7 @@ from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.options import Options
 from posekit.geometry import Array
 from posekit.motion.motion import Motion
+from posekit.skeleton import JOINTS, POINTS
 
 
 def numbers(values: Any) -> Array:
@@ -24,9 +25,24 @@ def numbers(values: Any) -> Array:
         If they are not numbers.
     """
     try:
-        return np.asarray(values, dtype=np.float64)
+        return np.asarray(values).astype(np.float64, casting="same_kind", copy=False)
     except (TypeError, ValueError):
         raise refusal("", "array", f"a {type(values).__name__}", "a path, an object or numbers") from None
+
+
+def has_layout(given: Any, layout: str | None) -> bool:
+    """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's.
+
+    Raises
+    ------
+    InputError
+        If they are not numbers.
+    """
+    if not isinstance(given, list | tuple | np.ndarray):
+        return False
+    shape = numbers(given).shape
+    known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
+    return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
 
 
 def motion_of(values: Any, options: Options) -> Motion:

@@ -8,8 +8,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from posekit.errors import refusal, shown
 from posekit.files import read_bytes
 from posekit.formats.node import undamaged
@@ -153,10 +151,11 @@ def open(  # the door's name, as in `gzip.open`
     if rate is not None and not 0 < rate < float("inf"):
         raise refusal("", "rate", shown(rate), "frames a second, above 0", "state another")
     if not isinstance(path, str | PathLike):
-        from posekit.formats.arrays import key_points_of, motion_of
+        from posekit.formats.arrays import key_points_of, motion_of, numbers
 
-        flat = np.ndim(path) > 2 and np.shape(path)[-1] == 2
-        return key_points_of(path, options) if flat else motion_of(path, options)
+        points = numbers(path)
+        flat = points.ndim > 2 and points.shape[-1] == 2
+        return key_points_of(points, options) if flat else motion_of(points, options)
     if suffix_of(Path(path)) == ".urdf":
         from posekit.robots import load_robot
 

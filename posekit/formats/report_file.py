@@ -20,7 +20,7 @@ from posekit.formats.json_file import nullable
 from posekit.formats.node import Node, schema_of, undamaged
 from posekit.formats.options import Options
 from posekit.formats.result_file import plain
-from posekit.formats.tables import Table, csv_text
+from posekit.formats.tables import Table, columns_of_rows, csv_text
 from posekit.formats.view_file import check_schema
 
 if TYPE_CHECKING:
@@ -101,25 +101,27 @@ def write_npz(path: str | Path, report: Report) -> None:
 
 def write_csv(path: str | Path, report: Report, *, clips: bool = False) -> None:
     """Write the table of findings, or that of clips, as CSV."""
-    write_bytes(path, csv_text(_clip_table(report) if clips else report.table()).encode())
+    write_bytes(path, csv_text(_table(report, clips)).encode())
 
 
 def write_parquet(path: str | Path, report: Report, *, clips: bool = False) -> None:
     """Write the table of findings, everything else in its metadata; or that of clips."""
     from posekit.formats.parquet import packed_table
 
-    held = _about(report) | {key: nullable(values) for key, values in _arrays(report).items()}
-    about = {} if clips else {"posekit": json.dumps(held, allow_nan=False)}
-    table = (_clip_table(report) if clips else report.table()).items()
+    about = {}
+    if not clips:
+        held = _about(report) | {key: nullable(values) for key, values in _arrays(report).items()}
+        about["posekit"] = json.dumps(held, allow_nan=False)
+    table = _table(report, clips).items()
     columns = {key: one.astype(np.str_) if one.dtype == object else one for key, one in table}
     write_bytes(path, packed_table(columns, about))
 
 
-def _clip_table(report: Report) -> dict[str, NDArray[Any]]:
+def _table(report: Report, clips: bool) -> dict[str, NDArray[Any]]:
+    """Return the columns of the table of clips, or of that of findings."""
     from posekit.validators.report import clip_rows
 
-    rows = clip_rows(report)
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return columns_of_rows(clip_rows(report)) if clips else report.table()
 
 
 def write_md(path: str | Path, report: Report) -> None:

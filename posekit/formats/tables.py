@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Final
 
@@ -212,6 +212,11 @@ def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[
     points = np.full((len(found), count, values.shape[1]), np.nan)
     points[row.reshape(-1), point] = values
     return found, first, points
+
+
+def columns_of_rows(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Return the columns of rows that have the same names."""
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def csv_text(columns: dict[str, Any], delimiter: str = ",") -> str:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.geometry.vectors import Array
-
-Unit = Literal["m", "cm", "mm"]
 
 #: Units in one metre. They are whole numbers, so that a division by them is correctly rounded.
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}

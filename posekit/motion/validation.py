@@ -17,7 +17,6 @@ from posekit.errors import InputError, refusal, shown
 from posekit.motion.motion import Motion
 from posekit.progress import watched
 from posekit.settings import EXACT, Tolerance, ValidateSettings, number, stated
-from posekit.skeleton import JOINTS, POINTS
 from posekit.validators.judge import Validator, validate_motion
 from posekit.validators.report import GROUND_NOTE, ClipDecision, Report, clip_rows, joined, plural
 
@@ -110,13 +109,6 @@ def are_paths(given: Any) -> bool:
     return all(isinstance(one, str | os.PathLike) for one in several)
 
 
-def has_layout(given: Any, layout: str | None) -> bool:
-    """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's."""
-    shape = np.shape(given) if isinstance(given, list | tuple | np.ndarray) else ()
-    known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
-    return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
-
-
 def files_of(given: Any) -> Iterator[Path]:
     """Yield the files that paths, folders and patterns stand for.
 
@@ -197,8 +189,10 @@ class Judge:
 
     def motion(self, given: Any, facts: Mapping[str, Any]) -> Motion:
         """Return an array or a motion with the facts that are stated beside it."""
+        from posekit.formats.arrays import has_layout
+
         layout, unit, up, rate = (facts.get(name) for name in ("layout", "unit", "up", "rate"))
-        if not isinstance(given, Motion) and has_layout(given, layout):
+        if has_layout(given, layout):
             import posekit
 
             opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate)
@@ -377,7 +371,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     InputError
         If the folder holds something, or a file cannot be read or written.
     """
-    from posekit.formats.tables import csv_text
+    from posekit.formats.tables import columns_of_rows, csv_text
 
     folder = new_folder(folder)
     part = folder.with_name(f".{folder.name}.part")
@@ -385,8 +379,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     part.mkdir(parents=True)
     try:
         rows = list(_kept(report, part, spans))
-        table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        (part / CLIP_TABLE).write_text(csv_text(table), encoding="utf-8")
+        (part / CLIP_TABLE).write_text(csv_text(columns_of_rows(rows)), encoding="utf-8")
         if folder.exists():
             folder.rmdir()
         part.rename(folder)
