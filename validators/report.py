@@ -515,7 +515,7 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
-    """Return what reports say of checks: their rank among causes, whether repair helps, the user's next step."""
+    """Return the table of checks for reports: their rank among causes, whether repair helps, the user's next step."""
     return tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
 
 

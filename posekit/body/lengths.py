@@ -326,7 +326,7 @@ def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, f
 
 
 def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, float]:
-    """Return how far along start-end, and how far from that line, the third corner of a triangle is."""
+    """Return the third corner of a triangle: its place along the line start-end, and its distance from that line."""
     base, near, far = (
         lengths[f"{a}-{b}"] if f"{a}-{b}" in lengths else lengths[f"{b}-{a}"]
         for a, b in ((start, end), (start, apex), (apex, end))

@@ -208,7 +208,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
 
 
 def _degenerate(head: HeadPoints, plane: Array, seen: Flags) -> list[str]:
-    """Return why each frame determines no camera; empty if it does."""
+    """Return the reason why each frame determines no camera; empty for a frame that determines one."""
     reasons = [degeneracy(head.names, head.points, pattern) for pattern in seen]
     along, across = np.linalg.svd(_centred(plane, seen)[2], compute_uv=False).T
     for frame in np.flatnonzero(across <= DEGENERATE_EXTENT * along):
@@ -350,7 +350,7 @@ class _Problem(NamedTuple):
         return _pose(R, shift, scale, np.zeros(len(R)) if self.free else scale)
 
     def behind(self, cost: Array) -> Flags:
-        """Tell where a head behind the camera fits better: it looks like its mirror image in front."""
+        """Return the frames (F,) that a head behind the camera fits better; it looks like its mirror image in front."""
         mirrored = self._replace(points=self.points * [1.0, 1.0, -1.0])
         other = mirrored.fit(mirrored.start())[1]
         ratio = np.maximum(other, self.rounding) / np.maximum(cost, self.rounding)

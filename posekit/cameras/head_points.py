@@ -71,7 +71,7 @@ class HeadPoints(Record):
 
 
 def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
-    """Return why the points (P, 3) that are `seen` (P,) cannot determine a camera; empty if they can."""
+    """Return the reason why the points (P, 3) that are `seen` (P,) determine no camera; empty if they do."""
     count = int(seen.sum())
     if count < MIN_POINTS:
         missing = [name for name, visible in zip(names, seen, strict=True) if not visible]

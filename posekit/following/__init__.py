@@ -1,1 +1,1 @@
-"""People through frames: detections and who is who in them, paths through recovered frames, live tracking."""
+"""People over many frames: detections, tracks of people, paths through recovered postures, and live tracking."""

@@ -88,7 +88,7 @@ class Moving(NamedTuple):
 
 
 def steps(seconds: float) -> tuple[Array, Array]:
-    """Return how a state goes on for a time, and the covariance that an acceleration of density one adds."""
+    """Return the transition matrix over a time, and the covariance that an acceleration of density one adds."""
     one, t = np.eye(3), seconds
     noise = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
     return np.kron(np.array([[1.0, t], [0.0, 1.0]]), one), np.kron(noise, one)

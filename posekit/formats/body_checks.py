@@ -192,7 +192,7 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
 
 
 def _misfit(layout: Layout, points: Array) -> float:
-    """Return how badly limbs of both sides agree and stated middles lie, 1 at the bounds."""
+    """Return the misfit of a layout: limbs of unequal sides, and stated middles off their place; 1 at the bounds."""
     found = layout.gather(points[:, : len(layout.points)])
     if not set(LIMBS) <= set(found):
         return np.inf

@@ -188,7 +188,7 @@ def _encoded(text: str, encoding: str = "latin1") -> bytes:
 
 
 def _plain_names() -> dict[tuple[str, str], Any]:
-    """Return what a pickle may name: makers of arrays, numbers and plain containers."""
+    """Return the names that a pickle may use: makers of arrays, numbers and plain containers."""
     found: dict[tuple[str, str], Any] = {
         ("numpy", "ndarray"): None,
         ("numpy", "dtype"): lambda spec, *_: _Pending("dtype", spec),
@@ -224,7 +224,7 @@ class _Plain(pickle._Unpickler):
         self.stream, self.source, self.names = file, source, {**PLAIN_NAMES, **(extra or {})}
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return what a pickle names, if it is one of the plain ones."""
+        """Return the object of a name that a pickle may use; refuse any other."""
         if (module, name) not in self.names:
             expected = "arrays, numbers, strings, lists and dicts"
             remedy = "save its arrays with numpy.savez"
@@ -242,7 +242,7 @@ class _Plain(pickle._Unpickler):
 
 
 def unpickled(data: bytes, source: str) -> Any:
-    """Return what a pickle holds, as it nests it, with lists in place of tuples; no code of it is run."""
+    """Return the content of a pickle, nested in the same way, with lists in place of tuples; its code is not run."""
     return _unpickled(io.BytesIO(_unpacked(data)), source)
 
 

@@ -158,7 +158,7 @@ def _columns(recovery: Recovery) -> dict[str, NDArray[Any]]:
 
 
 def _frame_fields(recovery: Recovery) -> Iterator[dict[str, Any]]:
-    """Go through the frames as JSON has them, in the file's unit; survivors are counted within each frame."""
+    """Yield the frames as JSON objects in the file's unit; the survivors of each frame are numbered from 0."""
     per, frames, tables = PER_METRE[recovery.unit], recovery.frames, _other_arrays(recovery)
     columns = {
         name: nullable(values * per**power if (power := COLUMNS[name].power) else values)

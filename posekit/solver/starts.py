@@ -55,7 +55,7 @@ def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array,
 
 
 def necks(problem: Problem) -> tuple[Ints, Array]:
-    """Return where necks may be: frames (K,), ascending, and positions (K, 3)."""
+    """Return possible places of necks: their frames (K,), ascending, and positions (K, 3)."""
     rooted, p, (origins, directions) = problem.rooted, problem.records, problem.rays
     deep = (p["root_weight"][:, 2, 2] > 0) & problem.seen_joints[:, 0]
     known = rooted | deep | (not problem.perspective)

@@ -159,7 +159,7 @@ def _apart(values: Array, wanted: Array) -> Array:
 
 
 def _euler(motion: Motion) -> dict[str, Any]:
-    """Return how a robot's table writes the rotation of the root as angles; empty if it does not."""
+    """Return the fields by which a robot's table writes the root's rotation as angles; empty if it has none."""
     turn = (
         load_layout(motion.layout).fields.get("rotation", {})
         if motion.q is not None and motion.layout
