@@ -210,7 +210,7 @@ def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Entry]:
     Raises
     ------
     InputError
-        If a process dies, as of lack of memory; what is done stays, and a new run goes on.
+        If a process dies, for example from lack of memory. Finished outputs remain, and a new run continues.
     """
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:

@@ -320,7 +320,7 @@ def render(
     Raises
     ------
     InputError
-        If there is nothing to draw, or the target is none of these.
+        If there is nothing to draw, or if the target has another suffix.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Errors, and the one line that refuses an input: source, field, value, what was expected, what to do."""
+"""Errors, and the one line that refuses an input: source, field, value, expected values, remedy."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def read_table(name: str, folder: str, built_in: Sequence[str], schema: str, opt
     Parameters
     ----------
     name : str
-        One of `built_in`, which are files in a folder of `DATA`, or the path of a file.
+        One of the names `built_in`, or the path of a file.
     folder, schema, option : str
         That folder, the schema that the table must state, and the option with which it is given, for errors.
 

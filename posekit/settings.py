@@ -1,4 +1,4 @@
-"""Everything that a recovery or a validation is asked: one frozen record each, handed down whole.
+"""Settings of a recovery and of a validation: one frozen record each, passed on as a whole.
 
 The command line makes its options from the fields of these records. Lengths and pixels can be given as numbers or as
 text with a unit.
@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, Self, get_args
 from posekit.errors import nearest, refusal, shown
 from posekit.geometry import PER_METRE, Record
 
-#: Units that a number may carry as text, and how many of them make a metre, pixel, degree, second or one.
+#: Units of numbers given as text, and how many of each make one metre, pixel, degree or second; 100 % is one.
 UNITS: Final = {**PER_METRE, "in": 1 / 0.0254, "ft": 1 / 0.3048, "px": 1.0, "deg": 1.0, "s": 1.0, "%": 100.0}
 
 #: Largest accepted relative standard deviation of lengths (dimensionless).
@@ -46,7 +46,7 @@ def number(
     name : str
         Name of the argument, for the error.
     expected, remedy : str
-        Words of the error: the expected value, and the remedy.
+        The expected value and the remedy, for the error.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class Tolerance:
     angle : float
         Directions of segments and joint angles, degrees.
     hips : float
-        Part of `rigid` that the distance between the hips may differ by, 0 to 1: the pelvis is bone.
+        Allowed difference of the distance between the hips as a part of `rigid`, 0 to 1: the pelvis is bone.
     """
 
     rigid: float
@@ -96,7 +96,7 @@ class Tolerance:
         return self.rigid <= EXACT.rigid
 
 
-#: For exact image points: rounding only.
+#: Tolerance for exact image points: rounding only.
 EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9)
 
 #: For measured points and bodies: a real torso varies by centimetres (CMU motion capture, 16 clips).
@@ -207,7 +207,7 @@ class Settings(Record):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RecoverSettings(Settings):
-    """Settings of a recovery: the fields of `Settings`, and these.
+    """Settings of a recovery: the fields of `Settings`, and those listed here.
 
     Parameters
     ----------
@@ -291,22 +291,22 @@ class RecoverSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ValidateSettings(Settings):
-    """Settings of a validation: the fields of `Settings`, and these.
+    """Settings of a validation: the fields of `Settings`, and those listed here.
 
     Parameters
     ----------
     noise : float, optional
         Standard deviation of measured coordinates, metres. By default it is estimated from the limbs' lengths.
     strict : bool
-        Judge postures as those of the model itself: its lengths, rounding alone.
+        Judge postures as the model's own: with its lengths, and a tolerance for rounding only.
     ground : float, optional
         Height of the ground along the up axis, metres. By default it is estimated from each clip.
     profile : str
         Checks over time and their thresholds: ``posekit``, ``phuma``, ``protomotions``, ``holomotion`` or the path of
         a TOML table.
     bodies : {"auto", "meshes", "capsules", "none"}
-        Collision bodies of a robot: those of its URDF, capsules, or none. ``auto`` takes capsules where no two bodies
-        of the URDF can touch.
+        Collision bodies of a robot: its URDF's, capsules, or none. ``auto`` takes capsules if no two bodies of the URDF
+        can touch.
     srdf : str, optional
         Path of the robot's SRDF, which lists pairs that are not checked.
     package_dirs : sequence of str
@@ -345,7 +345,7 @@ def stated(**given: Any) -> dict[str, Any]:
 
 
 def asdict_shallow(settings: Settings) -> dict[str, Any]:
-    """Return the fields by name without copying what they hold."""
+    """Return the fields by name; their values are not copied."""
     return {one.name: getattr(settings, one.name) for one in fields(settings)}
 
 

@@ -63,9 +63,9 @@ def draw(
     Raises
     ------
     InputError
-        If there is nothing to draw, or the target is none of these.
+        If there is nothing to draw, or if the target has another suffix.
     ViewerError
-        If a picture needs a browser and there is none, or it fails.
+        If a picture needs a browser, and no browser is installed or it fails.
 
     Examples
     --------

@@ -51,7 +51,7 @@ def find_browser() -> str:
     Raises
     ------
     ViewerError
-        If there is none, or the variable names none.
+        If no browser is found, or if the variable names a file that does not exist.
     """
     named = os.environ.get(VARIABLE)
     names = [named] if named else NAMES
@@ -76,7 +76,7 @@ class Browser:
     Raises
     ------
     ViewerError
-        If there is none, or it does not start.
+        If no browser is found, or if it does not start.
     """
 
     def __init__(self, *, size: tuple[int, int] = (1280, 720), timeout: float = 60.0) -> None:
@@ -239,7 +239,7 @@ def _start(program: str, folder: Path) -> tuple[int, int, int]:
 
 
 def _high(fd: int) -> int:
-    """Move a descriptor away from those that the browser's pipes will have."""
+    """Move a file descriptor away from the numbers that the browser's pipes will have."""
     moved = fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10)
     os.close(fd)
     return moved

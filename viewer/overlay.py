@@ -161,9 +161,9 @@ def _outlines(
 ) -> list[tuple[str, Array]]:
     """Return name and outline (48, 2) of each capsule of a posture, the farthest first.
 
-    An outline is the convex hull of what is seen of the capsule's two spheres, by its support in 48 directions. From
-    the centre of projection a sphere of radius r at c shows the circle about c (1 - r^2 / c^2), across c, of radius
-    r sqrt(1 - r^2 / c^2); in parallel rays the circle about c itself.
+    An outline is the convex hull of the images of the capsule's two spheres, from its support in 48 directions. From
+    the centre of projection a sphere of radius r at c shows the circle about c (1 - r^2 / c^2), across c, of radius r
+    sqrt(1 - r^2 / c^2); in parallel rays the circle about c itself.
     """
     turns = 2 * np.pi * np.arange(CORNERS) / CORNERS
     directions, found = np.stack([np.cos(turns), np.sin(turns)]), []

@@ -304,7 +304,7 @@ def pictures(
     Raises
     ------
     InputError
-        If the size is none that can be drawn.
+        If the size cannot be drawn.
     ViewerError
         If there is no browser, it fails, or a picture is flat.
     """

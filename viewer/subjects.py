@@ -1,4 +1,7 @@
-"""What is drawn: bodies over time as configurations of robots, in a world whose z points up and whose -y is the eye."""
+"""Subjects of a picture: bodies over time as configurations of robots.
+
+The world's z points up; the eye looks along +y.
+"""
 
 from __future__ import annotations
 
@@ -123,8 +126,8 @@ def subjects_of(
     ----------
     source : Motion or Recovery
     which : str
-        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers as ``0,4``. By default those that
-        stand for a frame in a still picture, and the followed path or the answers in a moving one.
+        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers as ``0,4``. By default a still picture
+        shows the frame's representatives, and a moving one the followed path or the answers.
     frame : int or (int, int), optional
         Frame, or first and last, from 0.
     urdf : str
@@ -261,7 +264,7 @@ def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None)
     Raises
     ------
     InputError
-        If there is none.
+        If the source has no body to draw.
     """
     counts, source = (
         np.bincount(recovery.survivors.frame, minlength=len(recovery)),

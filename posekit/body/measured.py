@@ -147,8 +147,8 @@ def _shoulders_behind(joints: Array) -> bool | None:
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
     """Return a figure with the lengths of a person, as far as they are plausible.
 
-    Implausible lengths are replaced by those of the figure at the person's size; if no plausible body is near the
-    lengths, all are replaced except the limbs'. Clips of one skeleton share a figure.
+    Implausible lengths are replaced by the figure's lengths at the person's size. If no plausible body is near the
+    lengths, all lengths except the limbs' are replaced. Clips of one skeleton share a figure.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def rewrite(
 ) -> str:
     """Write the figure's URDF with other capsules, lengths and head.
 
-    Masses and moments are those of a person of these lengths.
+    Masses and moments of inertia are computed for a person of these lengths.
 
     Parameters
     ----------

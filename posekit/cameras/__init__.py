@@ -1,4 +1,4 @@
-"""Cameras, and what they saw of a person: image points as a `View`."""
+"""Cameras, and a person's image points in one of them: `View`."""
 
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift

@@ -72,7 +72,7 @@ class HeadPose(Record):
     Attributes
     ----------
     head : HeadPoints
-        The points that were placed.
+        The head points, in the camera frame.
     reasons : tuple of str
         Why a frame gives no pose; empty if it does. Its R, t, f and points are then NaN.
     R_cam_head : array (F, 3, 3)

@@ -32,7 +32,7 @@ class HeadPoints(Record):
     names : tuple of str
         One a point, each once.
     points : array (P, 3)
-        Metres. The origin of the frame is free: in Table A.2 the neck is at (-0.34, 0.52, 0).
+        Metres. The origin of the frame is arbitrary: in Table A.2 the neck is at (-0.34, 0.52, 0).
 
     Raises
     ------

@@ -41,7 +41,7 @@ def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> A
     distortion : array (n,)
         Coefficients in OpenCV's order, n one of `COEFFICIENT_COUNTS`.
     fisheye : bool
-        Whether they are those of the fisheye model.
+        Whether the coefficients belong to the fisheye model.
 
     Returns
     -------

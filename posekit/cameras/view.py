@@ -207,7 +207,7 @@ def own_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def is_head_name(name: str) -> bool:
-    """Tell whether a head point can have this name: any short, printable one that no other joint has."""
+    """Return whether a head point can have this name: short, printable, and not a joint's."""
     short_enough = 0 < len(name.strip()) <= len(name) <= MAX_NAME_CHARACTERS
     return name in HEAD_NAMES or (short_enough and name.isprintable() and name not in JOINTS)
 

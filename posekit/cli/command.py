@@ -123,7 +123,7 @@ def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options by which key points become a view."""
+    """Declare the options that turn key points into a view."""
     calibration = "Calibration of the camera. Default: none is known."
     return apply(
         option("--camera", default=None, metavar="FILE[:NAME]", help=calibration),
@@ -134,7 +134,7 @@ def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options by which a file is read."""
+    """Declare the options that control how a file is read."""
     panel = "Reading"
     robot = option(
         "--urdf",
@@ -266,7 +266,7 @@ def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
 
 
 def _value(text: str) -> Any:
-    """Read the value of ``--set``: true, false, none, or text, which the record turns into what it needs."""
+    """Read the value of ``--set``: true, false, none, or text, which the settings convert to the field's type."""
     return {"true": True, "false": False, "none": None}.get(text.lower(), text)
 
 

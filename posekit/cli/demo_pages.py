@@ -1,4 +1,4 @@
-"""What `posekit demo` writes: samples, a judged motion, recovered views, the papers' rows, and a page that leads on."""
+"""Files of `posekit demo`: samples, a judged motion, recovered views, the papers' rows, and a page of links."""
 
 from __future__ import annotations
 

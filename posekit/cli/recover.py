@@ -77,7 +77,7 @@ def recover(source: Path, output: Path, explain: bool, linkage: str, **given: An
 
 
 def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: Path) -> list[str]:
-    """Recover another articulated object than a person from an uncalibrated view, and say what was found."""
+    """Recover an articulated object other than a person from an uncalibrated view, and print a summary."""
     import json
 
     from posekit.files import write_bytes
@@ -124,7 +124,7 @@ def picture_size(text: str | None) -> tuple[int, int] | None:
 
 
 def summary(recovery: Recovery, output: Path) -> list[str]:
-    """Say in a few lines what was found, how sure it is, and what to do next."""
+    """Print in a few lines the result, its probability, and the next step."""
     counts = np.bincount(recovery.survivors.frame, minlength=len(recovery))
     empty = int((counts == 0).sum())
     frames = f"{len(recovery)} frame{'s' * (len(recovery) != 1)}"

@@ -20,7 +20,7 @@ from posekit.cli.command import command, option, output, say
     help="Number of settings of the walker.",
 )
 def reproduce(paper: str, output: Path, pictures: bool, effort: str) -> None:
-    """Write what a paper prints beside what is computed, row by row. Exit code 1 if a row fails."""
+    """Write the paper's printed values beside the computed ones, row by row. Exit code 1 if a row fails."""
     from posekit.papers import reproduce as write
 
     rows = write(paper, output, effort=effort, pictures=pictures)

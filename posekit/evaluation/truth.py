@@ -1,4 +1,4 @@
-"""Truth from motion capture: its frames are matched to the pictures, and its axes to those of the camera's world."""
+"""Truth from motion capture: its frames are matched to the pictures, and its axes to the axes of the camera's world."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def with_truth(view: View, motion: Motion) -> tuple[View, str]:
     view : View
         A view whose camera has a pose in the world.
     motion : Motion
-        Joints in metres; its axes may differ from those of the camera's world.
+        Joints in metres; its axes may differ from the axes of the camera's world.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
     Raises
     ------
     InputError
-        If the truth is of other frames, or motion cannot be placed in front of the camera.
+        If the truth has other frames than the view, or if the motion cannot be placed in front of the camera.
     """
     if isinstance(given, Motion):
         camera, image = _camera_of(result), np.full((len(result), len(JOINTS), 2), np.nan)

@@ -285,7 +285,7 @@ class Detections(Record):
         )
 
     def _in_order(self, values: Array) -> Array:
-        """Return values (N, P, ...) by joints and head points (N, 19, ...); NaN for those that the layout lacks."""
+        """Return values (N, P, ...) by joints and head points (N, 19, ...); NaN for points that the layout lacks."""
         found = np.full((len(values), len(POINTS), *values.shape[2:]), np.nan)
         place = {name: k for k, name in enumerate(self.names)}
         have = [k for k, name in enumerate(POINTS) if name in place]

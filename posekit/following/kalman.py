@@ -53,7 +53,7 @@ class Moving(NamedTuple):
 
     @staticmethod
     def nothing(count: int) -> Moving:
-        """Return bodies of which nothing is known."""
+        """Return the state of bodies whose positions and velocities are unknown."""
         spread = np.diag([UNKNOWN] * 3 + [START_SPEED**2] * 3)
         shape = (count, len(DENSITY))
         spreads, known = np.tile(spread, (*shape, 1, 1)), np.zeros(shape, dtype=bool)

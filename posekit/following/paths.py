@@ -220,9 +220,9 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
 def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
-    The first path is what is expected of each frame given all frames, smoothed and laid onto the person's lengths. Each
-    further path passes through another survivor in one frame, the likeliest one of which some joint is at least 25 cm
-    away from the paths before. In an uncalibrated view postures move about their neck.
+    The first path is the expected posture of each frame given all frames, smoothed and laid onto the person's lengths.
+    Each further path is the most probable one that passes, in one frame, through a survivor with a joint at least 25 cm
+    from all earlier paths. In an uncalibrated view postures move about their neck.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> t
 
     The mean of all survivors, each as likely as all frames together say, is off least. Its covariance is the survivors'
     own and their differences. Exact survivors are points of a set with nothing between them: the nearest is returned.
-    Where the frame is likelier passed over, the survivor is -1 and the posture NaN.
+    If the path more probably skips the frame, the survivor is -1 and the posture NaN.
     """
     rows = np.flatnonzero(at >= 0)
     weight, at = share[rows], at[rows]
@@ -319,7 +319,7 @@ def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> t
 
 
 def _likeliest(own: Array) -> NDArray[np.intp]:
-    """Choose survivors by their cost (N,): those that hold `COVERAGE`, ties included, at most `MAX_SURVIVORS`."""
+    """Choose the survivors of least cost (N,) that hold `COVERAGE`, with ties; at most `MAX_SURVIVORS`."""
     order = np.argsort(own, kind="stable")
     order = order[np.isfinite(own[order])]
     if not len(order):

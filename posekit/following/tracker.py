@@ -66,7 +66,7 @@ class TrackedPosture(Record):
     sure : float
         Probability that every joint of it is within 5 cm; 0 where there is none.
     reason : str
-        Why the picture has no posture; empty where it has.
+        Reason why the picture has no posture; empty if it has one.
     path : PathPosture, optional
         The picture `lag` before this one; None for the first ones.
     recovery : Recovery, optional
@@ -90,7 +90,7 @@ class TrackedPosture(Record):
 class Tracker:
     """Recovers one picture a call, and follows the person.
 
-    The postures of a picture are those that `posekit.recover` finds for it alone; the path remembers.
+    `posekit.recover` finds the postures of each picture alone; only the path uses earlier pictures.
 
     Parameters
     ----------

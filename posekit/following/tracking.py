@@ -160,7 +160,7 @@ def _similarity(expected: Array, seen: Array, sizes: Array, reach: Array) -> Arr
 
 
 def _moves_far(points: Array, size: Array) -> bool:
-    """Tell whether a person, seen at points (F, P, 2), moves farther from picture to picture than in a video."""
+    """Return whether a person, seen at points (F, P, 2), moves farther between pictures than in a video."""
     moved = _median(np.linalg.norm(np.diff(points, axis=0), axis=2))
     far = moved / np.sqrt(np.fmax(np.fmax(size[1:], size[:-1]), 1.0))
     return bool(len(far)) and float(np.quantile(far, VIDEO_SHARE)) > MOTION_SIGMA

@@ -84,7 +84,7 @@ class Alignment(NamedTuple):
     scale: Array
 
     def apply(self, points: ArrayLike) -> Array:
-        """Map points (..., P, 3) onto the target; NaN if unknown or if nothing was aligned."""
+        """Map points (..., P, 3) onto the target; NaN for unknown points, or if no alignment was found."""
         turned = np.einsum("...ij,...pj->...pi", self.rotation, np.asarray(points, dtype=np.float64))
         return np.asarray(self.scale[..., None, None] * turned + self.translation[..., None, :])
 
@@ -159,7 +159,7 @@ def rms_distance(points: ArrayLike, target: ArrayLike, *, aligned: bool = True) 
 
 
 def _paired(points: ArrayLike, target: ArrayLike) -> tuple[Array, Array, Flags]:
-    """Broadcast two sets of points, and tell which points (..., P) are known in both."""
+    """Broadcast two sets of points; return both, and whether each point (..., P) is known in both."""
     x, y = np.broadcast_arrays(np.asarray(points, dtype=np.float64), np.asarray(target, dtype=np.float64))
     return x, y, np.isfinite(x).all(axis=-1) & np.isfinite(y).all(axis=-1)
 

@@ -119,13 +119,13 @@ def walk_rows(effort: str = "quick") -> Iterator[Row]:
 
 
 def closest(effort: str = "quick") -> int:
-    """Return the row of the setting at which all printed cells of both sequences together are closest to ours."""
+    """Return the row of the setting whose counts are closest to the printed cells of both sequences together."""
     return int(np.argmin(np.sum([count_walks(name, effort).distance for name in SEQUENCES], axis=0)))
 
 
 @cache
 def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRES) -> Walks:
-    """Count a sequence at all settings of a grid.
+    """Count the survivors of a sequence at all settings of a grid.
 
     Parameters
     ----------
@@ -172,8 +172,8 @@ def _counted(
 def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -> tuple[Trees, Array]:
     """Grow the trees of a walker's view as the paper does; return them, and the head points (F, 5, 3).
 
-    Torsos are compared by their distances alone, which do not distinguish them from their mirror images, and angles are
-    those of `table1-printed`.
+    Torsos are compared by their distances alone, which do not distinguish them from their mirror images; joint ranges
+    are ``table1-printed``.
     """
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
     pose = solve_pose(TABLE_A2, image, LeeChenCamera(f=None))
@@ -279,7 +279,7 @@ def _shoulders_row(view: View) -> Row:
 
 
 def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
-    """Yield a row for each level of a table, and for each step of §4.2."""
+    """Yield a row for each level of a printed table, and for each pruning step of §4.2."""
     name, columns = walks.name.upper(), np.arange(2 * 3 * len(JOINTS)).reshape(6, -1)
     table = f"Table {'3' if walks.name == 'seq1' else '4'} ({name})"
     for level, joint in enumerate(JOINTS):

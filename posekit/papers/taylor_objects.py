@@ -131,7 +131,7 @@ def joint_angles(points: Array, triples: Sequence[tuple[int, int, int]]) -> Arra
 
 
 def _picture_rows(one: Constrained) -> Iterator[Row]:
-    """Look for all scales at which the constraint holds, and recover pictures with noise."""
+    """Find all scales that satisfy the constraint, and recover pictures with noise."""
     s, rng = scale_of(one.points), np.random.default_rng(SEED)
     exact = LinkageFamily(linkage=one.linkage, image=one.points[:, :2] * s)
     nearer = name_nearer(one.linkage, exact.flips_of(one.points))
@@ -179,7 +179,7 @@ def _views_row(one: Constrained, *, posed: bool) -> Row:
 
 
 def sensitivity(one: Constrained, points: Array, s: float) -> Array:
-    """Return the deviations (A, M) of the angles, degrees, that M independent errors of one pixel cause.
+    """Return the errors (A, M) of A angles, degrees, that M independent image errors of one pixel cause.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _words(one: Constrained) -> dict[str, object]:
 
 
 def scale_of(points: Array) -> float:
-    """Return the scale at which an object is `SIZE_PIXELS` large, pixels per unit of length."""
+    """Return the scale, pixels per unit of length, that makes an object `SIZE_PIXELS` large."""
     return SIZE_PIXELS / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
 
 

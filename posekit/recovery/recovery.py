@@ -1,4 +1,4 @@
-"""`Recovery`: every survivor of every frame, what was rejected and why, and the answer."""
+"""`Recovery`: every survivor of every frame, the rejected branches and why, and the answer."""
 
 from __future__ import annotations
 

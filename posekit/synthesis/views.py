@@ -427,7 +427,7 @@ def _clip_index(motion: Motion, name: str) -> int:
 
 
 def _frames_of(motion: Motion, clip: int, names: Sequence[str]) -> Ints:
-    """Return the rows of a clip in which the named joints are known."""
+    """Return the rows of a clip that know the named joints."""
     known = np.isfinite(motion.points(names)).all(axis=(1, 2)) & (motion.clip == clip)
     return np.flatnonzero(known)
 
@@ -455,7 +455,7 @@ def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -
 
 
 def _shares(n: int, available: Sequence[int]) -> list[int]:
-    """Share n out evenly; a clip gives at most what it has."""
+    """Distribute n evenly over clips; no clip gives more frames than it has."""
     shares, left = [0] * len(available), n
     while left > 0:
         open_clips = [k for k, have in enumerate(available) if shares[k] < have]

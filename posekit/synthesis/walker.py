@@ -184,7 +184,7 @@ def _wave(turns: Array) -> Array:
 
 
 def _curve(knots: Sequence[tuple[float, float]], phase: Array) -> Array:
-    """Evaluate the periodic monotone cubic through (phase, value) knots (Fritsch & Butland 1984)."""
+    """Evaluate the periodic, monotone cubic spline through the knots (phase, value) (Fritsch & Butland 1984)."""
     from scipy.interpolate import PchipInterpolator
 
     x, y = np.array(knots).T

@@ -1,4 +1,4 @@
-"""What a page holds: bodies frame by frame in a world whose z points up, and what is known of them."""
+"""Data of a page: the bodies of each frame in a world whose z points up, with their findings and probabilities."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _judged(motion: Motion, urdf: str) -> Report:
 
 
 def _is_humanoid(robot: Robot) -> bool:
-    """Tell whether a robot has a joint map."""
+    """Return whether a robot has a joint map."""
     try:
         return bool(len(robot.joint_map))
     except InputError:
@@ -156,7 +156,7 @@ def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str
 
 
 def _kept(report: Report) -> NDArray[np.intp]:
-    """Return the rows that the page holds: all, or those of the worst clips."""
+    """Return the rows that the page holds: all rows, or the rows of the worst clips."""
     if len(report) <= MOST_FRAMES:
         return np.arange(len(report))
     order = np.argsort([-one.severity for one in report.clips], kind="stable")
@@ -178,7 +178,7 @@ def _points(motion: Motion, robot: Robot, q: Array) -> Array:
 
 
 def _joints(robot: Robot, q: Array) -> Array:
-    """Return the 14 joints (T, 19, 3) of any body, without a head; NaN where it has none."""
+    """Return the joints of a body as points (T, 19, 3); head points and missing joints are NaN."""
     known = np.isfinite(q).all(axis=1) & _is_humanoid(robot)
     joints = np.full((len(q), len(JOINTS), 3), np.nan)
     joints[known] = robot.points(q[known])[:, : len(JOINTS)]
