@@ -38,13 +38,13 @@ def draw(
     Parameters
     ----------
     source : Motion, Recovery, View with truth, Report or array (T, 14, 3)
-        What is drawn; arrays are in metres.
+        The bodies to draw; arrays are in metres.
     target : path
         ``.png`` (frames or alternative postures side by side), ``.gif`` and ``.mp4`` (one frame after the other),
         ``.html`` (a page that needs nothing else), ``.svg`` and ``.pdf`` (plots).
     view : View or Motion, optional
-        What a result was recovered from: its image and its camera are drawn, too. For a report, the motion that it
-        judges, or several: the page then shows the body in each frame.
+        The view of a result: its image and its camera are drawn, too. For a report, the motion that it judges, or
+        several: the page then shows the body in each frame.
     frame : int or (int, int), optional
         Frame, or first and last, from 0. By default a few frames of a motion, or all in an animation.
     which : str
@@ -53,8 +53,8 @@ def draw(
     size : (int, int)
         Pixels.
     azimuth, elevation : float, optional
-        Degrees by which the eye is turned to the person's left, from the front or from the camera of a result, and
-        raised above the level. 35 and 8 by default.
+        Direction of the eye, degrees: to the person's left, from the front or from a result's camera; and above the
+        horizontal. 35 and 8 by default.
     over : path, optional
         Picture, folder of pictures or film that is drawn over, through the view's camera.
     urdf : str

@@ -64,7 +64,7 @@ def find_browser() -> str:
 
 
 class Browser:
-    """A browser with one page, and the conversation with it. A context manager: at its end all processes are gone.
+    """A browser with one page. It is a context manager: at its end all processes are stopped.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from posekit.errors import InputError
 
 Pixels = NDArray[np.uint8]
 
-#: Most pictures a second; a faster recording loses some pictures and keeps its speed.
+#: Largest number of pictures per second; a faster recording is thinned out and keeps its speed.
 FASTEST: Final = {".gif": 20.0, ".mp4": 60.0}
 
 #: Pictures a second of an animation whose rate is not known.

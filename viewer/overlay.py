@@ -30,7 +30,7 @@ OTHER_OPACITY: Final = 0.45
 #: Factor by which a picture is painted larger, for smooth edges.
 FINER: Final = 2
 
-#: Points around each end of a capsule, and corners of its outline.
+#: Number of points around each end of a capsule, and number of corners of its outline.
 RIM_POINTS, CORNERS = 24, 48
 
 #: Points (19, 3) in the camera frame, metres, and the scale of a scaled orthographic camera.
@@ -159,7 +159,7 @@ def _painted(image: Any, postures: list[Posture], figure: Figure, view: View, ro
 def _outlines(
     figure: Figure, points: Array, scale: float, seen: Any, perspective: bool
 ) -> list[tuple[str, Array]]:
-    """Return name and outline (48, 2) of each capsule of a posture, the farthest first.
+    """Return the name and outline (48, 2) of each capsule of a posture, the farthest first.
 
     An outline is the convex hull of the images of the capsule's two spheres, from its support in 48 directions. From
     the centre of projection a sphere of radius r at c shows the circle about c (1 - r^2 / c^2), across c, of radius r
@@ -179,7 +179,7 @@ def _outlines(
 
 
 def _rim(middle: Array, radius: float, perspective: bool) -> Array:
-    """Return the circle (24, 3) that is seen of a sphere; NaN from inside of it."""
+    """Return the visible outline of a sphere, a circle (24, 3); NaN if the eye is inside."""
     away = float(np.linalg.norm(middle))
     forward, shrunk = np.array([0.0, 0.0, 1.0]), 1.0
     if perspective:

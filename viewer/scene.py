@@ -38,7 +38,7 @@ USUAL_ELEVATION: Final = 8.0
 #: Room around the bodies, as a factor.
 FRAME_MARGIN: Final = 1.03
 
-#: Room around links that their bodies take, metres.
+#: Distance that bodies extend beyond the origins of their links, metres.
 BODY_RADIUS: Final = 0.12
 
 #: Frames over which the eye's way is smoothed when it follows a body.
@@ -56,12 +56,12 @@ BATCH: Final = 40
 #: Distance of the drawn image plane from the camera, metres.
 IMAGE_DEPTH: Final = 0.6
 
-#: Share of pixels that must differ from the background: WebGL can fail with a flat picture.
+#: Least share of pixels that differ from the background: WebGL can fail with an empty picture.
 LEAST_DRAWN: Final = 2e-4
 
 
 class Recorder:
-    """Stands for meshcat's window: keeps the commands that it is sent, packed as meshcat's pages read them.
+    """A replacement for meshcat's window: it keeps the commands that it is sent, packed as meshcat's pages read them.
 
     Attributes
     ----------
@@ -293,7 +293,7 @@ def pictures(
     image : array (P, 2), optional
         Image points that stand in the upper left corner: what the camera saw.
     seen_from : str
-        Where the eye is, for the last line under the picture.
+        Description of the eye's position, for the last line under the picture.
     step : int
         Draw each frame whose number is a multiple of it.
 

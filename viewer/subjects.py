@@ -45,10 +45,10 @@ USUAL_POSTURES: Final = 4
 #: Free space between two bodies side by side, metres.
 GAP: Final = 0.2
 
-#: Degrees off the front, or off the view's camera: from there depth is seen.
+#: Default angle of the eye from the front, or from the view's camera, degrees; it shows depth.
 USUAL_AZIMUTH: Final = 35.0
 
-#: Speed of an animation of postures that have no time.
+#: Postures per second of an animation of postures without times.
 POSTURES_PER_SECOND: Final = 2.0
 
 
@@ -133,7 +133,7 @@ def subjects_of(
     urdf : str
         Robot of configurations whose robot is not known.
     view : View, optional
-        View of the result: it says how the camera is tilted.
+        View of the result, for the tilt of its camera.
     azimuth : float, optional
         Degrees by which the eye is turned from the front of a motion, or from the camera of a result.
     moving : bool
@@ -259,7 +259,7 @@ def spread(count: int, most: int) -> NDArray[np.intp]:
 
 
 def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None) -> int:
-    """Return the frame that was asked for, else the first that has a posture.
+    """Return the requested frame, else the first frame that has a posture.
 
     Raises
     ------

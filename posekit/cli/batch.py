@@ -32,7 +32,7 @@ from posekit.settings import RecoverSettings
 @seeing()
 @settings_options(RecoverSettings, {"stature": "LENGTH", "deviation": "PX", "checks": "LIST"})
 def batch(inputs: tuple[Path, ...], output: Path, jobs: int | None, ray: str, **given: Any) -> None:
-    """Recover an archive: every input once; broken ones are named and the rest is done. Exit code 1 if some fail."""
+    """Recover an archive: every input once. Exit code 1 if some inputs are broken; the others are done."""
     from posekit.batch import batch as run
 
     settings = settings_from(RecoverSettings, given)

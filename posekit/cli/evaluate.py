@@ -1,4 +1,4 @@
-"""`posekit evaluate`: how good results are where the truth is known."""
+"""`posekit evaluate`: the errors of results if the truth is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`posekit follow`: live, lines of key points in, lines of postures out."""
+"""`posekit follow`: read lines of key points and write lines of postures, live."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`posekit inspect`: what a file holds, and how it was understood."""
+"""`posekit inspect`: the content of a file, and the facts that posekit found."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from posekit.cli.command import command, reading, say
 @click.argument("source", metavar="FILE", type=click.Path(path_type=Path))
 @reading()
 def inspect(source: Path, **given: Any) -> None:
-    """Print what a file holds: kind, layout, frames, rate, axes, unit, names, and doubts."""
+    """Print the content of a file: kind, layout, frames, rate, axes, unit, names, and warnings."""
     from posekit.formats.inspect import inspect as table
 
     say(table(source, **given))

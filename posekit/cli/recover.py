@@ -41,8 +41,10 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 )
 @option("--size", default=None, metavar="WxH", hidden=True, help="Width and height of the pictures, pixels.")
 @option("--min-confidence", type=float, default=0.0, hidden=True, help="Least confidence of a key point.")
-@option("--linkage", default="", metavar="NAME|FILE", help="Another articulated object than a person.")
-@option("--explain", is_flag=True, help="Print what rejected the branches, and why frames are empty.")
+@option("--linkage", default="", metavar="NAME|FILE", help="An articulated object other than a person.")
+@option(
+    "--explain", is_flag=True, help="Print the rejected branches and their reasons, and why frames are empty."
+)
 @settings_options(RecoverSettings, SHOWN)
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
     """Recover every posture behind a view: each passes the checks and reprojects onto the image."""

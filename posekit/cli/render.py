@@ -20,9 +20,7 @@ from posekit.cli.recover import picture_size
 )
 @click.argument("source", metavar="FILE", type=click.Path(path_type=Path))
 @output("FILE", "Picture .png, animation .gif or .mp4, page .html, plot .svg or .pdf.")
-@option(
-    "--view", default=None, metavar="VIEW", help="What a result was recovered from: draws its image, too."
-)
+@option("--view", default=None, metavar="VIEW", help="View of a result: draws its image, too.")
 @option(
     "--frame", default=None, metavar="K|A-B", help="Frame, or first and last, from 0. Default: all that fit."
 )

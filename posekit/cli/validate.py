@@ -40,7 +40,7 @@ BAD_INPUT = 2
     type=click.Path(path_type=Path),
     help="New folder for the clips that pass; with --keep-spans SECONDS also for good parts of the others.",
 )
-@option("--keep-spans", metavar="SECONDS", type=float, hidden=True, help="Least length of a good part.")
+@option("--keep-spans", metavar="SECONDS", type=float, hidden=True, help="Least duration of a good part.")
 @option(
     "--repair",
     metavar="FILE|DIR",

@@ -14,7 +14,7 @@ from posekit.cli.command import command, option, reading, say
 
 @command("view", "posekit view walk.bvh", "posekit view postures.json --view walk.json")
 @click.argument("source", metavar="FILE", type=click.Path(path_type=Path))
-@option("--view", default=None, metavar="VIEW", help="What a result was recovered from.")
+@option("--view", default=None, metavar="VIEW", help="View of a result.")
 @option("--open/--no-open", "show", default=True, help="Open the browser.")
 @reading()
 def view(source: Path, view: str | None, show: bool, **given: Any) -> None:

@@ -201,7 +201,7 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
     Raises
     ------
     InputError
-        If the truth is of other frames, or none is known.
+        If the truth has other frames than the result, or no known joint.
     """
     count, rng = len(result), np.random.default_rng(seed)
     truth, note = truth_of(result, truth)

@@ -30,8 +30,8 @@ def evaluate_method(
 ) -> Evaluation:
     """Recover views whose truth is known, at levels of noise, and measure every frame.
 
-    A frame's noise is one draw that is scaled by the level: the levels differ in nothing else. A view that cannot be
-    recovered counts as frames without survivors.
+    The noise of a frame is drawn once and scaled by each level, so that levels differ only in scale. A view that cannot
+    be recovered counts as frames without survivors.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
 
 
 def _camera_of(result: Recovery) -> Any:
-    """Return the pinhole camera of a result with its pose; None if it has another one."""
+    """Return the pinhole camera of a result with its pose; None if the camera is not a pinhole."""
     fields = result.camera
     if fields.get("model") != "opencv":
         return None

@@ -1,4 +1,4 @@
-"""Contradictions to a calibration: pictures of another size, and people who do not stand by it."""
+"""Contradictions between a calibration and its pictures: another size, or people who are not upright."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from posekit.errors import refusal
 from posekit.geometry import Array, unit, up_vector
 from posekit.skeleton import POINTS
 
-#: Share of points outside the picture from which the picture's size is another's.
+#: Share of points outside the picture from which the calibration's picture size is wrong.
 OUTSIDE_SHARE: Final = 0.5
 #: Shortest and longest focal length, of the picture's longer side: views of 170 degrees and of half a degree.
 SHORTEST_FOCAL, LONGEST_FOCAL = 0.05, 100.0
@@ -19,7 +19,7 @@ SHORTEST_FOCAL, LONGEST_FOCAL = 0.05, 100.0
 UPRIGHT_DEGREES: Final = 45.0
 #: Length of the projected unit vector of the world's up axis below which the camera looks up or down.
 SEEN_ACROSS: Final = 0.5
-#: Height over shoulder width in the picture from which a person is seen from the side; about 4 of an upright one.
+#: Height over shoulder width in the picture above which a person is seen from the side; an upright person has about 4.
 SEEN_LONG: Final = 2.5
 
 
@@ -50,7 +50,7 @@ def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] |
 
 
 def contradictions(camera: CameraModel, points: Array) -> list[str]:
-    """Tell if a person does not stand upright by the camera's calibration, or is upside down in the picture.
+    """Describe contradictions: a person who is not upright by the calibration, or upside down in the picture.
 
     The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. A
     calibration that is camera-to-world, has y up in the camera, or another up axis turns that direction.
@@ -64,7 +64,7 @@ def contradictions(camera: CameraModel, points: Array) -> list[str]:
     Returns
     -------
     list of str
-        One sentence a contradiction.
+        One sentence for each contradiction.
     """
     part = {name: points[:, k] for k, name in enumerate(POINTS)}
     middle = {

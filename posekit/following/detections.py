@@ -51,7 +51,7 @@ class Detections(Record):
     rate : float, optional
         Pictures per second.
     film : bool
-        Whether the pictures follow each other in time; nobody is followed through unrelated photographs.
+        Whether the pictures follow each other in time; people are tracked in films only.
     by_camera : bool
         Whether rows of one picture are one person seen by several cameras: `person` is then the camera's number.
     layout : str
@@ -133,7 +133,7 @@ class Detections(Record):
     def people(self) -> Ints:
         """Return the number of each row's person (N,): the file's own, or that of `posekit.following.tracking.track`.
 
-        Among unrelated photographs everybody is somebody else.
+        In unrelated photographs every row is another person.
         """
         person = np.array(self.person)
         unknown = np.flatnonzero(person < 0)
@@ -152,7 +152,7 @@ class Detections(Record):
         which : int or str
             Number of a person, see `people`. Or ``largest``, the default: the person with the largest share of the
             pictures, summed over them; ``surest``: with the largest sum of confidences; ``first``: the first in the
-            first picture. Among unrelated photographs a rule chooses in each picture.
+            first picture. In unrelated photographs a rule chooses in each picture.
         camera : str
             Name of the camera, whose number chooses among the cameras of one file.
 

@@ -1,6 +1,6 @@
-"""The one filter of following: joints that move with a random acceleration (Kalman 1960), and its smoother.
+"""Filter of joints that move with a random acceleration (Kalman 1960), and its smoother.
 
-A joint's state is its place and velocity. Its acceleration is white noise of the spectral density q, and its place is
+A joint's state is its position and velocity. Its acceleration is white noise of spectral density q, and its position is
 measured with a covariance (R. E. Kalman 1960, J. Basic Eng. 82:35-45, eqs. 21 to 25). Smoothing goes back over the
 filtered frames (Rauch, Tung & Striebel 1965, AIAA J. 3:1445): frames that are passed over are interpolated.
 """
@@ -18,10 +18,10 @@ from posekit.geometry import Array
 #: signals in the CMU Graphics Lab Motion Capture Database at 30 Hz.
 ACCELERATION: Final = np.array([5.0] * 6 + [7.0, 7.0, 10.0, 10.0, 8.0, 8.0, 11.0, 11.0])
 
-#: Spectral density q of each joint's random acceleration, m^2/s^3: it lasts for 0.05 s.
+#: Spectral density q of each joint's random acceleration, m^2/s^3, for a correlation time of 0.05 s.
 DENSITY: Final = 0.05 * ACCELERATION**2
 
-#: Variance that every measured coordinate has at least, square metres.
+#: Least variance of a measured coordinate, square metres.
 LEAST_VARIANCE: Final = 1e-8
 
 #: Standard deviation of each coordinate of an unknown velocity, m/s.
@@ -37,13 +37,13 @@ class Moving(NamedTuple):
     Attributes
     ----------
     mean : array (S, 14, 6)
-        Place and velocity, metres and metres a second.
+        Position and velocity, metres and metres per second.
     spread : array (S, 14, 6, 6)
         Their covariance.
     known : bool array (S, 14)
         Joints that were measured.
     since : array (S, 14)
-        Seconds since they were measured last.
+        Seconds since the last measurement of each joint.
     """
 
     mean: Array
@@ -64,13 +64,13 @@ class Moving(NamedTuple):
         return Moving(self.mean[rows], self.spread[rows], self.known[rows], self.since[rows])
 
     def after(self, seconds: float) -> Moving:
-        """Let time pass."""
+        """Predict the state after a time, seconds."""
         F, noise = steps(seconds)
         spread = F @ self.spread @ F.T + DENSITY[:, None, None] * noise
         return Moving(self.mean @ F.T, spread, self.known, self.since + seconds)
 
     def given(self, joints: Array, covariance: Array) -> Moving:
-        """Measure joints (S, 14, 3), NaN where not seen, with covariances (S, 14, 3, 3)."""
+        """Update the state with measured joints (S, 14, 3), NaN if unseen, and their covariances (S, 14, 3, 3)."""
         seen = np.asarray(np.isfinite(joints).all(axis=2))
         noise = covariance + LEAST_VARIANCE * np.eye(3)
         gain = self.spread[..., :3] @ np.linalg.inv(self.spread[..., :3, :3] + noise)

@@ -1,4 +1,4 @@
-"""Live key points as JSON lines: every picture's answer as soon as its line is read."""
+"""Live key points as JSON lines: each picture is answered as soon as its line is read."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """One person through a sequence: the likeliest paths through the survivors of its frames.
 
-Every end of a path carries where the body is and how fast it moves, and goes on to every survivor of the next frame, or
-passes the frame over. While there are few, all paths are kept apart, and the cheapest of all is found. If several paths
-end in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with
-a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the
-probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+Every end of a path holds the body's position and velocity. It continues to every survivor of the next frame, or skips
+the frame. While there are few paths, all are kept, and the cheapest is exact. If several paths end in the same
+survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with a filter for
+each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the probability
+of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
 """
 
 from __future__ import annotations
@@ -29,43 +29,44 @@ from posekit.skeleton import SEGMENT_NAMES
 #: Kinesiology 50:172); the fastest balls leave hand and foot at 47 and 37 m/s, faster than wrist and ankle are.
 MAX_SPEED: Final = np.array([15.0] * 6 + [25.0, 25.0, 35.0, 35.0, 25.0, 25.0, 35.0, 35.0])
 
-#: Degrees of freedom of steps: a sudden move is dear and not impossible.
+#: Degrees of freedom of the t distribution of steps: a sudden move is improbable, not impossible.
 NU: Final = 4.0
 
-#: Weight of steps to survivors under noise: the joints of a body are off together, and frames as their neighbours.
+#: Weight of steps to survivors under noise: errors are correlated between the joints of a body and between frames.
 NOISY_WEIGHT: Final = 0.25
 
-#: Cost of passing over a frame beside that of a usual step.
+#: Cost of skipping a frame, in addition to the cost of a usual step.
 SKIP: Final = 100.0
 
 #: Cost of each joint that a survivor lacks and another of its frame has: unknown joints make no steps.
 MISSING_JOINT: Final = 5.0
 
-#: Standard deviations of both ends by which `MAX_SPEED` gives way.
+#: Tolerance of `MAX_SPEED`, in standard deviations of both positions.
 WALL_DEVIATIONS: Final = 3.0
 
-#: Survivors that are looked at hold this share of the probability; paths are kept apart up to `WIDTH`; an end that
-#: costs `SLACK` more than the cheapest is dropped.
+#: Share of the probability held by the survivors that are considered, and their largest number; largest number of
+#: separate paths; cost above the cheapest end from which an end is dropped.
 COVERAGE, MAX_SURVIVORS, WIDTH, SLACK = 0.95, 128, 64, 60.0
 
-#: Distance of some joint in some frame that makes another path.
+#: Least distance of a joint, in some frame, between two different paths, metres.
 APART_METRES: Final = 0.25
 
-#: Least probability of another path in the frame in which it differs most.
+#: Least probability of a further path in the frame where it differs most.
 LEAST_SHARE: Final = 1e-6
 
-#: Interval for which the cost of a usual step is taken, seconds.
+#: Interval between frames that defines the cost of a usual step, seconds.
 USUAL_INTERVAL: Final = 1 / 30
 
-#: A joint's 95 % radius over its deviation along the ray, which is most of it.
+#: Ratio of a joint's 95 % radius to its standard deviation along the ray, which dominates.
 RADIUS_DEVIATIONS: Final = 1.96
 
-#: A joint's deviation across its ray over that along it: 2 px at 4 m are 8 mm, and 4 cm of depth.
+#: Ratio of a joint's standard deviation across its ray to that along it: 2 px at 4 m are 8 mm across, and 4 cm in
+#: depth.
 ACROSS: Final = 0.2
 
 
 class Candidates(NamedTuple):
-    """The survivors of one frame, as a path sees them.
+    """The survivors of one frame as candidates of a path.
 
     Attributes
     ----------
@@ -97,11 +98,11 @@ class Stage(NamedTuple):
     Attributes
     ----------
     survivor : int array (S,)
-        Survivor of each; -1 where the frame is passed over.
+        Survivor at each end; -1 if the frame is skipped.
     cost : array (P, S)
-        Cost of every step, with the survivor's own; infinite where there is no step.
+        Cost of every step, including the survivor's own; infinite if the step is impossible.
     forward : array (S,)
-        Logarithm of the sum of the likelihoods of all paths to each, but for a constant.
+        Logarithm of the summed likelihoods of all paths to each end, up to a constant.
     """
 
     survivor: NDArray[np.intp]
@@ -126,7 +127,7 @@ class Trellis:
         self._last = np.nan
 
     def push(self, frame: Candidates) -> None:
-        """Go on by one frame."""
+        """Extend all paths by one frame."""
         known = np.asarray(np.isfinite(frame.joints).all(axis=2))
         own = frame.cost + MISSING_JOINT * (known.any(axis=0) & ~known).sum(axis=1)
         chosen = _likeliest(np.where(known.any(axis=1), own, np.inf))
@@ -160,7 +161,7 @@ class Trellis:
         at : int
             A frame.
         among : bool array (S,), optional
-            Ends that paths may go through there; all by default.
+            Ends of that frame that paths may pass through; all by default.
         """
         forward = [stage.forward for stage in self.stages]
         if among is not None:
@@ -179,21 +180,21 @@ class Trellis:
 
 
 def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> Array:
-    r"""Return the costs (S, N) of finding survivors where the motion of ends leads; infinite beyond `MAX_SPEED`.
+    r"""Return the costs (S, N) of steps from S ends to N survivors; infinite beyond `MAX_SPEED`.
 
-    A step costs minus the log-likelihood of the joints' distances x from where the filter expects them, under a Student
+    A step costs minus the log-likelihood of the joints' distances x from their predicted positions, under a Student
     distribution (Lange, Little & Taylor 1989, J. Am. Stat. Assoc. 84:881-896),
 
     .. math:: \sum_j \tfrac{\nu + 3}{2} \log\left(1 + \tfrac{1}{\nu} x_j^T S_j^{-1} x_j\right)
               + \tfrac12 \log\frac{|S_j|}{\sigma_j^6}, \qquad S_j = P_j + R_j,
 
-    with the filter's covariance P, the survivor's R, and :math:`\sigma_j^2` the random acceleration's part of P: a
-    joint that is where its motion takes it, exactly known before, costs nothing.
+    with the filter's covariance P, the survivor's R, and :math:`\sigma_j^2` the random acceleration's part of P. A
+    joint at its predicted position costs nothing if its previous position was exact.
 
     Parameters
     ----------
     ends, led : Moving
-        At the last frame, and carried on to this one.
+        State at the last frame, and predicted for this one.
     joints, covariance : array (N, 14, 3), (N, 14, 3, 3)
     """
     known = np.isfinite(joints).all(axis=2)
@@ -233,7 +234,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     Returns
     -------
     Recovery
-        The same with `path`.
+        The same recovery with `path`.
 
     Raises
     ------
@@ -275,7 +276,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
 
 
 def candidates(recovery: Recovery, k: int) -> Candidates:
-    """Return the survivors of a frame as paths see them: a joint's noise is mostly along its ray."""
+    """Return the survivors of a frame as candidates of paths: a joint's noise is mostly along its ray."""
     rows = recovery.rows(k)
     table = recovery.survivors
     joints, radius = table.joints[rows], np.asarray(table.radius)[rows]
@@ -294,9 +295,9 @@ def candidates(recovery: Recovery, k: int) -> Candidates:
 def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> tuple[int, Array, Array]:
     """Return the survivor nearest to the expected posture, that posture, and its covariance.
 
-    The mean of all survivors, each as likely as all frames together say, is off least. Its covariance is the survivors'
-    own and their differences. Exact survivors are points of a set with nothing between them: the nearest is returned.
-    If the path more probably skips the frame, the survivor is -1 and the posture NaN.
+    The expected posture is the mean of all survivors, weighted by their probabilities given all frames; it has the
+    least expected squared error. Its covariance has the survivors' own and their spread. Of exact survivors the one
+    nearest to the mean is returned. If the path more probably skips the frame, the survivor is -1 and the posture NaN.
     """
     rows = np.flatnonzero(at >= 0)
     weight, at = share[rows], at[rows]
@@ -331,7 +332,7 @@ def _likeliest(own: Array) -> NDArray[np.intp]:
 
 
 def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Choose the ways (S, N + 1) that become ends: parents, targets, and the end that each way becomes."""
+    """Choose the steps (S, N + 1) that become new ends: their starts, their targets, and the number of the new end."""
     near = total <= total.min() + SLACK
     most = max(1, WIDTH // total.shape[1]) if near.sum() > WIDTH else len(total)
     masked = np.where(near, total, np.inf)
@@ -376,7 +377,7 @@ def _elsewhere(
     marginals: Sequence[Array],
     found: Sequence[Array],
 ) -> tuple[int, NDArray[np.bool_], float] | None:
-    """Find where the body is likeliest elsewhere than on the paths found: frame, ends there, odds against the first."""
+    """Find the most probable place off the paths found so far: frame, ends there, odds against the first path."""
     best, at = LEAST_SHARE, -1
     places: list[Array] = []
     away: list[NDArray[np.bool_]] = []

@@ -1,4 +1,4 @@
-"""`Tracker`: the key points of one picture in, the posture of this picture and the path up to some pictures ago out."""
+"""`Tracker`: takes the key points of one picture; returns its posture, and the path up to some pictures before."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from posekit.skeleton import JOINTS, POINTS
 #: Diagonal angle of view of a usual webcam (Logitech C920, data sheet).
 WEBCAM_DEGREES: Final = 78.0
 
-#: Standard deviation of a live detector's points where none is stated, pixels.
+#: Default standard deviation of a live detector's points, pixels.
 DETECTED_DEVIATION: Final = 5.0
 
 #: Pictures that a path looks ahead: a sixth of a second at 30 a second.
@@ -43,7 +43,7 @@ class PathPosture(NamedTuple):
     time : float
         Seconds.
     joints : array (14, 3)
-        Camera frame, metres; NaN where the picture is passed over.
+        Camera frame, metres; NaN if the path skips the picture.
     """
 
     frame: int
@@ -62,13 +62,13 @@ class TrackedPosture(Record):
     time : float
         Seconds.
     joints : array (14, 3)
-        Answer of this picture alone, camera frame, metres; NaN where it has none.
+        Answer of this picture alone, camera frame, metres; NaN if there is no answer.
     sure : float
-        Probability that every joint of it is within 5 cm; 0 where there is none.
+        Probability that every joint of the answer is within 5 cm; 0 if there is no answer.
     reason : str
         Reason why the picture has no posture; empty if it has one.
     path : PathPosture, optional
-        The picture `lag` before this one; None for the first ones.
+        The picture `lag` before this one; None for the first `lag` pictures.
     recovery : Recovery, optional
         Every survivor of the picture.
     """
@@ -103,7 +103,7 @@ class Tracker:
     lengths : mapping of str to float, optional
         Segment lengths of the person, metres.
     stature : float, optional
-        Height of the person, metres, where no lengths are given.
+        Height of the person, metres, if no lengths are given.
     deviation : float, optional
         Standard deviation of each coordinate of the points, pixels; 5 by default.
     layout : str or Layout, optional
@@ -206,11 +206,11 @@ class Tracker:
         return posture
 
     def finish(self) -> list[PathPosture]:
-        """Return the path of the pictures that was not returned yet. More may follow."""
+        """Return the path of the last `lag` pictures; further pictures may follow."""
         return [self._oldest() for _ in range(len(self._waiting))]
 
     def _oldest(self) -> PathPosture:
-        """Take the oldest picture out of the window, with its place on the path."""
+        """Remove the oldest picture from the window, and return it with its posture on the path."""
         number, frame = self._waiting.popleft()
         share = self._trellis.marginals()[0]
         _, joints, _ = expected_posture(frame, self._trellis.stages[0].survivor, share)

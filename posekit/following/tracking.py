@@ -51,16 +51,17 @@ MIN_SIMILARITY: Final = 0.15
 #: Pictures for which an unseen person is kept: a second of video.
 PATIENCE_PICTURES: Final = 30
 
-#: Factor of the allowed motion of a person seen once, whose velocity is unknown.
+#: Factor of the allowed motion of a person who was seen once, so that the velocity is unknown.
 FRESH_MOTION_FACTOR: Final = 3.0
 
 #: Pictures over which a velocity is extrapolated.
 TRUSTED_VELOCITY_PICTURES: Final = 8
 
-#: Share of a video's pictures between which people move less than `MOTION_SIGMA`: sometimes another person enters.
+#: Share of a video's steps in which people move less than `MOTION_SIGMA`; another person may enter in the remaining
+#: steps.
 VIDEO_SHARE: Final = 0.75
 
-#: Pictures per second of usual video: longer steps count as the number of pictures that it would have had.
+#: Pictures per second of usual video; a longer step counts as several pictures.
 VIDEO_RATE: Final = 30.0
 
 

@@ -1,4 +1,4 @@
-"""Virtual cameras: where they stand, how they are turned, and whether a body is in their picture."""
+"""Virtual cameras: their positions and rotations, and whether a body is inside their picture."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@ The frame is the head-centred one of Lee & Chen 1985: x the moving direction, y 
 head at the coordinates of their Table A.2. The frame moves with the walker, as on a treadmill. The head stays upright
 and faces forward, so its points rest.
 
-The gait model leaves some motion open, which is decided here. The hips stay level and the back leans against them. The
-torso turns against the hips by as much as they turn, and the neck undoes both. Arms swing in planes of the torso and
+The gait model leaves some angles open; they are chosen here. The hips stay level and the back leans against them. The
+torso turns by the opposite of the hips' angle, and the neck compensates both. Arms swing in planes of the torso and
 legs in planes of the hips, without abduction and axial rotation.
 """
 
@@ -44,7 +44,7 @@ R_HEAD_REP103: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walker:
-    """A figure that walks at one velocity.
+    """A figure that walks at a constant velocity.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from posekit.files import write_bytes
 from posekit.viewer.page.data import page_data
 from posekit.viewer.subjects import as_motion
 
-#: In the order in which they need each other.
+#: Scripts of a page; each uses those before it.
 SCRIPTS: Final = ("sight.js", "panel.js", "tables.js", "scene.js", "play.js")
 
 #: Content security policy of a page: nothing is loaded.
@@ -38,7 +38,7 @@ def write_page(
     path : path
         The HTML file.
     view : View, Motion or sequence of Motion, optional
-        What a result was recovered from; or the motions that a report judges, in its order.
+        The view of a result; or the motions that a report judges, in its order.
     frame : int or (int, int), optional
         Frame, or first and last, from 0; all by default.
     urdf : str

@@ -27,7 +27,7 @@ from posekit.viewer import subjects as drawn
 
 Json = dict[str, Any]
 
-#: Frames of motion in a page; of more clips the worst are in it.
+#: Largest number of frames of motion in a page; the worst clips are shown.
 MOST_FRAMES: Final = 20_000
 
 MOST_POSTURES: Final = 60_000
@@ -39,10 +39,11 @@ MOST_SPANS: Final = 40
 #: Clips of a report, spans of a clip and reasons of rejection in a frame that a page lists.
 MOST_REASONS: Final = 60
 
-#: Points are whole steps from their frame's origin: an unknown one, the largest, and the least step, metres.
+#: Points are stored as whole steps from their frame's origin: the code of an unknown point, the largest number of
+#: steps, and the least step, metres.
 UNKNOWN, LARGEST, FINEST = -32_768, 32_767, 1e-4
 
-#: Radius of the lines that stand for a robot's links, metres.
+#: Radius of the lines that represent a robot's links, metres.
 LINK_RADIUS: Final = 0.025
 
 #: Height of the lowest joint above the ground, metres.
@@ -57,7 +58,7 @@ MARGIN_UNITS: Final = {"joint-range": ("°", 1.0), "rigid-parts": ("mm", 1e3), "
 #: Okabe & Ito's palette, one colour a group.
 GROUP_COLOURS: Final = (0x009E73, 0xCC79A7, 0x56B4E9, 0xD55E00, 0xF0E442, 0x0072B2, 0xE69F00, 0x505050)
 
-#: Difference of depth along a segment that is called nearer or farther, metres.
+#: Least difference in depth of a joint that is described as nearer or farther, metres.
 CLEARLY_NEARER: Final = 0.05
 
 
@@ -186,7 +187,7 @@ def _joints(robot: Robot, q: Array) -> Array:
 
 
 def _skeleton(robot: Robot) -> Json:
-    """Describe what joins the points: segments, and bodies relative to the distance of the points that place them."""
+    """Describe the segments between points, and the bodies relative to the length of their segment."""
     colours = {name: red << 16 | green << 8 | blue for name, (red, green, blue) in drawn.COLOURS.items()}
     shared: Json = {"colours": {**colours, "alarm": 0xD4006A}, "groupColours": GROUP_COLOURS}
     if isinstance(robot, Figure):
@@ -238,7 +239,7 @@ def _skeleton(robot: Robot) -> Json:
 
 
 def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
-    """Stand bodies on z = 0 and the first known point over x = y = 0; return what was added (3,), too."""
+    """Stand bodies on z = 0 with the first known point over x = y = 0; return them and the displacement (3,)."""
     low = [float(np.nanmin(one[:1, :, 2])) for one in bodies if np.isfinite(one[:1, :, 2]).any()]
     if not low:
         raise refusal("render", "", "no posture in any frame", "at least one", "see recover --explain")
@@ -326,7 +327,7 @@ def _short(file: str) -> str:
 def _add_findings(
     frames: Sequence[Json], rows: Sequence[NDArray[np.intp]], report: Report, names: Sequence[str]
 ) -> list[Json]:
-    """Add the findings of each posture: the number of a place, value and bound; return the places."""
+    """Add the findings of each posture, as number of the place, value and bound; return the places."""
     found = report.findings
     places: dict[tuple[int, str], tuple[int, Json]] = {}
     starts = np.searchsorted(found["row"], np.arange(len(report) + 1))
@@ -460,7 +461,7 @@ def _with_head(joints: Array) -> Array:
 
 
 def _frame(recovery: Recovery, k: int, rows: NDArray[np.intp], reasons: dict[str, int]) -> Json:
-    """Gather what is known of one frame; `rows` are the survivors that the page holds."""
+    """Gather the facts of one frame; `rows` are the survivors that the page holds."""
     seen, answer, one = recovery.frames, recovery.answer, recovery[k]
     place = {row: number for number, row in enumerate(rows.tolist())}
     rejected = sorted(seen.rejected[k].items(), key=lambda item: (-item[1], item[0]))
@@ -502,7 +503,7 @@ def _frame(recovery: Recovery, k: int, rows: NDArray[np.intp], reasons: dict[str
 
 
 def _difference(first: Array, other: Array) -> str:
-    """Say in few words which joints of a posture (14, 3) are nearer to the camera, or farther, than in the first."""
+    """Describe which joints of a posture (14, 3) are nearer to the camera, or farther, than in the first."""
     depths = [np.array([one[b, 2] - one[a, 2] for a, b in TREE_SEGMENTS]) for one in (first, other)]
     change = np.nan_to_num(depths[1] - depths[0])
     order = [int(k) for k in np.argsort(-np.abs(change)) if abs(change[k]) > CLEARLY_NEARER][:2]
