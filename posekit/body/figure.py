@@ -248,7 +248,7 @@ class Figure(Robot):
             Height of the person, metres: lengths that are not given follow from it (`lengths_from_stature`), and the
             head is scaled with the stature.
         key_points : bool
-            Take lengths between key points of detectors from the stature (`lengths_from_stature`).
+            Use lengths between detectors' key points (`lengths_from_stature`).
         behind : bool, optional
             Whether the shoulders lie behind the line from neck to pelvis, if positions tell it
             (`shoulders_are_behind`).
@@ -302,7 +302,7 @@ class Figure(Robot):
         return points
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
-        """Return the figure as far as uncertain lengths determine it: the side of the shoulders may become unknown."""
+        """Return the figure with an unknown side of the shoulders if uncertain lengths do not determine it."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
         return replace(self, side_known=False)
@@ -386,7 +386,7 @@ class Figure(Robot):
         return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
 
     def inverse_kinematics(self, points: Array) -> Array:
-        """Return the configurations (N, nq) of postures (N, 19, 3) alone: see `configurations`."""
+        """Return only the configurations (N, nq) of postures (N, 19, 3): see `configurations`."""
         if len(points) > ROWS_AT_ONCE:
             rows = range(0, len(points), ROWS_AT_ONCE)
             return np.concatenate([self.inverse_kinematics(points[k : k + ROWS_AT_ONCE]) for k in rows])
@@ -421,7 +421,7 @@ class Figure(Robot):
         return head
 
     def _check_layout(self) -> None:
-        """Raise if joints lie otherwise than the closed forms assume."""
+        """Raise if the joints are not placed as the closed forms assume."""
         q = self.neutral[None].copy()
         q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
         near = np.linalg.norm(self.forward_kinematics(q)[0] - self._placed(q[0]), axis=-1) < SAME_POINT_METRES

@@ -1,11 +1,11 @@
 """Mass, centre of mass and moments of inertia of each part of the body.
 
 Masses, centres and radii of gyration are de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
-parameters", J Biomech 29:1223, Table 4, means of women and men: fractions of the body's mass and of a segment's
-length. The trunk is that from the cervicale to the middle of the hips, the shank that to the ankle's centre. Parts
-without a segment of their own in the figure use the length of another one: head and trunk that from the neck to the
-middle of the hips, the hand the forearm's, the foot, which is put into the ankle, the shank's. Below the navel the
-trunk moves with the hips; the rest of the whole trunk's moments, by Steiner's theorem, is the torso's.
+parameters", J Biomech 29:1223, Table 4, means of women and men: fractions of the body's mass and of a segment's length.
+The trunk reaches from the cervicale to the middle of the hips, the shank to the ankle's centre. Parts without a segment
+of their own in the figure use the length of another one: head and trunk the distance from the neck to the middle of the
+hips, the hand the forearm's length, the foot (placed at the ankle) the shank's. Below the navel the trunk moves with
+the hips; the torso has the remaining moments of the whole trunk, by Steiner's theorem.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 r"""The person in the frames of a recording: lengths, the side of the shoulders, and the noise of measuring.
 
-Bones keep their length: what a limb's length scatters over time is the measuring. Two ends with independent errors of
-standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
+Bones keep their length, so the scatter of a limb's length over time is measuring noise. Two ends with independent
+errors of standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
 
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 
@@ -30,27 +30,27 @@ LIMB_NAMES: Final = tuple(map(segment_name, LIMB_SEGMENTS))
 #: Standard deviation of normal numbers over their median absolute deviation.
 DEVIATION_OF_MAD: Final = 1.4826
 
-#: Frames from which noise is estimated: of ten frames and eight limbs it is within a quarter of the true one.
+#: Least number of frames for an estimate of noise: with ten frames and eight limbs its error is below a quarter.
 LEAST_FRAMES: Final = 10
 
-#: Distance of both knees together in front of the middles between hip and ankle, metres, in a frame that tells the
+#: Summed distance of both knees in front of the middles between hip and ankle, metres, above which a frame shows the
 #: side.
 BENT_METRES: Final = 0.04
 
-#: Largest noise of a limb that is believed, in multiples of the usual noise: more is a defect.
+#: Largest plausible noise of a limb, in multiples of the usual noise: a larger value is a defect.
 WORST_OF_USUAL: Final = 3.0
 
 #: Sizes of people, in multiples of the figure (1.75 m): newborns 0.28, the tallest man known 1.55.
 SIZE_BOUNDS: Final = (0.25, 1.6)
 
-#: Lengths of limbs that are believed, in multiples of the figure's at the person's size: adults vary by 5 %, and a
-#: newborn's legs are two thirds of an adult's.
+#: Plausible lengths of limbs, in multiples of the figure's at the person's size: adults vary by 5 %, and a newborn's
+#: legs are two thirds of an adult's.
 LIMB_BOUNDS: Final = (0.6, 1.6)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Person(Record):
-    """A person as the frames of a recording show them.
+    """A person, measured in the frames of a recording.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Person(Record):
     def noise_of(self, segment: str) -> float:
         """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse.
 
-        0 where too few frames show it.
+        0 if too few frames show the segment.
         """
         if math.isnan(self.noise):
             return 0.0
@@ -127,7 +127,7 @@ def _hips_forward(joints: Array) -> float:
 
 
 def _shoulders_behind(joints: Array) -> bool | None:
-    """Tell the side by the frames whose knees bend forward: in others left and right may be exchanged."""
+    """Return the side in the frames whose knees bend forward: in other frames left and right may be exchanged."""
     neck, pelvis, right, left = (
         joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
     )

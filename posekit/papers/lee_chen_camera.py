@@ -40,7 +40,8 @@ N_PICTURES: Final = 200
 #: Standard deviation on the image plane, metres: a tenth of a unit of Table A.2(b)'s fourth digit.
 IMAGE_NOISE: Final = 1e-6
 
-#: Parts of Table 2, and the largest difference (cm) that counts as agreement: the print was made from rounded data.
+#: Parts of Table 2, and the largest difference (cm) that counts as agreement: the printed values come from rounded
+#: data.
 TABLE_2_PARTS: Final = (
     ("(a), transformation matrix", "T", 0.03),
     ("(b), rotation matrix", "R", 1e-4),
@@ -147,7 +148,7 @@ def _table_2_rows() -> Iterator[Row]:
 
 
 def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
-    """Return how far off the camera is, centimetres, and the head point that does not fit the others."""
+    """Return the error of the camera's position, centimetres, and the head point that does not fit the others."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the misfit is returned
         pose = solve_pose(head, image, LeeChenCamera(f=None))
@@ -156,7 +157,7 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
 
 
 def _linear(head: HeadPoints, image: Array) -> float:
-    """Return how far off the camera of the linear solution is, centimetres; data are normalised (Hartley 1997)."""
+    """Return the error of the linear solution's camera position, centimetres; data are normalised (Hartley 1997)."""
     centre, middle = head.points.mean(axis=0), image.mean(axis=0)
     sizes = [np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean()) for at in (head.points, image)]
     P = _null_space((head.points - centre) / sizes[0], (image - middle) / sizes[1])[1].T

@@ -51,13 +51,13 @@ LOOSE_TANGENT_METRES: Final = 0.01
 #: Distance of every joint from its group's representative (§3.4); not printed.
 GROUP_METRES: Final = 0.05
 
-#: Distance of every joint within which a survivor is the input.
+#: Largest distance of a joint between a survivor and the input that are the same posture.
 SAME_METRES: Final = 1e-6
 
-#: Distance of a body whose segments are all within reach from every wrong start.
+#: Distance of a body from the camera at which every wrong start still reaches the next ray, metres.
 FAR_METRES: Final = 1e5
 
-#: Percentiles of all settings between which a printed count is usual.
+#: Percentiles over all settings that bound the usual counts.
 PERCENTILES: Final = (5.0, 95.0)
 
 
@@ -192,7 +192,7 @@ def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -
 
 @cache
 def physical_checks() -> Sequence[Check]:
-    """Return the checks of §3.2 in the parts that the tree can ask early."""
+    """Return the checks of §3.2, split into parts that the tree can apply early."""
     distances = [RigidParts(segments=(segment,), torso=False) for segment in RIGID_SEGMENTS]
     return [*distances, *JointRange().parts, *Collision().parts]
 

@@ -108,7 +108,7 @@ def row(key: str, here: str, fits: bool | None, **names: Any) -> Row:
     here : str
         Our result.
     fits : bool or None
-        Whether it agrees; None if the paper leaves open what decides it.
+        Whether the result agrees; None if the paper does not print a number that decides it.
     **names
         Values of the words in braces.
     """

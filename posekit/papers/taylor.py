@@ -200,7 +200,7 @@ def _proportion_rows() -> Iterator[Row]:
 
 
 def _accuracy_rows() -> Iterator[Row]:
-    """Measure six joints by §3.2: flips given by hand, a similarity that aligns them best."""
+    """Measure the error of six joints as in §3.2: with the true flips, after the best similarity."""
     figure = load_figure().scaled(stature=STATURE)
     camera = default_camera()
     rng = np.random.default_rng(0)

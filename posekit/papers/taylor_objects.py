@@ -1,10 +1,10 @@
 r"""Taylor 2000, Figs. 7 and 8: a closed chain and a flat one, whose shape fixes the scale (§2.1, §3.3).
 
 The paper prints neither lengths nor postures of its objects; these are posekit's own (`urdf/linkages`). Views from
-random directions are compared with the angles' sensitivity to noise. Unknown are the points :math:`X` (units of length,
-the first at depth 0) and the scale :math:`s`; seen is :math:`u = s\,(X_x, X_y)`. The lengths and planes are equations
-:math:`c(X) = 0`, so that only motions along :math:`N = \ker \partial c` are free, in which the noise of the points
-leaves the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2`, :math:`H = \partial u / \partial (X, s)`.
+random directions are compared with the angles' sensitivity to noise. The unknowns are the points :math:`X` (units of
+length, the first at depth 0) and the scale :math:`s`; the image shows :math:`u = s\,(X_x, X_y)`. The lengths and planes
+are equations :math:`c(X) = 0`, so that only motions along :math:`N = \ker \partial c` are free. The noise of the points
+gives them the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2`, :math:`H = \partial u / \partial (X, s)`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ ANGLE_STEP: Final = 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Constrained:
-    """An object whose shape fixes the scale, in one posture.
+    """An object whose shape determines the scale, in one posture.
 
     Parameters
     ----------
