@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, JOINTS
 from tests.test_checks_motion import RATE, gesture, judged, pendulum_walk
 from tests.test_checks_motion_laws import rows_of
 
@@ -36,6 +36,25 @@ def test_a_body_that_does_not_fall_hovers_and_lacks_support(seconds: float, foun
     assert bool(len(lacks)) is found
     # The slow half of each ramp looks like rest.
     assert lacks.value.to_numpy() == pytest.approx(seconds - 0.5, abs=0.1)
+
+
+def over_hands(height: float) -> np.ndarray:
+    """Return a standing person who goes over straight arms for 0.7 s, wrists at a height over the ground."""
+    joints, rows = standing(), slice(60, 81)
+    turned = joints[rows] * [1.0, -1.0, -1.0]
+    for side in ("right", "left"):
+        for above, below in (("shoulder", "elbow"), ("elbow", "wrist")):
+            top, end = JOINT[f"{side}_{above}"], JOINT[f"{side}_{below}"]
+            turned[:, end] = turned[:, top] - [0.0, 0.0, 0.27]
+    turned[..., 2] += height - turned[..., 2].min()
+    joints[rows] = turned + (0.5 * np.arange(21) / RATE)[:, None, None] * [1.0, 0.0, 0.0]
+    return joints
+
+
+@pytest.mark.parametrize(("height", "found"), [(0.07, False), (0.5, True)])
+def test_hands_that_reach_the_ground_carry_a_body(height: float, found: bool) -> None:
+    rows = rows_of(judged(over_hands(height), checks=["floating"]), "floating")
+    assert rows.frame.tolist() == (list(range(60, 81)) if found else [])
 
 
 def leaning(way: float) -> np.ndarray:
@@ -145,6 +164,17 @@ def test_a_file_at_another_height_has_the_same_doubts(level: float) -> None:
     for factor in (0.5, 2.0):
         (warning,) = judged(joints, time=factor * time).warnings
         assert "about 60 Hz would fit" in warning
+
+
+@pytest.mark.parametrize("up", ["+z", "-z", "+x", "-x", "+y", "-y"])
+def test_a_person_who_bends_stands_on_the_plane_through_the_origin(up: str) -> None:
+    joints = standing() + [3.0, 2.0, 0.0]
+    upper = [k for k, name in enumerate(JOINTS) if not name.endswith(("hip", "knee", "ankle"))]
+    hips = joints[:, HIPS].mean(axis=1, keepdims=True)
+    cos, sin = np.cos(np.radians(70)), np.sin(np.radians(70))
+    joints[:, upper] = hips + (joints[:, upper] - hips) @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    report = judged(joints, checks=["orientation"], up=up)
+    assert report.invalid.any() == (up != "+z")
 
 
 def test_upside_down_is_measured_from_up() -> None:

@@ -43,6 +43,9 @@ ANKLE_SHARE: Final = 0.039
 #: Length of thigh and shank, as a share of the stature (same figure).
 LEG_SHARE: Final = 0.245 + 0.246
 
+#: Length of the hand, wrist to fingertips, as a share of the stature (same figure).
+HAND_SHARE: Final = 0.108
+
 #: Stature that is assumed where no leg is known, metres.
 USUAL_STATURE: Final = 1.7
 
@@ -136,13 +139,9 @@ class Ground:
 
 @once
 def stature_of(body: Body) -> float:
-    """Return the stature, metres, by the median length of the legs; NaN where no leg is known."""
+    """Return the stature, metres, by the median length of the legs; the usual one if no leg is known."""
     legs = [known_median(leg) for leg in body.segment_lengths[LIMB_ROWS[4:]]]
-    return 2 * float(mean_known(np.array(legs))) / LEG_SHARE
-
-
-def _stature(body: Body) -> float:
-    stature = stature_of(body)
+    stature = 2 * float(mean_known(np.array(legs))) / LEG_SHARE
     return stature if stature > 0 else USUAL_STATURE
 
 
@@ -156,7 +155,7 @@ def soles(body: Body) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and the heights of their soles along up (T, 6)."""
     points = np.concatenate([body.feet, body.joints[:, both("ankle")]], axis=1)
     toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
-    over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(body)] * len(SIDES)
+    over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * stature_of(body)] * len(SIDES)
     return points, points @ up_of(body) - over
 
 
@@ -204,7 +203,9 @@ def ground_of(body: Body) -> Ground:
     else:
         low, high = np.percentile(held, (5, 98))
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(body))
+    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * stature_of(body))
+    # The palm and the fingers of a hand that carries the body are below its wrist.
+    hands = np.fmin.reduce(height[:, both("wrist")], axis=1) - lifted - HAND_SHARE * stature_of(body)
     return Ground(
         low=float(low),
         high=float(high - low),
@@ -214,7 +215,7 @@ def ground_of(body: Body) -> Ground:
         resting=resting,
         hanging=still & ~resting,
         centre=centre,
-        in_air=~resting & (lowest > high + air),
+        in_air=~resting & (np.fmin(lowest, hands) > high + air),
     )
 
 

@@ -30,11 +30,11 @@ TRAVEL_METRES: Final = 0.4
 #: Range of the height of the lowest joint, 5th to 95th percentile, metres: a body that lies stays on the ground.
 LEVEL_METRES: Final = 0.1
 
-#: Coordinate of the lowest joint along up, metres, of a person who stands on the plane through the origin.
+#: Coordinate of the lowest joint along up, metres, of a person on the plane through the origin.
 SOLE_METRES: Final = (-0.03, 0.2)
 
-#: Range of that coordinate, 5th to 95th percentile, metres.
-STEADY_METRES: Final = 0.12
+#: Percentiles of that coordinate, and the range between the outer two, metres. Flights take up to 40 % of the frames.
+STEADY_PERCENTILES, STEADY_METRES = (5, 50, 60), 0.12
 
 #: Height of the wrists below the neck from which hands may carry a body that is upside down, metres.
 REACH_METRES: Final = 0.1
@@ -46,8 +46,9 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
 
     A body is upside down if neck, pelvis and ankles are one above the other in the wrong order, and hands do not carry
     it. It lies by a wrong axis if trunk and legs are straight along one axis across up, as people stand, while the
-    body travels or its lowest point rises and sinks, as nobody who lies does; or if feet stand on the plane through the
-    origin across another axis, and not across up.
+    body travels or its lowest point rises and sinks, as nobody who lies does. It also lies by a wrong axis if it does
+    not stand upright, and its lowest joint stays on the plane through the origin across another axis, but not across up.
+    The value is the angle between up and the trunk, or between up and the other axis.
 
     Parameters
     ----------
@@ -58,9 +59,11 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
         raise NotAskedError(f"it needs {FEWEST_FRAMES} frames of motion")
     trunk = unit(body.joints[:, JOINT["neck"]] - body.joints[:, JOINT["pelvis"]])
     cosine = dot(trunk, up_of(body))
+    inverted = _inverted(body, cosine, upside_down)
+    axis = None if inverted else _other_up(body, trunk, cosine, aligned)
+    cosine = cosine if axis is None else np.full(len(body), axis @ up_of(body))
     angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    wrong = _inverted(body, cosine, upside_down) or _lies(body, trunk, cosine, aligned)
-    bound = np.degrees(np.arccos(LYING_COSINE)) if wrong else np.inf
+    bound = np.inf if axis is None and not inverted else np.degrees(np.arccos(LYING_COSINE))
     return Judgement(("body",), angle, upper=bound, scale=90.0)
 
 
@@ -74,34 +77,29 @@ def _inverted(body: Body, cosine: Array, share: float) -> bool:
     return bool(np.mean(turned & ~carried) >= share)
 
 
-def _lies(body: Body, trunk: Array, cosine: Array, share: float) -> bool:
-    middle = np.nanmean(trunk, axis=0)
-    axis = np.zeros(3)
-    axis[np.argmax(np.abs(middle))] = np.sign(middle[np.argmax(np.abs(middle))])
+def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | None:
+    """Return the axis (3,) that points up if it is not the stated one; None if nothing speaks for another axis."""
+    up, middle = up_of(body), np.nanmean(trunk, axis=0)
+    axes = (*np.eye(3), *-np.eye(3))
+    axis = max(axes, key=lambda one: float(one @ middle))
     hips, ankles = (body.joints[:, both(name)].mean(axis=1) for name in ("hip", "ankle"))
-    straight = (trunk @ axis > UPRIGHT_COSINE) & (unit(hips - ankles) @ axis > UPRIGHT_COSINE)
+    legs = unit(hips - ankles)
+    straight = (trunk @ axis > UPRIGHT_COSINE) & (legs @ axis > UPRIGHT_COSINE)
     if np.mean(straight & (np.abs(cosine) < LYING_COSINE)) >= share:
         across = hips - (hips @ axis)[:, None] * axis
         travel = float(np.linalg.norm(np.nanmax(across, axis=0) - np.nanmin(across, axis=0)))
-        if travel > TRAVEL_METRES or _range(np.fmin.reduce(body.height, axis=1)) > LEVEL_METRES:
-            return True
-    return not _stands(body, up_of(body), share) and any(
-        _stands(body, way, share) and bool(np.nanmedian(trunk @ way) > 0)
-        for way in (*np.eye(3), *-np.eye(3))
-        if float(way @ up_of(body)) < LYING_COSINE
-    )
+        level = np.ptp(np.nanpercentile(np.fmin.reduce(body.height, axis=1), (5, 95)))
+        if travel > TRAVEL_METRES or level > LEVEL_METRES:
+            return axis
+    upright = np.median((cosine > UPRIGHT_COSINE) & (legs @ up > UPRIGHT_COSINE)) > 0
+    if upright or _rests_on_origin(body, up):
+        return None
+    lower = [one for one in axes if one @ up < LYING_COSINE and np.nanmedian(trunk @ one) > 0]
+    return next((one for one in lower if _rests_on_origin(body, one)), None)
 
 
-def _stands(body: Body, up: Array, share: float) -> bool:
-    """Return whether ankles are the lowest joints along a direction, at one level on the plane through the origin."""
-    height = body.joints @ up
-    lowest = np.fmin.reduce(height, axis=1)
-    ankles = np.fmin.reduce(height[:, both("ankle")], axis=1)
-    level = SOLE_METRES[0] < float(np.nanmedian(lowest)) < SOLE_METRES[1]
-    return level and _range(lowest) < STEADY_METRES and bool(np.mean(ankles <= lowest) >= share)
-
-
-def _range(values: Array) -> float:
-    """Return the range between the 5th and the 95th percentile."""
-    low, high = np.nanpercentile(values, (5, 95))
-    return float(high - low)
+def _rests_on_origin(body: Body, up: Array) -> bool:
+    """Return whether the lowest joint along a direction (3,) is mostly at one level, on the plane through the origin."""
+    lowest = np.fmin.reduce(body.joints @ up, axis=1)
+    low, middle, high = np.nanpercentile(lowest, STEADY_PERCENTILES)
+    return bool(SOLE_METRES[0] < middle < SOLE_METRES[1] and high - low < STEADY_METRES)
