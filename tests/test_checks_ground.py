@@ -168,7 +168,7 @@ def test_a_file_at_another_height_has_the_same_doubts(level: float) -> None:
 
 @pytest.mark.parametrize("up", ["+z", "-z", "+x", "-x", "+y", "-y"])
 def test_a_person_who_bends_stands_on_the_plane_through_the_origin(up: str) -> None:
-    joints = standing() + [3.0, 2.0, 0.0]
+    joints = standing() + np.array([3.0, 2.0, 0.0])
     upper = [k for k, name in enumerate(JOINTS) if not name.endswith(("hip", "knee", "ankle"))]
     hips = joints[:, HIPS].mean(axis=1, keepdims=True)
     cos, sin = np.cos(np.radians(70)), np.sin(np.radians(70))

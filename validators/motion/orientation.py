@@ -45,9 +45,11 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     """Bodies are upside down, or lie as if another axis pointed up.
 
     A body is upside down if neck, pelvis and ankles are one above the other in the wrong order, and hands do not carry
-    it. It lies by a wrong axis if trunk and legs are straight along one axis across up, as people stand, while the
-    body travels or its lowest point rises and sinks, as nobody who lies does. It also lies by a wrong axis if it does
-    not stand upright, and its lowest joint stays on the plane through the origin across another axis, but not across up.
+    it. Another axis than the stated one points up in two cases. First, trunk and legs are straight along that axis, as
+    people stand, while the body travels or its lowest joint rises and sinks, unlike a body that lies. Second, the body
+    does not stand upright along the stated axis, and its lowest joint stays on the plane through the origin that is
+    perpendicular to the other axis, not on the one perpendicular to the stated axis.
+
     The value is the angle between up and the trunk, or between up and the other axis.
 
     Parameters
@@ -99,7 +101,7 @@ def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | 
 
 
 def _rests_on_origin(body: Body, up: Array) -> bool:
-    """Return whether the lowest joint along a direction (3,) is mostly at one level, on the plane through the origin."""
+    """Return whether the lowest joint along a direction (3,) mostly stays on the plane through the origin."""
     lowest = np.fmin.reduce(body.joints @ up, axis=1)
     low, middle, high = np.nanpercentile(lowest, STEADY_PERCENTILES)
     return bool(SOLE_METRES[0] < middle < SOLE_METRES[1] and high - low < STEADY_METRES)
