@@ -83,7 +83,7 @@ def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | 
     """Return the axis (3,) that points up if it is not the stated one; None if nothing speaks for another axis."""
     up, middle = up_of(body), np.nanmean(trunk, axis=0)
     axes = (*np.eye(3), *-np.eye(3))
-    axis = max(axes, key=lambda one: float(one @ middle))
+    axis: Array = max(axes, key=lambda one: float(one @ middle))
     hips, ankles = (body.joints[:, both(name)].mean(axis=1) for name in ("hip", "ankle"))
     legs = unit(hips - ankles)
     straight = (trunk @ axis > UPRIGHT_COSINE) & (legs @ axis > UPRIGHT_COSINE)
