@@ -22,12 +22,15 @@ Source = Any
 
 
 def opened(source: Source, layout: str = "", **facts: Any) -> Any:
-    """Return the content of a path or of an array in the order of a layout; other objects unchanged."""
+    """Return the content of a path, or an array of joints or configurations as motion; other objects unchanged."""
     from posekit.formats import open as open_file
-    from posekit.formats.arrays import has_layout
+    from posekit.formats.options import facts_of
+    from posekit.motion.validation import Judge
 
-    if isinstance(source, str | PathLike) or has_layout(source, layout):
+    if isinstance(source, str | PathLike):
         return open_file(source, layout, **facts)
+    if isinstance(source, list | tuple | np.ndarray):
+        return Judge(None, facts.get("urdf", ""), {}).motion(source, facts_of(layout=layout, **facts))
     return source
 
 
@@ -40,6 +43,8 @@ def recover(
     person: str = "",
     layout: str = "",
     rate: float | None = None,
+    fov: float | None = None,
+    size: str | tuple[int, int] | None = None,
     checks: Any = None,
     ranges: str | None = None,
     deviation: str | float | None = None,
@@ -69,6 +74,10 @@ def recover(
         Name of the key points' layout, or the path of a TOML layout.
     rate : float, optional
         Frames a second of key points that have no times.
+    fov : float, optional
+        Guess of the horizontal field of view, degrees, in place of a calibration.
+    size : (int, int) or str, optional
+        Width and height of the pictures, pixels, if no file has them; also as ``"1280x720"``.
     checks, ranges, deviation, length_deviation, coverage, group, follow : optional
         As the fields of `RecoverSettings`.
     figure : Figure, optional
@@ -103,7 +112,9 @@ def recover(
         stature=stature,
     )
     asked = (settings or RecoverSettings()).changed(**given)
-    view = view_of(source, camera=camera, person=person, layout=layout, rate=rate)
+    view = view_of(
+        source, camera=camera, person=person, layout=layout, rate=rate, fov=fov, size=picture_size(size)
+    )
     return recover_view(view, asked, figure=figure)
 
 
@@ -145,8 +156,9 @@ def view_of(
     from posekit.following.detections import Detections
     from posekit.formats import open as open_file
     from posekit.formats.arrays import key_points_of
-    from posekit.formats.options import Options
+    from posekit.formats.options import Options, facts_of
 
+    rate = facts_of(rate=rate).get("rate")
     name = source if isinstance(source, str | PathLike) else getattr(source, "source", "") or "recover"
     if isinstance(source, str | PathLike):
         source = open_file(source, layout, rate=rate)
@@ -218,9 +230,14 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
     InputError
         If the file holds no camera, or several and none is named.
     """
-    if camera is None or not isinstance(camera, str | PathLike):
-        return camera
+    from posekit.cameras import Camera
     from posekit.formats import open as open_file
+
+    if camera is None or isinstance(camera, Camera):
+        return camera
+    if not isinstance(camera, str | PathLike):
+        expected = "the file of a calibration, or a PinholeCamera"
+        raise refusal("", "camera", shown(type(camera).__name__), expected, "give one of these")
 
     path, name = str(camera), ""
     if not Path(path).exists() and ":" in path:
@@ -237,6 +254,27 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
             path, "", f"{len(cameras)} cameras", f"one of {', '.join(cameras)}", f"write {path}:NAME"
         )
     return cameras[name or next(iter(cameras))]
+
+
+def picture_size(size: Any) -> tuple[int, int] | None:
+    """Return a width and a height, given as two numbers or as ``"1280x720"``; None if nothing is given."""
+    if not size:
+        return None
+    sides = size.lower().split("x") if isinstance(size, str) else list(np.ravel(size))
+    if len(sides) != 2 or not all(str(side).isdigit() and int(side) for side in sides):
+        raise refusal("", "size", shown(size), "WIDTHxHEIGHT in pixels", "write it as 1280x720")
+    return int(sides[0]), int(sides[1])
+
+
+def frame_range(frame: Any) -> int | tuple[int, int] | None:
+    """Return a frame, or the first and the last, given as numbers or as ``"3"`` or ``"0-9"``."""
+    if frame is None:
+        return None
+    ends = frame.split("-") if isinstance(frame, str) else list(np.ravel(frame))
+    if len(ends) not in (1, 2) or not all(str(end).isdigit() for end in ends):
+        expected = "a frame from 0, or the first and the last"
+        raise refusal("", "frame", shown(frame), expected, "write it as 3 or 0-9")
+    return int(ends[0]) if len(ends) == 1 else (int(ends[0]), int(ends[1]))
 
 
 def convert(
@@ -286,10 +324,12 @@ def render(
     layout: str = "",
     urdf: str = "",
     rate: float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
     view: Source = None,
-    frame: int | tuple[int, int] | None = None,
+    frame: int | str | tuple[int, int] | None = None,
     which: str = "",
-    size: tuple[int, int] = (1280, 720),
+    size: str | tuple[int, int] = (1280, 720),
     azimuth: float | None = None,
     elevation: float | None = None,
     over: str | PathLike[str] | None = None,
@@ -302,16 +342,16 @@ def render(
         A robot is drawn at its neutral configuration. An array is joints (T, 14, 3), or (T, J, 3) in the order of the
         `layout`.
     target : path
-    layout, urdf, rate
+    layout, urdf, rate, unit, up
         As in `posekit.open`.
     view : path or View, optional
         View of a result: its image is drawn, too.
-    frame : int or (int, int), optional
-        Frame, or first and last frame, from 0.
+    frame : int, (int, int) or str, optional
+        Frame, or first and last frame, from 0; also as ``"3"`` or ``"0-9"``.
     which : {"", "answer", "path", "all", "first"} or str
         Postures of a result, or their numbers as ``0,4``.
-    size : (int, int)
-        Pixels.
+    size : (int, int) or str
+        Width and height, pixels; also as ``"1280x720"``.
     azimuth, elevation : float, optional
         Direction of the look, degrees; from the front and slightly above by default.
     over : path, optional
@@ -332,7 +372,7 @@ def render(
     from posekit.viewer import draw
 
     name = source if isinstance(source, str | PathLike) else "render"
-    source = opened(source, layout, rate=rate, urdf=urdf)
+    source = opened(source, layout, rate=rate, urdf=urdf, unit=unit, up=up)
     if isinstance(view, str | PathLike):
         view = opened(view)
     if isinstance(source, dict | Detections):
@@ -344,9 +384,9 @@ def render(
         source,
         target,
         view=view,
-        frame=frame,
+        frame=frame_range(frame),
         which=which,
-        size=size,
+        size=picture_size(size) or (1280, 720),
         azimuth=azimuth,
         elevation=elevation,
         over=over,

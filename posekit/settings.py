@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
@@ -16,8 +16,14 @@ from typing import Any, Final, Literal, Self, get_args
 from posekit.errors import nearest, refusal, shown
 from posekit.geometry import PER_METRE, Record
 
-#: Units of numbers given as text, and how many of each make one metre, pixel, degree or second; 100 % is one.
-UNITS: Final = {**PER_METRE, "in": 1 / 0.0254, "ft": 1 / 0.3048, "px": 1.0, "deg": 1.0, "s": 1.0, "%": 100.0}
+#: Units of numbers given as text, and how many of each make one metre, pixel, degree, second or hertz; 100 % is one.
+UNITS: Final = {
+    **PER_METRE,
+    "in": 1 / 0.0254,
+    "ft": 1 / 0.3048,
+    **dict.fromkeys(("px", "deg", "s", "Hz", "fps"), 1.0),
+    "%": 100.0,
+}
 
 #: Largest accepted relative standard deviation of lengths (dimensionless).
 MAX_LENGTH_DEVIATION: Final = 0.3
@@ -138,10 +144,13 @@ class Settings(Record):
     angle_tolerance: float | None = None
 
     def __post_init__(self) -> None:
+        for one in fields(self):
+            if one.type in ("str", "str | None") and getattr(self, one.name) is not None:
+                self._set(one.name, str(getattr(self, one.name)))
         if isinstance(self.checks, str):
             self._set("checks", tuple(name.strip() for name in self.checks.split(",") if name.strip()))
         elif self.checks is not None:
-            self._set("checks", tuple(self.checks))
+            self._set("checks", tuple(self.checks) if isinstance(self.checks, Iterable) else (self.checks,))
         if isinstance(self.rules, str):
             self._set("rules", tuple(int(rule) for rule in self.rules.split(",") if rule.strip().isdigit()))
         self._set("rules", tuple(self.rules))
@@ -274,8 +283,6 @@ class RecoverSettings(Settings):
         self._number("group", 0.0)
         self._number("follow", 0.0)
         self._set("follow", int(self.follow))
-        if isinstance(self.scale, float | int):
-            self._set("scale", str(self.scale))
 
     def tolerance(self, usual: Tolerance) -> Tolerance | None:
         """Return the tolerance that is given, completed from the `usual` one; None if no part is given."""

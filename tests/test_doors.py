@@ -206,3 +206,86 @@ def test_an_own_check_with_residuals_pulls_noisy_postures(folder: Path) -> None:
     assert np.median(BentElbow().angle(free)) < 35
     assert len(pulled)
     assert BentElbow().angle(pulled).min() > 38
+
+
+STANDING = np.repeat(posekit.load_figure().neutral_points[None, :14], 20, axis=0)
+
+#: Doors that take an array of joints, and facts about it.
+FACT_DOORS = {
+    "validate": lambda folder, **facts: posekit.validate(STANDING, **facts).decision,
+    "repair": lambda folder, **facts: posekit.repair(STANDING, **facts).report.decision,
+    "open": lambda folder, **facts: posekit.open(STANDING, "posekit_14", **facts).rate,
+    "convert": lambda folder, **facts: posekit.convert(STANDING, folder / "x.csv", **facts),
+    "render": lambda folder, **facts: posekit.render(STANDING, folder / "x.html", **facts),
+}
+
+
+@pytest.mark.parametrize("door", FACT_DOORS)
+class TestFactsAboutAnArray:
+    def test_spelling_does_not_matter(self, door: str, tmp_path: Path) -> None:
+        exact, loose = tmp_path / "exact", tmp_path / "loose"
+        exact.mkdir()
+        loose.mkdir()
+        same = FACT_DOORS[door](exact, rate=30.0, up="+z", unit="m")
+        assert FACT_DOORS[door](loose, rate="30 Hz", up="Z", unit="M") == same
+        for written in exact.iterdir():
+            assert (loose / written.name).read_bytes() == written.read_bytes()
+
+    @pytest.mark.parametrize(
+        ("name", "fact"),
+        [
+            *(("rate", wrong) for wrong in (0, -1.0, np.nan, "fast", [30])),
+            *(("up", wrong) for wrong in ("w", 3)),
+            *(("unit", wrong) for wrong in ("parsec", 1)),
+        ],
+    )
+    def test_an_impossible_fact_is_refused_by_its_name(
+        self, door: str, name: str, fact: Any, tmp_path: Path
+    ) -> None:
+        with pytest.raises(posekit.InputError, match=f"^{name}: "):
+            FACT_DOORS[door](tmp_path, **{"rate": 30.0, name: fact})
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda: posekit.validate(STANDING, rate=30, checks=3), "checks"),
+        (lambda: posekit.validate(STANDING, rate=30, ranges=3), "ranges"),
+        (lambda: posekit.validate(STANDING, rate=30, profile=3), "profile"),
+        (lambda: posekit.validate(STANDING, rate=30, urdf=3), "robot"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", camera=np.eye(3)), "camera"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", size="wide"), "size"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", rate=0), "rate"),
+        (lambda: posekit.render(STANDING, "x.png", frame="last"), "frame"),
+        (lambda: posekit.render(STANDING, "x.png", size=(0, 10)), "size"),
+    ],
+)
+def test_an_argument_of_another_kind_is_refused_by_its_name(call: Any, names: str) -> None:
+    with pytest.raises(posekit.InputError, match=names):
+        call()
+
+
+def test_text_stands_for_frames_and_sizes_as_on_the_command_line(folder: Path, tmp_path: Path) -> None:
+    posekit.render(folder / "walk.npz", tmp_path / "page.html", frame=(2, 5))
+    numbers = (tmp_path / "page.html").read_bytes()
+    posekit.render(folder / "walk.npz", tmp_path / "page.html", frame="2-5", size="640x480")
+    assert (tmp_path / "page.html").read_bytes() == numbers
+    coco = np.ones((1, 17, 2)) * np.arange(17)[:, None]
+    guess = posekit.recover(coco, layout="coco_17", fov=60, size="1280x720")
+    assert guess.camera == posekit.recover(coco, layout="coco_17", fov=60, size=(1280, 720)).camera
+
+
+def test_configurations_are_converted_and_drawn(tmp_path: Path) -> None:
+    robot = posekit.Validator("g1").robot
+    q = np.tile(robot.neutral, (3, 1))
+    posekit.convert(q, tmp_path / "g1.csv", urdf="g1", rate=50)
+    again = posekit.open(tmp_path / "g1.csv", urdf="g1")
+    np.testing.assert_allclose(again.q, q, atol=1e-9)
+    assert again.rate == pytest.approx(50)
+
+
+def test_the_figure_is_the_robot_of_its_validator() -> None:
+    validator = posekit.Validator()
+    assert validator.robot is validator.figure
+    assert validator.check(validator.robot.neutral).ok.all()

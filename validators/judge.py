@@ -360,26 +360,26 @@ class Validator:
     ) -> None:
         changes = stated(checks=checks, ranges=ranges, profile=profile, ground=ground, strict=strict)
         self.settings = (settings or ValidateSettings()).changed(**changes)
-        self.figure, self.robot = _loaded(urdf, self.settings)
-        chosen_checks(self.settings, of_robot=self.robot is not None, in_time=True)
+        self.robot = _loaded(urdf, self.settings)
+        chosen_checks(self.settings, of_robot=self.figure is None, in_time=True)
 
     def __repr__(self) -> str:
-        return f"Validator({self.body!r})"
+        return f"Validator({self.robot!r})"
 
     @property
-    def body(self) -> Robot:
-        """The figure or the robot."""
-        return self.figure or self.robot  # type: ignore[return-value]
+    def figure(self) -> Figure | None:
+        """The figure that judges; None if it is another robot."""
+        return self.robot if isinstance(self.robot, Figure) else None
 
     @property
     def model(self) -> Any:
         """Pinocchio's model of the figure or robot."""
-        return self.body.model
+        return self.robot.model
 
     @property
     def configuration_names(self) -> tuple[str, ...]:
         """Name of each entry of q."""
-        return self.body.configuration_names
+        return self.robot.configuration_names
 
     def check(
         self, given: Motion | ArrayLike, *, head: ArrayLike | None = None, tolerance: Tolerance | None = None
@@ -407,7 +407,8 @@ class Validator:
             If a shape is wrong or a number is infinite or absurd.
         """
         motion = given if isinstance(given, Motion) else self.motion(given, head)
-        robot, figure = self.robot, self.figure
+        figure = self.figure
+        robot = None if figure is not None else self.robot
         if figure is not None and motion.joints is None and motion.q is not None:
             if self.settings.ranges in ("auto", "urdf"):
                 robot = figure
@@ -440,7 +441,7 @@ class Validator:
                 raise refusal("postures", "", "a coordinate of kilometres", "metres", "scale them")
             points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
             return Motion(joints=points, joint_names=POINTS, **still)
-        body = self.body
+        body = self.robot
         if body.free_flyer and values.shape[1:] == (count - 7,):  # angles alone: the root is at neutral
             root = np.broadcast_to(body.neutral[:7], (len(values), 7))
             values = np.concatenate([root, values], axis=1)
@@ -459,27 +460,27 @@ class Validator:
 MOST_METRES: Final = 1e6
 
 
-def _loaded(urdf: Any, settings: ValidateSettings) -> tuple[Figure | None, Robot | None]:
+def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
     """Load the body that judges: the figure, a figure's own URDF, or a robot."""
-    if not isinstance(urdf, str | Path):
-        return (urdf, None) if isinstance(urdf, Figure) else (None, urdf)
+    from posekit.robots import Robot, load_robot
+
+    if isinstance(urdf, Robot):
+        return urdf
     name = str(urdf)
     if name in ("figure", "stick_figure"):
-        return load_figure(), None
-    from posekit.robots import load_robot
+        return load_figure()
 
     if Path(name).is_file():
         try:
-            return load_figure(name), None
+            return load_figure(name)
         except InputError:  # another robot, or the error that loading it as one words better
             pass
 
-    found: Any = None
-    for bodies in ("meshes", "capsules") if settings.bodies == "auto" else (settings.bodies,):
-        found = load_robot(name, srdf=settings.srdf, bodies=bodies, package_dirs=settings.package_dirs)
-        if found.collision_pairs:
-            break
-    return None, found
+    bodies = "meshes" if settings.bodies == "auto" else settings.bodies
+    found = load_robot(name, srdf=settings.srdf, bodies=bodies, package_dirs=settings.package_dirs)
+    if settings.bodies == "auto" and not found.collision_pairs:
+        return load_robot(name, srdf=settings.srdf, bodies="capsules", package_dirs=settings.package_dirs)
+    return found
 
 
 def assert_valid(

@@ -36,8 +36,6 @@ ALIASES: Final = {
 #: Names of the option for a layout.
 LAYOUT: Final = ("--layout", "--skeleton", "--format")
 
-ABOVE_ZERO: Final = click.FloatRange(min=0, min_open=True)
-
 
 def say(text: str, *, err: bool = False) -> None:
     """Print lines without control characters: names in files may hold escapes and line ends."""
@@ -129,7 +127,7 @@ def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         option("--camera", default=None, metavar="FILE[:NAME]", help=calibration),
         option("--person", default="", metavar="WHO", help="largest, surest, first or a track's number."),
         option(*LAYOUT, default="", metavar="NAME|FILE.toml", help="Names of the key points."),
-        option("--rate", "--fps", type=ABOVE_ZERO, metavar="HZ", help="Frames a second."),
+        option("--rate", "--fps", default=None, metavar="HZ", help="Frames a second."),
     )
 
 
@@ -169,7 +167,6 @@ def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[...
             "--rate",
             "--fps",
             default=None,
-            type=ABOVE_ZERO,
             metavar="HZ",
             panel=panel,
             help="Frames a second where the file has no times.",

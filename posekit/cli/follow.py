@@ -8,7 +8,6 @@ from typing import Any
 import click
 
 from posekit.cli.command import command, option, settings_from, settings_options
-from posekit.cli.recover import picture_size
 from posekit.errors import InputError
 from posekit.settings import RecoverSettings
 
@@ -35,7 +34,7 @@ def follow(
     """
     if not stdin:
         raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")
-    from posekit.doors import opened_camera
+    from posekit.doors import opened_camera, picture_size
     from posekit.following.lines import answers
     from posekit.following.tracker import Tracker
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import click
 
+from posekit import __version__
 from posekit.cli.command import progress_bar, say
 from posekit.errors import PosekitError, refusal
 from posekit.progress import show_with
@@ -73,7 +74,7 @@ class Commands(click.Group):
 
 
 @click.command(cls=Commands, no_args_is_help=True)
-@click.version_option(package_name="posekit", message="posekit %(version)s")
+@click.version_option(__version__, message="posekit %(version)s")
 def posekit() -> None:
     """Validate human and humanoid postures and motion, and recover every posture behind one view."""
 
@@ -88,7 +89,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     show_with(progress_bar if sys.stderr.isatty() else None)
     try:
-        code = posekit.main(standalone_mode=False)
+        code = posekit.main(prog_name="posekit", standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
         code = _fail("interrupted", INTERRUPTED)
     except Terminated:

@@ -49,7 +49,7 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
     """Recover every posture behind a view: each passes the checks and reprojects onto the image."""
     from posekit import save
-    from posekit.doors import opened_camera, view_of
+    from posekit.doors import opened_camera, picture_size, view_of
     from posekit.recovery.conductor import recover as recover_view
 
     settings = settings_from(RecoverSettings, given)
@@ -111,18 +111,6 @@ def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: 
     return lines + [
         f"frame {k}: {about['reason']}" for k, about in enumerate(found.frames) if about["reason"]
     ]
-
-
-def picture_size(text: str | None) -> tuple[int, int] | None:
-    """Read ``WxH``."""
-    from posekit.errors import refusal, shown
-
-    if not text:
-        return None
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and int(width) and int(height)):
-        raise refusal("", "--size", shown(text), "WIDTHxHEIGHT in pixels", "write it as 1280x720")
-    return int(width), int(height)
 
 
 def summary(recovery: Recovery, output: Path) -> list[str]:

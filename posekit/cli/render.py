@@ -8,7 +8,6 @@ from typing import Any
 import click
 
 from posekit.cli.command import command, option, output, reading, say
-from posekit.cli.recover import picture_size
 
 
 @command(
@@ -37,24 +36,9 @@ from posekit.cli.recover import picture_size
 @option("--elevation", type=float, default=None, metavar="DEGREES", help="Above the level.")
 @option("--over", default=None, metavar="PICTURES", help="Picture, folder or film to draw over.")
 @reading()
-def render(source: Path, output: Path, view: str | None, frame: str | None, size: str, **given: Any) -> None:
+def render(source: Path, output: Path, **given: Any) -> None:
     """Draw postures, motion, a result, a view or a report. Right limbs are orange, left ones blue."""
     from posekit.doors import render as draw
 
-    given.pop("unit"), given.pop("up")
-    draw(source, output, view=view, frame=frames(frame), size=picture_size(size) or (1280, 720), **given)
+    draw(source, output, **given)
     say(f"{output}")
-
-
-def frames(text: str | None) -> int | tuple[int, int] | None:
-    """Read ``K`` or ``A-B``."""
-    from posekit.errors import refusal, shown
-
-    if text is None:
-        return None
-    first, dash, last = text.partition("-")
-    if not first.isdigit() or (dash and not last.isdigit()):
-        raise refusal(
-            "", "--frame", shown(text), "a frame from 0, or the first and the last", "write it as 3 or 0-9"
-        )
-    return (int(first), int(last)) if dash else int(first)

@@ -40,7 +40,7 @@ BAD_INPUT = 2
     type=click.Path(path_type=Path),
     help="New folder for the clips that pass; with --keep-spans SECONDS also for good parts of the others.",
 )
-@option("--keep-spans", metavar="SECONDS", type=float, hidden=True, help="Least duration of a good part.")
+@option("--keep-spans", metavar="SECONDS", default=None, hidden=True, help="Least duration of a good part.")
 @option(
     "--repair",
     metavar="FILE|DIR",
@@ -53,7 +53,7 @@ def validate(
     sources: tuple[Path, ...],
     output: Path | None,
     keep: Path | None,
-    keep_spans: float | None,
+    keep_spans: str | None,
     repair: Path | None,
     **given: Any,
 ) -> None:

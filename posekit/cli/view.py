@@ -22,7 +22,6 @@ def view(source: Path, view: str | None, show: bool, **given: Any) -> None:
     from posekit.doors import render
 
     page = Path(tempfile.mkdtemp(prefix="posekit-")) / f"{source.stem}.html"
-    given.pop("unit"), given.pop("up")
     render(source, page, view=view, **given)
     say(str(page))
     if show:

@@ -72,7 +72,9 @@ def parse_xml(data: bytes, source: str) -> dict[str, Any]:
         reason = cut(one_line(str(error)))
         raise refusal(source, "", f"no plain XML: {reason}", "XML without a document type") from None
     if root.tag != "opencv_storage":
-        raise refusal(source, "", f"the root element <{cut(root.tag)}>", "<opencv_storage>")
+        raise refusal(
+            source, "", f"<{cut(root.tag)}>", "cameras in <opencv_storage>", "name a robot by its URDF"
+        )
     return {element.tag: _xml_value(element) for element in root}
 
 

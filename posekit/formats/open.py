@@ -12,7 +12,7 @@ from posekit.errors import refusal, shown
 from posekit.files import read_bytes
 from posekit.formats.node import undamaged
 from posekit.formats.options import Options
-from posekit.geometry import UP_AXES, Array
+from posekit.geometry import Array
 
 CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     # container: "module:parse" of (data: bytes, source: str) -> plain document, and the endings of its files
@@ -80,7 +80,9 @@ def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
         raise refusal(path, "", "an empty file", "one with data", "write or copy it again")
     if container is None:
         known = ", ".join(one for _, suffixes in CONTAINERS.values() for one in suffixes)
-        raise refusal(path, "", shown(suffix), f"a file of {known}", "convert it, or rename it")
+        raise refusal(
+            path, "", shown(suffix), f"a file of {known}", "export it as one of these, such as BVH or C3D"
+        )
     return container, named(CONTAINERS[container][0])(data, str(path))
 
 
@@ -141,15 +143,7 @@ def open(  # the door's name, as in `gzip.open`
     >>> posekit.open("samples/jump.bvh").rate
     30.0
     """
-    if up is not None and len(up) == 1:
-        up = f"+{up}"
     options = Options(layout=layout, unit=unit or "", up=up or "", rate=rate, urdf=urdf, person=person)
-    if options.unit and options.unit not in ("m", "cm", "mm", "in"):
-        raise refusal("", "unit", shown(options.unit), "m, cm, mm or in", "state one of them")
-    if options.up and options.up not in UP_AXES:
-        raise refusal("", "up", shown(options.up), f"one of {', '.join(UP_AXES)}", "state one of them")
-    if rate is not None and not 0 < rate < float("inf"):
-        raise refusal("", "rate", shown(rate), "frames a second, above 0", "state another")
     if not isinstance(path, str | PathLike):
         from posekit.formats.arrays import key_points_of, motion_of, numbers
 

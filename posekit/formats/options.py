@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any, Final
+
+from posekit.errors import refusal, shown
+from posekit.geometry import UP_AXES
+from posekit.settings import number
+
+#: Units of length of files.
+UNITS: Final = ("m", "cm", "mm", "in")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """Facts about a file that its user gives; an empty field is found in the file or from its values.
+
+    The unit and the axis may be in upper case, an axis without its sign is the positive one, and the rate may be text
+    such as ``"30 Hz"``.
 
     Attributes
     ----------
@@ -25,6 +36,11 @@ class Options:
         Person of a file of several people, from 0.
     notes, warnings : list of str
         Readers add the assumptions that they make, and the contradictions that a user must see.
+
+    Raises
+    ------
+    InputError
+        If the unit, the axis or the rate is impossible.
     """
 
     layout: str = ""
@@ -36,6 +52,21 @@ class Options:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        unit, up = str(self.unit).lower(), str(self.up).lower()
+        up = f"+{up}" if len(up) == 1 else up
+        if unit not in ("", *UNITS):
+            raise refusal("", "unit", shown(self.unit), "m, cm, mm or in", "state one of them")
+        if up not in ("", *UP_AXES):
+            raise refusal("", "up", shown(self.up), f"one of {', '.join(UP_AXES)}", "state one of them")
+        object.__setattr__(self, "unit", unit)
+        object.__setattr__(self, "up", up)
+        if self.rate is not None:
+            rate = number(self.rate, "rate", "frames a second, above 0", "state another")
+            if rate <= 0:
+                raise refusal("", "rate", shown(self.rate), "frames a second, above 0", "state another")
+            object.__setattr__(self, "rate", rate)
+
     def note(self, assumption: str) -> None:
         """Add an assumption."""
         self.notes.append(assumption)
@@ -43,3 +74,10 @@ class Options:
     def warn(self, contradiction: str) -> None:
         """Add a contradiction."""
         self.warnings.append(contradiction)
+
+
+def facts_of(**given: Any) -> dict[str, Any]:
+    """Return the facts that are given, not None, checked and spelled as in `Options`."""
+    stated = {name: fact for name, fact in given.items() if fact is not None}
+    options = Options(**stated)
+    return {name: getattr(options, name) for name in stated}

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, LengthUncertainty, load_figure
-from posekit.errors import InputError, refusal, shown
+from posekit.errors import InputError, refusal
+from posekit.formats.options import facts_of
 from posekit.motion.motion import Motion
 from posekit.progress import watched
 from posekit.settings import EXACT, Tolerance, ValidateSettings, number, stated
@@ -47,7 +48,7 @@ def validate(
     rate: float | None = None,
     person: int | None = None,
     keep: str | Path | None = None,
-    keep_spans: float | None = None,
+    keep_spans: str | float | None = None,
     checks: Any = None,
     ranges: str | None = None,
     profile: str | None = None,
@@ -70,7 +71,7 @@ def validate(
         its points in the layout's order.
     keep : path, optional
         New folder for the clips that pass: see `keep_clips`.
-    keep_spans : float, optional
+    keep_spans : float or str, optional
         Least duration of the longest valid span, seconds, that is kept of other clips.
     checks, ranges, profile, ground : optional
         As the fields of `ValidateSettings`, on top of the settings.
@@ -92,14 +93,13 @@ def validate(
     'keep 1 of 1 clip'
     """
     judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
-    facts = stated(layout=layout, unit=unit, up=up, rate=rate, person=person)
-    if rate is not None and not 0 < rate < np.inf:
-        raise refusal("", "rate", shown(rate), "frames a second, above 0", "correct it")
+    facts = facts_of(layout=layout, unit=unit, up=up, rate=rate, person=person)
     if not are_paths(given):
         return judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
     report = _files(list(files_of(given)), judge, facts)
     if keep is not None:
-        report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=keep_spans)))
+        spans = None if keep_spans is None else number(keep_spans, "keep-spans", "seconds")
+        report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=spans)))
     return report
 
 
@@ -213,7 +213,7 @@ class Judge:
         if not isinstance(given, Motion):
             return self._of_recovery(given)
         validator = self.validator(given.robot)
-        if given.joints is None or (validator.robot is not None and given.q is not None):
+        if given.joints is None or (validator.figure is None and given.q is not None):
             given = in_order(given, validator)
         return validator.check(given)
 
@@ -263,7 +263,7 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
     names = validator.configuration_names
     if not motion.q_names or tuple(motion.q_names) == names:
         return motion
-    if validator.robot is None:
+    if validator.figure is not None:
         got = f"configurations of {motion.robot or 'a robot'}"
         remedy = "name the robot with --urdf"
         remedy += ", or give the .trc of the markers" if motion.layout == "opensim" else ""

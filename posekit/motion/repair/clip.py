@@ -151,7 +151,7 @@ class Clip:
 
     def checks(self, *, over_time: bool) -> list[Check]:
         """Return the checks over time that are asked for, or those of postures."""
-        of_robot = self.validator.robot is not None
+        of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
 
@@ -409,7 +409,7 @@ class RobotClip(Clip):
     @cached_property
     def robot(self) -> Any:
         """The robot, or the figure, whose configurations these are."""
-        return self.validator.robot or self.validator.figure
+        return self.validator.robot
 
     @property
     def entries(self) -> Sequence[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from posekit.errors import InputError, refusal
 from posekit.files import write_bytes
 from posekit.formats.bvh import Bvh
-from posekit.formats.options import Options
+from posekit.formats.options import Options, facts_of
 from posekit.geometry import Record
 from posekit.motion.motion import PER_FRAME, Motion
 from posekit.motion.repair.clip import Clip, RobotClip
@@ -163,7 +163,7 @@ def repair(
     True
     """
     judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
-    facts = stated(layout=layout, unit=unit, up=up, rate=rate, person=person, urdf=judge.name)
+    facts = facts_of(layout=layout, unit=unit, up=up, rate=rate, person=person, urdf=judge.name)
     if are_paths(source):
         files = list(files_of(source))
         if len(files) > 1 or not Path(files[0]).samefile(str(source)):
@@ -239,7 +239,7 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
     if before.ok.all():
         return Repaired(motion=motion, before=before, report=before, notes=(_changed(0, len(motion)),))
     validator = judge.validator(motion.robot)
-    of_points = validator.robot is None and motion.joints is not None
+    of_points = validator.figure is not None and motion.joints is not None
     motion = replace(motion, q=None, q_names=(), robot="") if of_points else in_order(motion, validator)
     kind: type[Clip] = Clip if of_points else RobotClip
     given = clips = [kind.of(recording, validator) for _, recording in motion.recordings()]
