@@ -308,3 +308,17 @@ def test_lenses_are_undone_up_to_the_fold(name):
     straight = far * np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.linspace(0.1, 1, 24)[:, None]
     back = undistort(distort(straight, d, fisheye=fisheye), d, fisheye=fisheye)
     np.testing.assert_allclose(back, straight, atol=1e-12)
+
+
+@pytest.mark.parametrize("aside", [0.0, 3.0, 200.0, 1e4])
+@pytest.mark.parametrize("camera", [CAMERAS["orthographic"], ScaledOrthographicCamera(scale=3.7)])
+def test_a_segment_along_the_image_has_one_end_wherever_it_lies(camera, aside):
+    rng = np.random.default_rng(5)
+    turn, length = rng.uniform(0, 2 * np.pi, 200), rng.uniform(0.1, 0.5, 200)
+    start = np.column_stack(
+        [aside + rng.uniform(size=200), -aside + rng.uniform(size=200), np.full(200, 2.0)]
+    )
+    end = start + length[:, None] * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(200)])
+    lift = camera.lift(start, camera.project(end), length, tolerance=0.0)
+    assert lift.valid.tolist() == [[True, False]] * 200
+    np.testing.assert_allclose(lift.points[:, 0], end, atol=1e-9 * (1 + aside))

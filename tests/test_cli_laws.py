@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import posekit
+from posekit.cli.recover import probability
 from posekit.settings import RecoverSettings, ValidateSettings
 from tests.test_cli import folder, run
 from tests.test_report_validate import clip
@@ -227,3 +228,10 @@ def test_options_win_over_set_and_set_over_a_file(run: Any, tmp_path: Path) -> N
     assert run("recover", "walk.json", "-o", str(tmp_path / "a.json"), *words, "--coverage", "0.95")[0] == 0
     found = posekit.open(tmp_path / "a.json").settings
     assert (found["coverage"], found["ranges"], found["follow"]) == (0.95, "table1", 1)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "less than 0.01"), (0.009, "less than 0.01"), (0.012, "0.01"), (0.976, "0.98")]
+)
+def test_small_probabilities_are_printed_as_a_bound(value: float, text: str) -> None:
+    assert probability(value) == text

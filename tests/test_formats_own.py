@@ -160,6 +160,9 @@ def changed(place: str, value: Any = None) -> Callable[[Any], None]:
             "frames[1].tme: got a field; expected no field of this name; did you mean time?",
         ),
         (changed("frames/2/image", []), "frames[2].image: got []; expected an object"),
+        (changed("frames/1/image/left_knee", ["1.0", "2.0"]), "frames[1].image.left_knee: got "),
+        (changed("frames/1/image/left_knee", [True, False]), "frames[1].image.left_knee: got "),
+        (changed("camera/K", [["9", "0", "3"], ["0", "9", "2"], ["0", "0", "1"]]), "camera.K: got "),
         (
             changed("camera/K/0", [1.0, 2.0]),
             "camera.K: got a list of 3 entries; expected finite numbers, 3 x 3",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from posekit.papers.lee_chen_walks import count_walks, grown
 from posekit.papers.rows import Row, Rows, printed, row, write_rows
 from posekit.papers.taylor import taylor_figure
 from posekit.skeleton import JOINTS, PARENTS
-from posekit.synthesis import builtin_view
+from posekit.synthesis import Walker, builtin_view, walker_view
 
 N_ROWS = 127
 """Statements of both papers that have a row."""
@@ -120,6 +121,60 @@ def test_errata_of_table_a2_and_of_the_camera(rows: Rows) -> None:
     assert "right eye" in eye.check and eye.here == "-31.168 cm"
     (null_space,) = of(rows, "§2.1, eqs. (4)")
     assert null_space.here == "5.000000 and (400.000000, 0.000000, 0.000000) cm"
+
+
+def test_errors_of_exact_statements_are_those_of_rounding(rows: Rows) -> None:
+    found = {one.place: re.match(r"(\S+) (cm |m |degrees )?off", one.here) for one in rows}
+    errors = {place: float(match[1]) for place, match in found.items() if match}
+    printed_to = {
+        "Table A.2(b)": 5e-4,
+        "Table 2(a)": 0.05,
+        "Table 2(b)": 1e-4,
+        "Table 2(c)": 0.05,
+        "Table 2(d)": 0.05,
+    }
+    assert len(errors) == 14
+    for place, error in errors.items():
+        if place != "§2.1: the camera by the linear solution":
+            assert error < next((most for start, most in printed_to.items() if place.startswith(start)), 1e-9)
+    (camera,) = of(rows, "§2.1: the camera by the linear solution")
+    linear, refined = map(float, re.findall(r"\d+\.\d+", camera.here))
+    assert refined < 0.5 < 2.0 < linear < 10.0
+
+
+@pytest.mark.parametrize("name", ["seq1", "seq2"])
+def test_walkers_are_counted_at_their_own_phase(name: str) -> None:
+    """Frames 1, 3, 5 of a setting are pictures 0.4 s apart of a walk that starts at its phase."""
+    with pytest.MonkeyPatch.context() as small:
+        small.setitem(lee_chen_walks.GRIDS, "phases", (np.array([0.8]), np.array([2.0]), 3))
+        walks = count_walks(name, "phases")
+    camera = lee_chen_walks.SEQUENCES[name][0]
+    walker = Walker(velocity=0.8, lean=np.radians(2.0))
+    assert walks.settings[:, :2].tolist() == [[0.8, 2.0]] * 3
+    assert walks.settings[:, 2] == pytest.approx([0, 1 / 3, 2 / 3])
+    for levels, phase in zip(walks.levels, walks.settings[:, 2], strict=True):
+        view = walker_view(walker, camera=camera, frames=5, dt=0.2, phase0=phase)
+        for number, frame in enumerate((0, 2, 4)):
+            code = grown(view.take([frame]))[0].code
+            alive = [len(np.unique(code >> (13 - level))) for level in range(14)]
+            assert levels[0, number].tolist() == alive
+
+
+def test_remarks_on_the_walks_are_shares_of_their_settings(rows: Rows) -> None:
+    def shares(start: str) -> list[int]:
+        (one,) = of(rows, start)
+        return [int(share) for share in re.findall(r"(\d+)%", one.here)]
+
+    with pytest.MonkeyPatch.context() as small:
+        small.setitem(lee_chen_walks.GRIDS, "few", (np.array([0.7, 1.0]), np.array([0.0]), 4))
+        first, second = (count_walks(name, "few").levels for name in ("seq1", "seq2"))
+    nodes = first[:, 0, 0]
+    wrist = [1 < after / before < 2 for before, after in nodes[:, 7:9]]
+    assert shares("§4.1.B(ii), SEQ1, frame 1") == [pytest.approx(100 * np.mean(wrist), abs=0.6)]
+    assert 0 < sum(wrist) < len(wrist)
+    for name, joint in (("elbows", 6), ("knees", 10)):
+        same = [(one[:, 1, :, joint] == one[:, 1, :, joint + 1]).mean(axis=0) for one in (first, second)]
+        assert shares(f"§4.1.B: with Rule 1 the two {name}") == pytest.approx(100 * np.ravel(same), abs=0.6)
 
 
 def test_taylors_figure_has_his_proportions_at_any_height() -> None:

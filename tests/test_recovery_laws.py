@@ -17,7 +17,7 @@ from posekit.cameras import PinholeCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
 from posekit.skeleton import JOINTS, other_side
-from posekit.synthesis import random_views
+from posekit.synthesis import forget_camera, random_views
 from tests.test_cli import folder, run
 
 __all__ = ["folder", "run"]  # fixtures
@@ -126,6 +126,43 @@ def test_exact_postures_alone_are_listed_if_points_are_not_to_be_refined(view: p
         found = posekit.recover(replace(exact, image=image), posekit.RecoverSettings(refine=refine))
         assert (len(found.survivors) == 0) is empty
         assert not empty or set(found.frames.reason) == {"no posture is exact"}
+
+
+@pytest.mark.parametrize("within", [0.1, 0.25, 0.6])
+def test_a_posture_joins_the_first_leader_that_is_near(within: float) -> None:
+    """The likeliest posture without a group leads the next one."""
+    found = posekit.recover(posekit.builtin_view("seq2"), group=within)
+    for k in range(len(found)):
+        joints, leaders = found[k].joints, list[int]()
+        for row, one in enumerate(joints):
+            near = [n for n in leaders if np.linalg.norm(one - joints[n], axis=1).max() <= within]
+            leaders += [] if near else [row]
+            assert found[k].group[row] == (leaders.index(near[0]) if near else len(leaders) - 1)
+
+
+@pytest.mark.parametrize("photograph", [True, False])
+def test_regions_are_as_wide_as_errors_are(photograph: bool) -> None:
+    """Squares of 95 % radii are 2.6 times those of errors if errors are normal and alike in all directions."""
+    seen = random_views(12, np.random.default_rng(2), distance=(3.0, 6.0))
+    noise = np.random.default_rng(3).normal(0, 4.0, seen.truth.shape[:2] + (2,))
+    calibrated = posekit.View(
+        camera=CAMERA,
+        image=CAMERA.project(seen.truth) + noise,
+        time=seen.time,
+        root=seen.truth[:, 0],
+        deviation=4.0,
+        lengths=dict(posekit.load_figure().lengths),
+    )
+    given, known = (forget_camera(seen), {"stature": 1.75}) if photograph else (calibrated, {})
+    found = posekit.recover(given, **known)
+    radii, errors = [], []
+    for one, truth in zip(found, seen.truth, strict=True):
+        away = one.joints - one.joints.mean(axis=1, keepdims=True) - (truth - truth.mean(axis=0))
+        off = np.linalg.norm(away, axis=2)
+        radii.append(one.radius[off.mean(axis=1).argmin()])
+        errors.append(off[off.mean(axis=1).argmin()])
+    assert 1.0 < np.mean(np.square(radii)) / np.mean(np.square(errors)) < 7.0
+    assert np.mean(np.less_equal(errors, radii)) > 0.85
 
 
 @pytest.mark.parametrize(("place", "seen"), [(-1.0, False), (0.0, True), (639.0, True), (640.0, False)])

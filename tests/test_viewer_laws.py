@@ -16,8 +16,10 @@ import posekit
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.motion import Motion
 from posekit.skeleton import DOFS, JOINT, TREE_SEGMENTS
+from posekit.synthesis import random_views
 from posekit.viewer.scene import Stage, camera_lines
 from posekit.viewer.subjects import subjects_of
+from tests.test_report_laws import random_report
 from tests.test_report_validate import clip as gesture
 from tests.test_viewer import data_of, drawn, motion, points_of, recovery, side_pixels, vars_of, view
 
@@ -69,6 +71,19 @@ def test_a_page_of_a_result_holds_its_table(
     for k, body in enumerate(truth):
         cam = (body + data["frames"][k]["origin"] - camera["position"]) @ R.T
         np.testing.assert_allclose(cam, view.truth[k], atol=2e-3)
+
+
+def test_a_page_counts_the_postures_that_it_leaves_out(folder: Path) -> None:
+    seen = random_views(3, np.random.default_rng(3))
+    found = posekit.recover(seen, checks=["collision"])
+    for frame, shown in ((None, [0, 1, 2]), ((1, 2), [1, 2])):
+        posekit.render(found, folder / "many.html", view=seen, frame=frame)
+        data = data_of(folder / "many.html")
+        assert [one["number"] for one in data["frames"]] == shown
+        assert [one["count"] for one in data["frames"]] == [len(found[k]) for k in shown]
+        held = sum(one["held"] for one in data["frames"])
+        assert data["left"] == sum(len(found[k]) for k in shown) - held > 0
+        assert len(unpacked(data, "probability")) == len(unpacked(data, "number")) == held
 
 
 def test_a_page_of_a_tilted_camera_stands_upright(folder: Path, view: posekit.View) -> None:
@@ -227,6 +242,19 @@ def test_timelines_are_to_scale(folder: Path) -> None:
         assert ((bar[:, 0].min() - origin) / step, (bar[:, 0].max() - origin) / step) == pytest.approx(
             (span.first, span.last + 1), abs=0.05
         )
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_timelines_count_the_frames_of_their_clips(folder: Path, seed: int) -> None:
+    report = random_report(seed)
+    posekit.render(report, folder / "counts.svg")
+    text = (folder / "counts.svg").read_text(encoding="utf-8")
+    of_clip, verdict = np.asarray(report.clip), np.array(report.verdicts)
+    assert {"invalid", "undecided"} <= set(verdict)
+    for number, one in enumerate(report.clips):
+        mine = verdict[of_clip == number]
+        frames = f"{len(mine)} frame{'s' * (len(mine) != 1)}"
+        assert f"{one.title}: {one.decision}; {int((mine != 'valid').sum())} of {frames} not valid" in text
 
 
 # Scenes

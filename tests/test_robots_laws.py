@@ -1,0 +1,49 @@
+"""Laws of robots: links stand where another reader of URDFs puts them, whatever kind of joint a joint follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yourdfpy
+
+from posekit.robots import Robot
+from tests.test_robots import LIMIT, joint, link, text
+
+
+def following(of: str, factor: float, offset: float) -> str:
+    return f'{LIMIT}<mimic joint="{of}" multiplier="{factor}" offset="{offset}"/>'
+
+
+FOLLOWERS = text(
+    *map(link, "abcdefgh"),
+    joint("hinge", "a", "b"),
+    joint("turn", "b", "c", "continuous", ""),
+    joint("slide", "c", "d", "prismatic"),
+    joint("behind_turn", "d", "e", inside=following("turn", 0.5, 0.2)),
+    joint("turns_with_hinge", "e", "f", "continuous", '<mimic joint="hinge" multiplier="3" offset="-0.4"/>'),
+    joint("slides_with_hinge", "f", "g", "prismatic", following("hinge", -0.25, 0.05)),
+    joint("hinges_with_slide", "g", "h", inside=following("slide", 0.7, 0)),
+)
+"""Joints of each kind that follow joints of each kind."""
+
+
+@pytest.mark.parametrize("upper", [False, True])
+def test_links_stand_where_another_reader_of_the_urdf_puts_them(upper: bool, tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(FOLLOWERS, encoding="utf-8")
+    other = yourdfpy.URDF.load(str(tmp_path / "r.urdf"), load_meshes=False, load_collision_meshes=False)
+    robot = Robot(urdf=FOLLOWERS, fixed_base=True)
+    names = ["hinge", "turn", "slide"]
+    values = np.random.default_rng(1).uniform(-0.9, 0.9, (4, 3)) * [1, 3, 1]
+    columns = [f"{name}_joint".upper() if upper else name for name in names]
+    q, notes = robot.q_from_columns(columns, values)
+    assert notes == () and np.allclose(robot.mimic_errors(q), 0, atol=1e-12)
+    data = robot.model.createData()
+    for row, given in zip(q, values, strict=True):
+        other.update_cfg(dict(zip(names, given, strict=True)))
+        pin.framesForwardKinematics(robot.model, data, row)
+        for name in "bcdefgh":
+            placed = data.oMf[robot.model.getFrameId(name)].homogeneous
+            np.testing.assert_allclose(placed, other.get_transform(name, "a"), atol=1e-9)
