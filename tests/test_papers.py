@@ -139,7 +139,7 @@ def test_errors_of_exact_statements_are_those_of_rounding(rows: Rows) -> None:
             assert error < next((most for start, most in printed_to.items() if place.startswith(start)), 1e-9)
     (camera,) = of(rows, "§2.1: the camera by the linear solution")
     linear, refined = map(float, re.findall(r"\d+\.\d+", camera.here))
-    assert refined < 0.5 < 2.0 < linear < 10.0
+    assert refined < 0.5 and 2.0 < linear < 10.0
 
 
 @pytest.mark.parametrize("name", ["seq1", "seq2"])

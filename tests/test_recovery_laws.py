@@ -144,7 +144,7 @@ def test_a_posture_joins_the_first_leader_that_is_near(within: float) -> None:
 def test_regions_are_as_wide_as_errors_are(photograph: bool) -> None:
     """Squares of 95 % radii are 2.6 times those of errors if errors are normal and alike in all directions."""
     seen = random_views(12, np.random.default_rng(2), distance=(3.0, 6.0))
-    noise = np.random.default_rng(3).normal(0, 4.0, seen.truth.shape[:2] + (2,))
+    noise = np.random.default_rng(3).normal(0, 4.0, (*seen.truth.shape[:2], 2))
     calibrated = posekit.View(
         camera=CAMERA,
         image=CAMERA.project(seen.truth) + noise,
