@@ -21,6 +21,7 @@ from posekit.papers.rows import Row, Rows, printed, row, write_rows
 from posekit.papers.taylor import taylor_figure
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Walker, builtin_view, walker_view
+from posekit.synthesis.views import SEQUENCES
 
 N_ROWS = 127
 """Statements of both papers that have a row."""
@@ -148,7 +149,7 @@ def test_walkers_are_counted_at_their_own_phase(name: str) -> None:
     with pytest.MonkeyPatch.context() as small:
         small.setitem(lee_chen_walks.GRIDS, "phases", (np.array([0.8]), np.array([2.0]), 3))
         walks = count_walks(name, "phases")
-    camera = lee_chen_walks.SEQUENCES[name][0]
+    camera = SEQUENCES[name][0]
     walker = Walker(velocity=0.8, lean=np.radians(2.0))
     assert walks.settings[:, :2].tolist() == [[0.8, 2.0]] * 3
     assert walks.settings[:, 2] == pytest.approx([0, 1 / 3, 2 / 3])
