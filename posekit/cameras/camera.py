@@ -73,7 +73,7 @@ class Camera(Record):
         start : array (F, ..., 3)
             Known ends, camera frame, metres.
         pixel : array (F, ..., 2)
-            Image points of the other ends.
+            Image points of the other ends; their axes broadcast against those of `start`.
         length : array broadcastable to (F, ...)
             Lengths, metres.
         tolerance : float

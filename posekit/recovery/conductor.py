@@ -34,8 +34,9 @@ from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
 #: Packages that decide a result.
 VERSIONED: Final = {"posekit": posekit, "pin": pinocchio, "numpy": np}
 
-#: Frames that are recovered together: enough to spread NumPy's overhead. The result does not depend on them.
-FRAMES_AT_ONCE: Final = 64
+#: Frames whose trees are grown together, and frames that are solved together: enough to spread NumPy's overhead, few
+#: enough to keep memory small. The result does not depend on them.
+GROWN_AT_ONCE, SOLVED_AT_ONCE = 256, 64
 
 #: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
 MANY: Final = 3000
@@ -83,11 +84,11 @@ def recover(
     person = person_of(view, settings, figure)
     lengths = uncertainty_of(view, settings, own_figure=figure is not None)
     conductor = _Conductor(view, settings, person, lengths)
-    for stage in conductor.stages():
+    for stage, at_once in conductor.stages():
         left = np.array(sorted(conductor.found.open), dtype=np.intp)
-        starts = range(0, len(left), FRAMES_AT_ONCE)
+        starts = range(0, len(left), at_once)
         for start in watched(starts, "recovering") if starts else ():
-            stage(left[start : start + FRAMES_AT_ONCE])
+            stage(left[start : start + at_once])
     recovery = conductor.found.recovery(conductor.margins, **conductor.about())
     if settings.follow:
         from importlib import import_module
@@ -123,20 +124,20 @@ class _Conductor:
             self.person, self.settings, self.lengths, self.up.direction, photograph=self.photograph
         )
 
-    def stages(self) -> Iterator[Callable[[Ints], None]]:
-        """Yield what is done, one after the other, with the frames that are open."""
+    def stages(self) -> Iterator[tuple[Callable[[Ints], None], int]]:
+        """Yield the stages in order: a function of open frames, and how many of them it takes at once."""
         found = self.found
         if self.judged == "tolerated":
-            yield self._grow
+            yield self._grow, GROWN_AT_ONCE
             why = "its neck is not known, or a joint is not seen"
             found.close(*found.open, judged="tolerated", reason=why)
         elif self.sight.may_be_exact:
-            yield self._grow
+            yield self._grow, GROWN_AT_ONCE
             if self.settings.refine is False:
                 found.close(*found.open, judged="exact", reason="no posture is exact", rejected={})
             elif not self.photograph:
-                yield partial(self._solve, sharp=True)
-        yield partial(self._solve, sharp=False)
+                yield partial(self._solve, sharp=True), SOLVED_AT_ONCE
+        yield partial(self._solve, sharp=False), SOLVED_AT_ONCE
 
     def _grow(self, part: Ints) -> None:
         """Grow the exact trees of some frames; frames whose points cannot be exact are left open."""
@@ -155,29 +156,33 @@ class _Conductor:
             head=sight.head,
             tolerance=tolerance.tangent,
         )
-        lost = {k: Counter[str]() for k in sight.frame.tolist()}
-        for k, rejected in zip(sight.frame.tolist(), trees.rejected, strict=True):
-            lost[k].update(rejected)
+        lost: dict[int, Counter[str]] = {}
+        levels: dict[int, Ints] = {}
+        for k, rejected, own in zip(sight.frame.tolist(), trees.rejected, trees.levels, strict=True):
+            lost[k] = lost[k] + rejected if k in lost else rejected
+            levels[k] = levels.get(k, 0) + own
         frame = sight.frame[trees.frame]
         if self.judged == "exact":
             lost = {k: lost[k] for k in self._closing(frame, trees.joints, lost)}
-        own = np.flatnonzero(np.isin(frame, list(lost)))
-        row, joints, short = trees.frame[own], trees.joints[own], trees.length_residual[own]
+        kept = np.flatnonzero(np.isin(frame, list(lost)))
+        row, joints, short = trees.frame[kept], trees.joints[kept], trees.length_residual[kept]
         columns = {
-            "frame": frame[own],
+            "frame": frame[kept],
             "joints": joints,
             "head": sight.head[row],
-            "branch": trees.branches[own],
+            "branch": trees.branches[kept],
             "scale": sight.scale[row],
         }
         deviation = deviation_of_tolerance(tolerance.rigid)
         terms = log_terms(joints, deviation=deviation, lengths=lengths, length_residual=short, up=self.up)
         # The tree asked checks about the points that they name; what has parts has named all that it reads.
         late = [check for check in self.checks if not hasattr(check, "parts")]
-        reason, _ = certified(self.exact, late, with_head(joints, sight.head[row]))
+        reason = np.full(len(joints), "")
+        if late:
+            reason, _ = certified(self.exact, late, with_head(joints, sight.head[row]))
         self.found.add(self.judged, lost, columns, terms, reason)
         for k in lost:
-            self.found.frames["levels"][k] = trees.levels[sight.frame == k].sum(axis=0).tolist()
+            self.found.frames["levels"][k] = levels[k].tolist()
 
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
         """Return the frames in which a branch closes torso and hips exactly, which only exact image points do."""
@@ -187,7 +192,8 @@ class _Conductor:
         closing = set(frame[(off <= 10 * EXACT.rigid).all(axis=1)].tolist())
         if "rigid-parts" in [check.name for check in self.checks]:
             before = ("rigid-parts/", "no-solution/")
-            closing |= {k for k, names in lost.items() if not all(name.startswith(before) for name in names)}
+            others = lost.keys() - closing
+            closing |= {k for k in others if not all(name.startswith(before) for name in lost[k])}
         return closing
 
     def _solve(self, part: Ints, *, sharp: bool) -> None:

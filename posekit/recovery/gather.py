@@ -114,10 +114,11 @@ class Gathering:
         held[first] = True
         unlisted = np.bincount(frame[~held], minlength=len(self.view))
         improbable = np.bincount(frame[~held], probability[~held], len(self.view)).astype(np.float64)
-        found = np.array(sorted(set(frame.tolist())), dtype=np.intp)
-        for k in found.tolist() if leave else lost:
-            worst = max(lost[k], key=lambda name: lost[k][name], default="").replace("/", " at ")
-            why = "" if k in found else f"no posture passes: most fail {worst}"
+        passed = set(frame.tolist())
+        found = np.array(sorted(passed), dtype=np.intp)
+        for k in passed if leave else lost:
+            worst = max(lost[k], key=lost[k].__getitem__, default="").replace("/", " at ")
+            why = "" if k in passed else f"no posture passes: most fail {worst}"
             about = {"unlisted": int(unlisted[k]), "unlisted_probability": improbable[k]}
             self.close(k, rejected=dict(lost[k]), judged=judged, reason=why, **about)
         if len(found):
@@ -152,7 +153,7 @@ class Gathering:
         if self.settings.group is not None:
             each = np.split(joints, starts[1:])
             table["group"] = np.concatenate([group_of(one, self.settings.group) for one in each])
-        self.survivors.append(Survivors(**table))
+        self.survivors.append(Survivors(**frozen(table)))
         answers: Callable[[], dict[str, Any]] = partial(
             answers_of, joints, frame, probability, covariance, self.lengths, relative, unlisted
         )
@@ -190,12 +191,12 @@ class Gathering:
             order = np.argsort(table["frame"], kind="stable")
             table = {name: values[order] for name, values in table.items()}
         starts = np.searchsorted(table["frame"], np.arange(len(view)))
-        points = with_head(table["joints"], table["head"])
+        points = partial(with_head, table["joints"], table["head"])
         return Recovery(
             survivors=Survivors(
-                q=partial(self.person.inverse_kinematics, points),
-                margins=partial(margins, points, table["chi2"] > 0),
-                **table,
+                q=lambda: self.person.inverse_kinematics(points()),
+                margins=lambda: margins(points(), table["chi2"] > 0),
+                **frozen(table),
             ),
             frames=Frames(pictures=view.pictures, **self.frames),
             answer=partial(self.answer, starts),
@@ -206,6 +207,13 @@ class Gathering:
             source=view.source,
             **about,  # type: ignore[arg-type]
         )
+
+
+def frozen(table: dict[str, Any]) -> dict[str, Any]:
+    """Make the columns of a table read-only, so that they need not be copied."""
+    for values in table.values():
+        values.flags.writeable = False
+    return table
 
 
 def group_of(joints: Array, within: float) -> Ints:

@@ -45,7 +45,9 @@ class Table(Record):
                 given = getattr(self, one.name)
                 shape, fill = (rows, *one.metadata["shape"]), one.metadata["fill"]
                 dtype = np.dtype(np.str_) if isinstance(fill, str) else np.result_type(type(fill))
-                values = np.full(shape, fill) if given is None else np.array(given, dtype=dtype)
+                # A read-only array need not be copied.
+                copy = None if isinstance(given, np.ndarray) and not given.flags.writeable else True
+                values = np.full(shape, fill) if given is None else np.array(given, dtype, copy=copy)
                 if values.shape != shape and not (values.size == 0 and rows == 0):
                     raise InputError(
                         f"result: {one.name}: got shape {values.shape}; expected {shape}; correct it"

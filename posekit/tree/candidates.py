@@ -112,23 +112,20 @@ class Candidates:
         table[:, 0] = root
         unseen = np.asarray(np.isnan(image).any(axis=2))
         for joints in GENERATIONS:
-            parents = [PARENTS[joint] for joint in joints]
-            start = np.stack([table[:, FIRST[parent] : FIRST[parent + 1]] for parent in parents], axis=1)
-            pixel = np.broadcast_to(image[:, joints, None], (*start.shape[:3], 2))
-            length = np.repeat(lengths[:, [joint - 1 for joint in joints]], start.shape[2], axis=1)
-            flat = start.reshape(frames, -1, 3)
-            lift = camera.lift(flat, pixel.reshape(frames, -1, 2), length, tolerance=slack)
+            start = np.stack([table[:, FIRST[PARENTS[j]] : FIRST[PARENTS[j] + 1]] for j in joints], axis=1)
+            length = lengths[:, [joint - 1 for joint in joints], None]
+            lift = camera.lift(start, image[:, joints, None], length, tolerance=slack)
             found = np.where(lift.valid, OPEN, BEHIND)
             found[..., 1][lift.valid[..., 0] & ~lift.valid[..., 1]] = COINCIDENT
             found[(lift.excess > slack) & ~lift.valid.any(axis=-1)] = NO_SOLUTION
-            unknown = np.isnan(flat).any(axis=2) | np.repeat(unseen[:, joints], start.shape[2], axis=1)
+            unknown = np.isnan(start[..., 0]) | unseen[:, joints, None]
             found[unknown] = OPEN, MISSING
             points = np.where((found == OPEN)[..., None], lift.points, np.nan)
             points[unknown] = np.nan
             own = np.concatenate([np.arange(FIRST[joint], FIRST[joint + 1]) for joint in joints])
             table[:, own] = points.reshape(frames, -1, 3)
             state[:, own] = found.reshape(frames, -1)
-            excess[:, own] = np.repeat(lift.excess, 2, axis=1)
+            excess[:, own] = np.repeat(lift.excess.reshape(frames, -1), 2, axis=1)
         return Candidates(table=table, state=state, excess=excess)
 
     def column(self, level: int, point: int, code: NDArray[np.int64]) -> NDArray[np.int64]:

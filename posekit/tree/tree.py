@@ -7,6 +7,7 @@ nodes that share it: given the torso, the four limbs are judged alone.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,12 +114,12 @@ class Trees:
         return digits.astype(np.uint32).view(f"U{DEPTH}")[:, 0]
 
     @cached_property
-    def rejected(self) -> list[dict[str, int]]:
+    def rejected(self) -> list[Counter[str]]:
         """Leaves of the full tree that were lost, by frame and reason; with the survivors they make 8192."""
         width = max(len(self.reasons), 1)
         weight = 1 << (DEPTH - self.losses.level)
         number = np.bincount(self.losses.frame * width + self.losses.reason, weight, self.count * width)
-        totals: list[dict[str, int]] = [{} for _ in range(self.count)]
+        totals = [Counter[str]() for _ in range(self.count)]
         for k in np.flatnonzero(number).tolist():
             totals[k // width][self.reasons[k % width][0]] = int(number[k])
         return totals
