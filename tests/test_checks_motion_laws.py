@@ -191,6 +191,15 @@ def test_trembling_is_the_standard_deviation_of_a_coordinate(deviation: float) -
     assert np.median(rows_of(report, "jitter").value) == pytest.approx(deviation, rel=0.15)
 
 
+@pytest.mark.parametrize(("first", "last"), [(0, 149), (12, 137), (40, 80)])
+def test_noise_of_all_frames_is_measuring_and_noise_of_some_is_jitter(first: int, last: int) -> None:
+    joints = gesture(5.0)
+    joints[first : last + 1] += np.random.default_rng(1).normal(0, 0.015, (last + 1 - first, 14, 3))
+    rows = rows_of(judged(joints, checks=["jitter"]), "jitter")
+    assert bool(len(rows)) == (first > 0)
+    assert not first or (abs(rows.frame.min() - first) <= 3 and abs(rows.frame.max() - last) <= 3)
+
+
 @pytest.mark.parametrize("plant", [raised, sunk, stretched, drifting, moved_wrist])
 def test_stated_noise_widens_bounds_and_never_rejects_more(
     plant: Callable[[np.ndarray, float], np.ndarray],

@@ -315,6 +315,11 @@ def spine_gives(lengths: Mapping[str, float]) -> float:
     return math.hypot(h, w) - math.sqrt(c * c + w * w - 2 * c * w * math.sin(half))
 
 
+def hips_share(lengths: Mapping[str, float]) -> float:
+    """Return the distance between the hips as a share of the thigh's length."""
+    return lengths["right_hip-left_hip"] / lengths["right_hip-right_knee"]
+
+
 def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
     r"""Return how much the shoulder girdle changes two distances, metres: shoulder to shoulder, and shoulder to pelvis.
 

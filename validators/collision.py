@@ -18,7 +18,7 @@ from posekit.geometry import dot, unit
 from posekit.robots.collision import segment_distance
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree.steps import CAPSULES, Step, step
-from posekit.validators.body import Body
+from posekit.validators.body import Body, hips_share
 from posekit.validators.check import Judgement
 
 #: Penetration below which the verdict would be rounding, metres.
@@ -125,7 +125,4 @@ def _slimness(body: Body, link: str) -> float:
     """Return the factor of a capsule's radius: legs of people whose hips are nearer together are as much slimmer."""
     if not body.measured or not link.endswith(("thigh", "shank")):
         return 1.0
-    hips, thigh = "right_hip-left_hip", "right_hip-right_knee"
-    usual = body.base_figure.lengths
-    narrow = body.lengths[hips] / body.lengths[thigh] * usual[thigh] / usual[hips]
-    return float(min(narrow, 1.0))
+    return min(hips_share(body.lengths) / hips_share(body.base_figure.lengths), 1.0)

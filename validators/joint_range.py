@@ -34,7 +34,7 @@ from posekit.solver.limits import (
     torso_axes,
 )
 from posekit.tree.steps import LIMB, PELVIS, Step, step
-from posekit.validators.body import Body
+from posekit.validators.body import Body, hips_share
 from posekit.validators.check import Judgement
 from posekit.validators.ranges import limits_of, load_ranges, of_person
 from posekit.validators.table1 import table1_angles
@@ -285,6 +285,4 @@ def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedFo
 
 def _hips_outward(figure: Figure) -> float:
     """Return by how many degrees straight thighs lean inward because hips are wider apart than usual."""
-    hips, thigh, usual = "right_hip-left_hip", "right_hip-right_knee", load_figure().lengths
-    lengths = figure.lengths
-    return math.degrees(math.atan((lengths[hips] / lengths[thigh] - usual[hips] / usual[thigh]) / 2))
+    return math.degrees(math.atan((hips_share(figure.lengths) - hips_share(load_figure().lengths)) / 2))

@@ -378,12 +378,11 @@ class Report(Record):
         for k, name in enumerate(self.checks):
             found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}
             rows = np.unique(found["row"])
-            undecided = int((self.silent[:, k] & self.undecided).sum())
-            counts[name] = {
-                "frames": len(rows),
-                "clips": len(np.unique(self.clip[rows])),
-                "undecided": undecided,
-            }
+            clips, undecided = (
+                len(np.unique(self.clip[rows])),
+                int((self.silent[:, k] & self.undecided).sum()),
+            )
+            counts[name] = {"frames": len(rows), "clips": clips, "undecided": undecided}
             counts[name] |= {"place": "", "worst": "", "frame": -1}
             if len(rows):
                 worst = int(np.argmin(found["margin"]))

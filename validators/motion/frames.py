@@ -45,6 +45,10 @@ TREMBLING_RATE: Final = 25.0
 #: Standard deviations of measuring noise that are allowed.
 TELEPORT_DEVIATIONS, JITTER_DEVIATIONS, DRIFT_DEVIATIONS = 5.0, 2.0, 4.0
 
+#: Percentage of the frames that are calm, and their trembling as a share of the median frame's, at most: noise of
+#: measuring is in all frames alike (0.5 to 0.8), a local defect is not.
+CALM_PERCENT, CALM_SHARE = 2.0, 0.3
+
 #: Share of the frames with another length from which either may be the usual one.
 LEAST_OTHER: Final = 0.2
 
@@ -192,16 +196,17 @@ def jitter(body: Body, *, deviation: float = 0.006) -> Judgement:
         Standard deviation of a coordinate, metres.
     """
     needs_rate(body, TREMBLING_RATE)
-    found = explained(body)
-    value, bound = found.trembling, deviation + JITTER_DEVIATIONS * body.noise
-    hot = np.nan_to_num(value) > bound
+    found, noise = explained(body), body.noise
+    if body.settings.noise is None and noise > 0:
+        calm, usual = usual_trembling(found.joints, (CALM_PERCENT, 50.0))
+        noise = noise if calm > CALM_SHARE * usual else min(noise, calm)
+    value, allowed = found.trembling, JITTER_DEVIATIONS * noise
+    hot = np.nan_to_num(value) > deviation + allowed
     if hot.any():
         exact = trembling_frames(found.joints, hot)
         most = np.where(hot, value, 0.0).max(axis=0)
         value = np.where(exact, np.where(hot, value, most), np.minimum(value, deviation))
-    return Judgement(
-        JOINTS, found.timeline.of_frames(value), upper=deviation, tolerance=JITTER_DEVIATIONS * body.noise
-    )
+    return Judgement(JOINTS, found.timeline.of_frames(value), upper=deviation, tolerance=allowed)
 
 
 @check("drift", unit="1", reads=("joints",), over_time=True)
@@ -298,7 +303,7 @@ def explained(body: Body) -> Explained:
     kept = known & ~stretches_of(places)
     joints = np.where(kept[:, None, None], joints, np.nan)
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
-    noise = max(body.noise, usual_trembling(joints[kept]))
+    noise = max(body.noise, *usual_trembling(joints[kept]))
     follows = np.diff(timeline.slots[order][kept]) == 1
     # Joint ranges judge which way a knee of one posture bends; the sides of a robot follow from its names.
     if len(joints) > 1 and body.q is None:

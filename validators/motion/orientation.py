@@ -70,10 +70,9 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
 
 
 def _inverted(body: Body, cosine: Array, share: float) -> bool:
-    height = body.height
-    neck, pelvis = height[:, JOINT["neck"]], height[:, JOINT["pelvis"]]
-    ankles = height[:, both("ankle")].min(axis=1)
-    wrists = height[:, both("wrist")].max(axis=1)
+    neck, pelvis = (body.height[:, JOINT[name]] for name in ("neck", "pelvis"))
+    ankles = body.height[:, both("ankle")].min(axis=1)
+    wrists = body.height[:, both("wrist")].max(axis=1)
     turned = (cosine < INVERTED_COSINE) & (ankles > pelvis)
     carried = wrists < neck - REACH_METRES
     return bool(np.mean(turned & ~carried) >= share)

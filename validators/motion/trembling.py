@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import comb
 from typing import Final
 
@@ -10,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from posekit.body.lengths import lengths_in_frames
-from posekit.geometry import Array, groups, known_median, norm
+from posekit.geometry import Array, groups, norm
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.validators.motion.timeline import centred, filtered, spaced
 
@@ -78,10 +79,13 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
     )
 
 
-def usual_trembling(joints: Array) -> float:
-    """Return the median trembling of joints (T, 14, 3) early in a clip, metres: no less than its noise."""
+def usual_trembling(joints: Array, percents: Sequence[float] = (50.0,)) -> Array:
+    """Return percentiles over the frames of the median trembling of joints (T, 14, 3), early in a clip, metres."""
     rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
-    return float(np.nan_to_num(known_median(rough)))
+    known = rough[np.isfinite(rough).any(axis=1)]
+    if not len(known):
+        return np.zeros(len(percents))
+    return np.percentile(np.nanmedian(known, axis=1), percents)
 
 
 def _windows(rough: Array) -> Array:
