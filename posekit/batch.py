@@ -21,7 +21,7 @@ from typing import Any, Final
 from posekit.errors import PosekitError, one_line, refusal, shown
 from posekit.geometry import Record
 from posekit.motion import Motion
-from posekit.motion.validation import files_of, names_below
+from posekit.motion.validation import are_paths, files_of, names_below
 from posekit.settings import RecoverSettings, Settings, ValidateSettings
 from posekit.validators.report import plural
 
@@ -104,17 +104,18 @@ def batch(
     >>> posekit.batch.batch("archive/", "results", jobs=8)  # doctest: +SKIP
     BatchRun(118 done, 0 kept, 1 failed)
     """
-    folder = Path(output)
+    asked, folder = Settings.of(settings or RecoverSettings()), Path(output)
     if folder.exists() and not folder.is_dir():
         raise refusal(folder, "", "a file", "a folder", "name another")
     inside = folder.resolve()
+    if not are_paths(inputs):
+        raise refusal("batch", "inputs", shown(type(inputs).__name__), "paths", "name files or folders")
     found = {path.resolve(): path for path in files_of(inputs)}
     paths = [path for resolved, path in found.items() if inside not in resolved.parents]
     if not paths:
         raise refusal(folder, "", "no input outside of it", "files", "name another folder for the output")
     folder.mkdir(parents=True, exist_ok=True)
     options = {"camera": camera, "person": person, "layout": layout, "rate": rate}
-    asked = settings or RecoverSettings()
     about = json.dumps(
         [asked.to_json(), {k: str(v) for k, v in options.items()}], sort_keys=True, default=str
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posekit.errors import refusal, shown
-from posekit.settings import RecoverSettings, number, stated
+from posekit.settings import RecoverSettings, number, picture_size
 
 if TYPE_CHECKING:
     from posekit.body import Figure
@@ -52,7 +52,7 @@ def recover(
     coverage: float | None = None,
     group: str | float | None = None,
     follow: int | None = None,
-    figure: Figure | None = None,
+    figure: str | PathLike[str] | Figure | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
 
@@ -80,8 +80,8 @@ def recover(
         Width and height of the pictures, pixels, if no file has them; also as ``"1280x720"``.
     checks, ranges, deviation, length_deviation, coverage, group, follow : optional
         As the fields of `RecoverSettings`.
-    figure : Figure, optional
-        Body; the built-in figure by default.
+    figure : Figure or path, optional
+        Body, or its URDF; the built-in figure by default.
 
     Returns
     -------
@@ -99,9 +99,11 @@ def recover(
     >>> len(recovery)
     5
     """
+    from posekit.body import Figure, load_figure
     from posekit.recovery.conductor import recover as recover_view
 
-    given = stated(
+    asked = RecoverSettings.of(
+        settings,
         checks=checks,
         ranges=ranges,
         deviation=deviation,
@@ -111,10 +113,9 @@ def recover(
         follow=follow,
         stature=stature,
     )
-    asked = (settings or RecoverSettings()).changed(**given)
-    view = view_of(
-        source, camera=camera, person=person, layout=layout, rate=rate, fov=fov, size=picture_size(size)
-    )
+    view = view_of(source, camera=camera, person=person, layout=layout, rate=rate, fov=fov, size=size)
+    if figure is not None and not isinstance(figure, Figure):
+        figure = load_figure(str(figure))
     return recover_view(view, asked, figure=figure)
 
 
@@ -127,7 +128,7 @@ def view_of(
     unit: str | None = None,
     rate: float | None = None,
     stature: str | float | None = None,
-    size: tuple[int, int] | None = None,
+    size: str | tuple[int, int] | None = None,
     fov: float | None = None,
     min_confidence: float = 0.0,
 ) -> View:
@@ -140,8 +141,8 @@ def view_of(
         ``FILE`` or ``FILE:NAME`` where a calibration has several cameras.
     person, layout, unit, rate, stature
         As in `recover`; `unit` is that of the calibration.
-    size : (int, int), optional
-        Width and height of the pictures, pixels, where neither file has them.
+    size : (int, int) or str, optional
+        Width and height of the pictures, pixels, if neither file has them; also as ``"1280x720"``.
     fov : float, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     min_confidence : float
@@ -177,7 +178,7 @@ def view_of(
         person=person,
         rate=rate,
         stature=None if stature is None else number(stature, "stature"),
-        size=size,
+        size=picture_size(size),
         fov=fov,
         min_confidence=min_confidence,
     )
@@ -186,8 +187,9 @@ def view_of(
 def kind_of(held: Any) -> str:
     """Say in words what an opened file holds."""
     words = {"dict": "cameras", "Recovery": "a result", "Detections": "key points", "Motion": "motion"}
+    words |= {name: f"a {name.lower()}" for name in ("View", "Report", "Robot", "Figure")}
     name = type(held).__name__
-    return words.get(name, f"a {name.lower()}")
+    return words.get(name, shown(name))
 
 
 def detected_view(
@@ -254,16 +256,6 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
             path, "", f"{len(cameras)} cameras", f"one of {', '.join(cameras)}", f"write {path}:NAME"
         )
     return cameras[name or next(iter(cameras))]
-
-
-def picture_size(size: Any) -> tuple[int, int] | None:
-    """Return a width and a height, given as two numbers or as ``"1280x720"``; None if nothing is given."""
-    if not size:
-        return None
-    sides = size.lower().split("x") if isinstance(size, str) else list(np.ravel(size))
-    if len(sides) != 2 or not all(str(side).isdigit() and int(side) for side in sides):
-        raise refusal("", "size", shown(size), "WIDTHxHEIGHT in pixels", "write it as 1280x720")
-    return int(sides[0]), int(sides[1])
 
 
 def frame_range(frame: Any) -> int | tuple[int, int] | None:
@@ -368,14 +360,17 @@ def render(
     >>> posekit.render(posekit.recover(posekit.builtin_view("seq1")), "walk.html")
     """
     from posekit.cameras import View
-    from posekit.following.detections import Detections
+    from posekit.motion import Motion
+    from posekit.recovery import Recovery
+    from posekit.robots import Robot
+    from posekit.validators import Report
     from posekit.viewer import draw
 
     name = source if isinstance(source, str | PathLike) else "render"
     source = opened(source, layout, rate=rate, urdf=urdf, unit=unit, up=up)
     if isinstance(view, str | PathLike):
         view = opened(view)
-    if isinstance(source, dict | Detections):
+    if not isinstance(source, Motion | Recovery | View | Report | Robot):
         expected = "postures, motion, a result, a view or a report"
         raise refusal(name, "", kind_of(source), expected, "recover key points first")
     if isinstance(source, View) and not np.isfinite(source.truth).any():
@@ -387,8 +382,8 @@ def render(
         frame=frame_range(frame),
         which=which,
         size=picture_size(size) or (1280, 720),
-        azimuth=azimuth,
-        elevation=elevation,
+        azimuth=None if azimuth is None else number(azimuth, "azimuth"),
+        elevation=None if elevation is None else number(elevation, "elevation"),
         over=over,
         urdf=urdf,
     )

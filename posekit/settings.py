@@ -161,6 +161,20 @@ class Settings(Record):
         for name in ("rigid_tolerance", "angle_tolerance"):
             self._number(name, 0.0)
 
+    @classmethod
+    def of(cls, settings: Settings | None, **changes: Any) -> Self:
+        """Return the settings, the defaults if they are None, with the changes that are not None.
+
+        Raises
+        ------
+        InputError
+            If they are settings of another kind, a field is unknown, or its value is impossible.
+        """
+        if settings is not None and not isinstance(settings, cls):
+            got, expected = shown(type(settings).__name__), f"a {cls.__name__}"
+            raise refusal("", "settings", got, expected, "see posekit settings")
+        return (settings or cls()).changed(**stated(**changes))
+
     def changed(self, **fields_given: Any) -> Self:
         """Return the settings with some fields changed.
 
@@ -349,6 +363,22 @@ class ValidateSettings(Settings):
 def stated(**given: Any) -> dict[str, Any]:
     """Return the arguments that are not None."""
     return {name: one for name, one in given.items() if one is not None}
+
+
+def picture_size(size: Any) -> tuple[int, int] | None:
+    """Return a width and a height, given as two numbers or as ``"1280x720"``; None if nothing is given."""
+    if not size:
+        return None
+    sides = (
+        size.lower().split("x")
+        if isinstance(size, str)
+        else list(size)
+        if isinstance(size, Sequence)
+        else [size]
+    )
+    if len(sides) != 2 or not all(str(side).isdigit() and int(side) for side in sides):
+        raise refusal("", "size", shown(size), "WIDTHxHEIGHT in pixels", "write it as 1280x720")
+    return int(sides[0]), int(sides[1])
 
 
 def asdict_shallow(settings: Settings) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import pinocchio
 import pytest
 
 import posekit
+from posekit.batch import batch
 from posekit.samples import samples
 from posekit.settings import RecoverSettings, ValidateSettings, number
 
@@ -257,6 +258,21 @@ class TestFactsAboutAnArray:
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", camera=np.eye(3)), "camera"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", size="wide"), "size"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", rate=0), "rate"),
+        (lambda: posekit.validate(STANDING, 3), "settings"),
+        (lambda: posekit.validate(STANDING, posekit.RecoverSettings()), "settings"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), 3, layout="coco_17"), "settings"),
+        (lambda: posekit.recover(posekit.builtin_view("seq1"), figure="nobody.urdf"), "nobody.urdf"),
+        (lambda: posekit.Tracker(3, size=(1280, 720)), "settings"),
+        (lambda: posekit.Tracker(camera="calibration.toml"), "camera"),
+        (lambda: posekit.Tracker(size="1280x720").update("points", 0.0), "points"),
+        (lambda: posekit.Tracker(size="1280x720").update(np.ones((14, 2)), "now"), "time"),
+        (lambda: posekit.View(camera=3, time=[0], image=np.ones((1, 14, 2))), "camera"),
+        (lambda: posekit.save({"cam": 1}, "cameras.toml"), "cameras"),
+        (lambda: posekit.render(None, "x.html"), "NoneType"),
+        (lambda: posekit.render(STANDING, "x.svg", which="angel"), "angles"),
+        (lambda: posekit.render(STANDING, "x.png", azimuth="left"), "azimuth"),
+        (lambda: batch(3, "results"), "inputs"),
+        (lambda: batch(["walk.json"], "results", 3), "settings"),
         (lambda: posekit.render(STANDING, "x.png", frame="last"), "frame"),
         (lambda: posekit.render(STANDING, "x.png", size=(0, 10)), "size"),
     ],

@@ -15,7 +15,7 @@ from posekit.body import Figure, load_figure, with_head
 from posekit.errors import InputError, PosekitError, refusal, shown
 from posekit.geometry import Array
 from posekit.motion.motion import Motion
-from posekit.settings import Settings, Tolerance, ValidateSettings, stated
+from posekit.settings import Settings, Tolerance, ValidateSettings
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree.steps import Step
 from posekit.validators.body import Body
@@ -358,8 +358,9 @@ class Validator:
         ground: str | float | None = None,
         strict: bool | None = None,
     ) -> None:
-        changes = stated(checks=checks, ranges=ranges, profile=profile, ground=ground, strict=strict)
-        self.settings = (settings or ValidateSettings()).changed(**changes)
+        self.settings = ValidateSettings.of(
+            settings, checks=checks, ranges=ranges, profile=profile, ground=ground, strict=strict
+        )
         self.robot = _loaded(urdf, self.settings)
         chosen_checks(self.settings, of_robot=self.figure is None, in_time=True)
 

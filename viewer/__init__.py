@@ -99,6 +99,8 @@ def draw(
         kind = which if which in PLOT_NAMES else "timeline" if isinstance(source, Report) else "angles"
         if suffix not in PLOTS:
             raise refusal(path, "", f"the format {suffix}", ", ".join(PLOTS), "name a plot so")
+        if which not in ("", *PLOT_NAMES):
+            raise refusal(path, "--posture", shown(which), " or ".join(PLOT_NAMES), "choose a plot")
         return write_bytes(path, plotted(source, kind, suffix, frame=frame, view=view))
     if which and isinstance(source, Motion):
         expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture a frame"

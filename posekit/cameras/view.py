@@ -8,6 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from posekit.cameras.camera import Camera
 from posekit.cameras.lee_chen import LeeChenCamera
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera
@@ -118,6 +119,9 @@ class View(Record):
     layout: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.camera, Camera):
+            got = shown(type(self.camera).__name__)
+            raise refusal("view", "camera", got, "a camera", "make a PinholeCamera, or open a calibration")
         frames = len(self.time)
         shapes = {
             "time": (frames,),

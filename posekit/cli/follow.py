@@ -34,7 +34,7 @@ def follow(
     """
     if not stdin:
         raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")
-    from posekit.doors import opened_camera, picture_size
+    from posekit.doors import opened_camera
     from posekit.following.lines import answers
     from posekit.following.tracker import Tracker
 
@@ -42,7 +42,7 @@ def follow(
         settings=settings_from(RecoverSettings, given),
         camera=opened_camera(camera),
         layout=layout,
-        size=picture_size(size),
+        size=size,
         lag=lag,
     )
     for line in answers(sys.stdin.buffer, tracker, keep_going=keep_going):

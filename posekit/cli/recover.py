@@ -49,7 +49,7 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
     """Recover every posture behind a view: each passes the checks and reprojects onto the image."""
     from posekit import save
-    from posekit.doors import opened_camera, picture_size, view_of
+    from posekit.doors import opened_camera, view_of
     from posekit.recovery.conductor import recover as recover_view
 
     settings = settings_from(RecoverSettings, given)
@@ -62,7 +62,7 @@ def recover(source: Path, output: Path, explain: bool, linkage: str, **given: An
         person=given["person"],
         layout=given["layout"],
         rate=given["rate"],
-        size=picture_size(given["size"]),
+        size=given["size"],
         fov=given["fov"],
         min_confidence=given["min_confidence"],
     )

@@ -56,7 +56,7 @@ def evaluate_method(
         raise refusal("", "noise", shown(list(noise)), "different numbers, 0 or more", "correct them")
     from posekit.recovery.conductor import recover
 
-    settings = settings or RecoverSettings()
+    settings = RecoverSettings.of(settings)
     parts = []
     if isinstance(source, Motion):
         complete = int(np.isfinite(source.figure_joints).all(axis=(1, 2)).sum())

@@ -12,15 +12,15 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import PinholeCamera, View
+from posekit.cameras import Camera, PinholeCamera, View
 from posekit.cameras.pinhole import camera_from_fov
-from posekit.errors import PosekitError, refusal
+from posekit.errors import PosekitError, refusal, shown
 from posekit.following.detections import Detections
 from posekit.following.paths import Candidates, Trellis, candidates, expected_posture
 from posekit.geometry import Array, Record
 from posekit.recovery.conductor import recover
 from posekit.recovery.recovery import Recovery
-from posekit.settings import RecoverSettings
+from posekit.settings import RecoverSettings, number, picture_size
 from posekit.skeleton import JOINTS, POINTS
 
 #: Diagonal angle of view of a usual webcam (Logitech C920, data sheet).
@@ -98,13 +98,13 @@ class Tracker:
         Settings for each picture.
     camera : PinholeCamera, optional
         By default a usual webcam's, from `size`.
-    size : (int, int), optional
-        Width and height of the pictures, pixels.
+    size : (int, int) or str, optional
+        Width and height of the pictures, pixels; also as ``"1280x720"``.
     lengths : mapping of str to float, optional
         Segment lengths of the person, metres.
-    stature : float, optional
-        Height of the person, metres, if no lengths are given.
-    deviation : float, optional
+    stature : float or str, optional
+        Height of the person, metres or with its unit, if no lengths are given.
+    deviation : float or str, optional
         Standard deviation of each coordinate of the points, pixels; 5 by default.
     layout : str or Layout, optional
         Meaning of the points: name or file of a layout, as ``coco_17``. By default the 14 joints in tree order,
@@ -129,10 +129,10 @@ class Tracker:
         settings: RecoverSettings | None = None,
         *,
         camera: PinholeCamera | None = None,
-        size: tuple[int, int] | None = None,
+        size: str | tuple[int, int] | None = None,
         lengths: Mapping[str, float] | None = None,
-        stature: float | None = None,
-        deviation: float | None = None,
+        stature: str | float | None = None,
+        deviation: str | float | None = None,
         layout: Any = "",
         lag: int = DEFAULT_LAG,
     ) -> None:
@@ -143,14 +143,17 @@ class Tracker:
             layout = import_module("posekit.formats.layout").load_layout(layout)
         if layout and not layout.points:
             raise refusal("Tracker", "layout", layout.name, "points in an order, as in coco_17")
-        self.settings = settings or RecoverSettings()
-        self.camera = camera or camera_from_fov(size or (0, 0), WEBCAM_DEGREES, "diagonal")
+        if camera is not None and not isinstance(camera, Camera):
+            remedy = "open a calibration with posekit.open(FILE)[NAME]"
+            raise refusal("Tracker", "camera", shown(type(camera).__name__), "a PinholeCamera", remedy)
+        self.settings = RecoverSettings.of(settings)
+        self.camera = camera or camera_from_fov(picture_size(size) or (0, 0), WEBCAM_DEGREES, "diagonal")
         self.layout, self.lag = layout or None, lag
         self.names: tuple[str, ...] = tuple(layout.points) if layout else POINTS
         self._known: dict[str, Any] = {
             "lengths": dict(lengths or {}),
-            "stature": stature or self.settings.stature,
-            "deviation": deviation or self.settings.deviation or DETECTED_DEVIATION,
+            "stature": self.settings.stature if stature is None else number(stature, "stature"),
+            "deviation": number(deviation or self.settings.deviation or DETECTED_DEVIATION, "deviation"),
         }
         self._trellis = Trellis()
         self._waiting: deque[tuple[int, Candidates]] = deque()
@@ -173,36 +176,40 @@ class Tracker:
         InputError
             If the number of points is wrong or the time does not ascend: the picture then does not count.
         """
-        if not (math.isfinite(time) and time > self._last + 1e-6):
+        time = number(time, "time", "seconds")
+        if time <= self._last + 1e-6:
             raise refusal("Tracker", "time", f"{time:g}", f"seconds after {self._last:g}")
-        table = np.array(points, dtype=np.float64)
+        try:
+            table = np.array(points, dtype=np.float64)
+        except (TypeError, ValueError):
+            table = np.empty(())
         counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
         if table.ndim != 2 or len(table) not in counts or table.shape[1] not in (2, 3):
             expected = f"({' or '.join(map(str, counts))}, 2) or 3 columns"
             raise refusal("Tracker", "points", f"shape {table.shape}", expected, "give NaN for gaps")
         recovery = None
         try:
-            recovery = recover(self._view(table, float(time), root), self.settings)
+            recovery = recover(self._view(table, time, root), self.settings)
             reason = recovery.frames.reason[0]
         except PosekitError as error:
             reason = str(error)
         frame = Candidates(time, np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS), 3, 3)), np.empty(0))
         joints, sure = np.full((len(JOINTS), 3), np.nan), 0.0
         if recovery is not None:
-            frame = candidates(recovery, 0)._replace(time=float(time))
+            frame = candidates(recovery, 0)._replace(time=time)
             joints, sure = recovery.answer.joints[0], float(np.nan_to_num(recovery.answer.sure[0]))
         self._trellis.push(frame)
         self._waiting.append((self._frame, frame))
         posture = TrackedPosture(
             frame=self._frame,
-            time=float(time),
+            time=time,
             joints=joints,
             sure=sure,
             reason=reason,
             path=self._oldest() if len(self._waiting) > self.lag else None,
             recovery=recovery,
         )
-        self._frame, self._last = self._frame + 1, float(time)
+        self._frame, self._last = self._frame + 1, time
         return posture
 
     def finish(self) -> list[PathPosture]:

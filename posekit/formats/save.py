@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from posekit.cameras import PinholeCamera
 from posekit.errors import refusal, shown
 from posekit.formats.open import named, suffix_of
 
@@ -69,6 +70,8 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
         raise refusal(
             path, "--posture", shown(which), "no choice: a motion has one posture a frame", "leave it out"
         )
+    elif kind == "dict" and not all(isinstance(camera, PinholeCamera) for camera in thing.values()):
+        raise refusal(path, "", "a dict", "cameras by name", "save a motion, view, result or report")
     known = WRITERS.get(kind, {})
     if suffix not in known:
         expected = ", ".join(known) or "a motion, view, result or report"

@@ -172,7 +172,7 @@ class Judge:
     def __init__(self, settings: ValidateSettings | None, urdf: Any, changes: Mapping[str, Any]) -> None:
         self.settings, self.urdf, self.changes = settings, urdf, dict(changes)
         self._made: dict[str, Validator] = {}
-        ValidateSettings().changed(**self.changes)
+        ValidateSettings.of(settings, **self.changes)
 
     @property
     def name(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -323,6 +324,7 @@ class Recovery(Record):
 
     def __getitem__(self, k: int) -> Frame:
         """Return one frame; negative numbers count from the end."""
+        k = operator.index(k)
         if not -len(self) <= k < len(self):
             raise IndexError(f"frame {k} of {len(self)}")
         number = k % len(self)
