@@ -98,6 +98,59 @@ def test_the_truth_is_recovered_by_closure(seed):
     np.testing.assert_allclose(image, np.broadcast_to(points[:, :2] * 50.0, image.shape), atol=1e-6)
 
 
+CHANGES = ("larger", "another unit", "mirrored", "turned", "moved", "another order")
+
+
+def changed_object(linkage, image, change):
+    """Return names, segments, image and the map of postures (N, P, 3) that a change makes."""
+    names, order = list(linkage.points), np.arange(len(linkage.points))
+    moved, lengths = (lambda points: points), np.array(linkage.lengths)
+    if change == "larger":  # the object is the same, the picture larger: the scale alone changes
+        image = 3 * image
+    elif change == "another unit":
+        lengths, moved = 1000 * lengths, (lambda points: 1000 * points)
+    elif change == "mirrored":
+        image, moved = image * [-1, 1], (lambda points: points * [-1, 1, 1])
+    elif change == "turned":
+        image, moved = image @ [[0, 1], [-1, 0]], (lambda points: points @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    elif change == "moved":
+        image = image + np.array([300.0, -200.0])
+    else:
+        order = np.random.default_rng(1).permutation(len(names))
+        image, moved = image[order], (lambda points: points[:, order])
+    segments = {
+        tuple(names[end] for end in ends): length
+        for ends, length in zip(linkage.segments, lengths.tolist(), strict=True)
+    }
+    return [names[k] for k in order], segments, image, moved
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("kind", ["min", "closure"])
+@pytest.mark.parametrize("make", [tetrahedron, four_bar])
+def test_postures_of_an_object_move_with_it(make, kind, change):
+    linkage, points = make(np.random.default_rng(2))
+    image = points[:, :2] * 50.0
+    names, segments, seen, moved = changed_object(linkage, image, change)
+    first = recover_object(linkage, [image], scale=kind)
+    other = recover_object(
+        Linkage.from_names(name="other", points=names, segments=segments), [seen], scale=kind
+    )
+    assert len(first.points) == len(other.points) > 0
+
+    def centred(one):
+        return one - one.mean(axis=1, keepdims=True)
+
+    expected, found = centred(moved(first.points)), centred(other.points)
+    size = np.abs(expected).max()
+    apart = np.abs(expected[:, None] - found[None]).max(axis=(2, 3))
+    assert apart.min(axis=0).max() < 1e-5 * size and apart.min(axis=1).max() < 1e-5 * size
+    factor = {"larger": 3.0, "another unit": 1e-3}.get(change, 1.0)
+    np.testing.assert_allclose(np.sort(other.scale), np.sort(first.scale) * factor, rtol=1e-6)
+    rejected = [sum(one.frames[0]["rejected"].values()) for one in (first, other)]
+    assert rejected[0] == rejected[1]
+
+
 def test_survivors_and_rejected_are_all_flips():
     linkage, points = tetrahedron(np.random.default_rng(7))
     found = recover_object(linkage, [points[:, :2] * 50.0], scale=50.0)

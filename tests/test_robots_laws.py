@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 
-from posekit.robots import Robot
-from tests.test_robots import LIMIT, joint, link, text
+from posekit.robots import Robot, load_robot
+from tests.test_robots import LIMIT, configurations, joint, link, text
 
 
 def following(of: str, factor: float, offset: float) -> str:
@@ -47,3 +47,16 @@ def test_links_stand_where_another_reader_of_the_urdf_puts_them(upper: bool, tmp
         for name in "bcdefgh":
             placed = data.oMf[robot.model.getFrameId(name)].homogeneous
             np.testing.assert_allclose(placed, other.get_transform(name, "a"), atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "reach"), [("figure", 0.8), ("human", 0.8), ("g1", 0.3)])
+def test_angles_of_a_posture_do_not_depend_on_where_it_stands_and_looks(name: str, reach: float) -> None:
+    robot = load_robot(name, bodies="none")
+    joints = robot.points(configurations(robot, 6, reach, seed=2))
+    joints += np.random.default_rng(4).normal(0, 0.01, joints.shape)  # no configuration reaches them exactly
+    turn, move = pin.rpy.rpyToMatrix(0.4, -0.8, 2.5), np.array([3.0, -20.0, 1.0])
+    q, distance = robot.configurations(joints)
+    moved, again = robot.configurations(joints @ turn.T + move)
+    np.testing.assert_allclose(again, distance, atol=1e-6)
+    np.testing.assert_allclose(moved[:, 7:], q[:, 7:], atol=1e-4)
+    np.testing.assert_allclose(robot.points(moved), robot.points(q) @ turn.T + move, atol=1e-5)
