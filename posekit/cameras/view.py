@@ -8,7 +8,6 @@ from typing import Final, Literal
 
 import numpy as np
 
-from posekit.cameras.camera import Camera
 from posekit.cameras.lee_chen import LeeChenCamera
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera
@@ -119,9 +118,10 @@ class View(Record):
     layout: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.camera, Camera):
-            got = shown(type(self.camera).__name__)
-            raise refusal("view", "camera", got, "a camera", "make a PinholeCamera, or open a calibration")
+        if not isinstance(self.camera, CameraModel):
+            raise refusal(
+                "view", "camera", shown(type(self.camera).__name__), "a camera", "open a calibration"
+            )
         frames = len(self.time)
         shapes = {
             "time": (frames,),
@@ -178,20 +178,20 @@ class View(Record):
         ]
 
     def _check_figure(self) -> None:
-        for name, length in self.lengths.items():
+        for name in self.lengths:
             _check_name("lengths", name, SEGMENT_NAMES)
-            _check_length(f"lengths.{name}", length)
+        sizes = {f"lengths.{name}": length for name, length in self.lengths.items()}
+        for name, size in (*sizes.items(), ("stature", self.stature), ("deviation", self.deviation)):
+            if size is not None and not (np.isfinite(size) and size > 0):
+                unit = "number of pixels" if name == "deviation" else "length in metres"
+                raise refusal("view", name, shown(float(size)), f"a positive {unit}")
         self._set("lengths", {name: float(length) for name, length in self.lengths.items()})
-        if self.deviation is not None:
-            _check_length("deviation", self.deviation, "a positive number of pixels")
         if self.length_deviation is not None and not 0 <= self.length_deviation <= MAX_LENGTH_DEVIATION:
             got, expected = shown(self.length_deviation), f"a fraction, 0 to {MAX_LENGTH_DEVIATION:g}"
             raise refusal("view", "length_deviation", got, expected, "correct it, or leave it out")
         for name in self.derived:
             _check_name("derived", name, JOINTS)
         self._set("derived", tuple(self.derived))
-        if self.stature is not None:
-            _check_length("stature", self.stature)
         if self.head_points is None:
             return
         points = {}
@@ -218,8 +218,7 @@ def is_head_name(name: str) -> bool:
 
 def _check_points(name: str, values: Array) -> None:
     """Raise if a number is infinite or too far, or if a point is known in part."""
-    unknown = np.isnan(values)
-    bad = np.isinf(values)
+    unknown, bad = np.isnan(values), np.isinf(values)
     if name in ("root", "truth"):  # metres; image points may have any unit
         bad |= np.abs(values) > FARTHEST_COORDINATE
     if name == "confidence":
@@ -236,8 +235,3 @@ def _check_points(name: str, values: Array) -> None:
 def _check_name(field_name: str, name: str, names: tuple[str, ...]) -> None:
     if name not in names:
         raise refusal("view", field_name, shown(name), "a known name", nearest(name, names))
-
-
-def _check_length(field_name: str, value: float, expected: str = "a positive length in metres") -> None:
-    if not (np.isfinite(value) and value > 0):
-        raise refusal("view", field_name, shown(float(value)), expected)

@@ -65,10 +65,8 @@ def _picture(where: str, line: bytes, names: tuple[str, ...]) -> tuple[float, Ar
                 row[: len(point)] = [np.nan if value is None else float(value) for value in point]
         return time, points, document.get("root")
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
-        got, expected = (
-            shown(line.decode(errors="replace").strip()),
-            '{"time": seconds, "points": [[x, y], …]}',
-        )
+        got = shown(line.decode(errors="replace").strip())
+        expected = '{"time": seconds, "points": [[x, y], …]}'
         raise refusal(where, "", got, expected, "see posekit follow --help") from None
 
 

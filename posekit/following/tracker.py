@@ -136,16 +136,14 @@ class Tracker:
         layout: Any = "",
         lag: int = DEFAULT_LAG,
     ) -> None:
-        if camera is None and size is None:
-            raise refusal("Tracker", "camera", "nothing", "a camera or a size", "give size=(1280, 720)")
         if isinstance(layout, str) and layout:
             # Layouts belong to the files, above this room; only a name given here needs them.
             layout = import_module("posekit.formats.layout").load_layout(layout)
         if layout and not layout.points:
             raise refusal("Tracker", "layout", layout.name, "points in an order, as in coco_17")
-        if camera is not None and not isinstance(camera, Camera):
-            remedy = "open a calibration with posekit.open(FILE)[NAME]"
-            raise refusal("Tracker", "camera", shown(type(camera).__name__), "a PinholeCamera", remedy)
+        if not isinstance(camera, Camera) and (camera is not None or size is None):
+            remedy = "give size=(1280, 720), or open a calibration with posekit.open(FILE)[NAME]"
+            raise refusal("Tracker", "camera", shown(camera), "a PinholeCamera or a size", remedy)
         self.settings = RecoverSettings.of(settings)
         self.camera = camera or camera_from_fov(picture_size(size) or (0, 0), WEBCAM_DEGREES, "diagonal")
         self.layout, self.lag = layout or None, lag
