@@ -76,13 +76,24 @@ def read_table(name: str, folder: str, built_in: Sequence[str], schema: str, opt
     path = DATA / folder / f"{name}.toml" if name in built_in else Path(name)
     if not name or not path.is_file():
         raise refusal(option, "", cut(name), "a name or a TOML file", nearest(name, built_in))
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise refusal(name, "", str(error), "a TOML file", "correct it") from None
+    table = parse_toml(read_bytes(path), name)
     if table.get("schema") != schema:
         raise refusal(name, "schema", shown(table.get("schema")), schema, "state it")
     return table
+
+
+def parse_toml(data: bytes, source: str) -> dict[str, Any]:
+    """Parse TOML.
+
+    Raises
+    ------
+    InputError
+        If it is damaged; the error names the line.
+    """
+    try:
+        return tomllib.loads(text(data, source))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise refusal(source, "", str(error), "a TOML file", "correct the line") from None
 
 
 def _names_beside(path: Path) -> list[str]:

@@ -445,6 +445,9 @@ def test_results_of_the_version_before_are_read(tmp_path: Path) -> None:
     # 2 cm in each direction: 95 % lie within sqrt(7.81) deviations.
     assert found.survivors.radius[0, 0] == pytest.approx(0.02 * np.sqrt(7.815), rel=5e-3)
     assert found.frames.camera[0]["f"] == pytest.approx(0.05) and found.frames.levels[0] == (1,)
+    np.savez(tmp_path / "r.npz", schema=document["schema"], count=np.array([2, 1]))
+    with pytest.raises(InputError, match=r"r\.npz: got posekit\.result/2 as NPZ; expected its JSON"):
+        posekit.open(tmp_path / "r.npz")
 
 
 def test_damaged_results_are_refused(tmp_path: Path) -> None:

@@ -182,8 +182,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:
     """Find the layout: the user's, by the names in the file, or by the number of points and the head's size."""
     if options.layout:
-        given = load_layout(options.layout)
-        return given.over(rows.names) if rows.names else given
+        return load_layout(options.layout)
     if rows.names:
         return by_names(rows.names, rows.source)
     if not len(points):

@@ -1,4 +1,4 @@
-"""``posekit.result/2``, the format of earlier versions: its JSON and NPZ are converted to a document of ``result/3``.
+"""``posekit.result/2``, the format of earlier versions: its JSON is converted to a document of ``result/3``.
 
 ``result/2`` stores no joints of the answer; the joints of the first representative are used. Postures are sorted by
 decreasing probability, and the covariance of each joint becomes its radius.
@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.formats import json_file
 from posekit.formats.node import Node
 from posekit.geometry import PER_METRE
 from posekit.recovery.answer import joint_radius
@@ -19,21 +18,15 @@ from posekit.skeleton import JOINTS
 
 #: Entries of a symmetric matrix in a file: xx, xy, xz, yy, yz, zz.
 UPPER: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
-#: Padded arrays of the NPZ by the field of a posture in JSON.
-POSTURE_ARRAYS: Final = {
-    **{"joints": "joints", "q": "q", "branches": "branches", "group": "groups"},
-    **{"probability": "probability", "scale": "scales"},
-    **{"chi2": "refined/chi2", "covariance": "refined/covariance"},
-}
 ROOT_FIELDS: Final = ("method", "estimate", "deviation", "lower", "upper")
 
 
 def document_of(root: Node) -> dict[str, Any]:
     """Return the document of ``posekit.result/3`` for one of ``posekit.result/2``, in the file's unit."""
-    document = dict(root.value)
-    if "count" in document:
-        document = _unpadded(root)
-    frames = [dict(frame.object()) for frame in Node(document, root.source).at("frames").list(1)]
+    document: Mapping[str, Any] = root.value
+    if "frames" not in document:
+        raise root.refused("its JSON", "recover the view again", "posekit.result/2 as NPZ")
+    frames = [dict(frame.object()) for frame in root.at("frames").list(1)]
     _add_radius([posture for frame in frames for posture in frame["postures"]])
     places = []  # by frame: the new number of each posture
     for frame in frames:
@@ -90,49 +83,4 @@ def _path(one: Mapping[str, Any], places: list[dict[int, int]]) -> dict[str, Any
         "probability": one["share"],
         "survivor": [place.get(int(old), -1) for old, place in zip(one["survivor"], places, strict=True)],
         "joints": np.where(np.isfinite(smoothed), smoothed, joints),
-    }
-
-
-def _unpadded(root: Node) -> dict[str, Any]:
-    """Return the JSON document of the padded arrays of an NPZ."""
-    held: Mapping[str, Any] = root.value
-    counts = root.at("count").array(None).astype(np.intp).tolist()
-
-    def parsed(name: str, default: Any) -> Any:
-        return json_file.parse(root.at(name).text().encode(), root.source) if name in held else default
-
-    of_posture = {ours: np.asarray(held[name]) for ours, name in POSTURE_ARRAYS.items() if name in held}
-    margins = {name.removeprefix("margins/"): held[name] for name in held if name.startswith("margins/")}
-    inferred, roots = (parsed(name, [None] * len(counts)) for name in ("inferred", "roots"))
-    reasons = np.asarray(held["rejected/names"]).tolist()
-    frames: list[dict[str, Any]] = []
-    for k, count in enumerate(counts):
-        postures = [{name: one[k, i].tolist() for name, one in of_posture.items()} for i in range(count)]
-        for i, posture in enumerate(postures):
-            posture["margins"] = {name: float(values[k, i]) for name, values in margins.items()}
-            posture["inferred"] = inferred[k][i] if inferred[k] else {}
-        camera = {name: held[f"camera/{name}"][k] for name in ("f", "rotation", "position", "residual")}
-        rejected = zip(reasons, held["rejected/counts"][k].tolist(), strict=True)
-        frame = {
-            "time": float(held["time"][k]),
-            "camera": {name: None if np.isnan(values).any() else values for name, values in camera.items()},
-            "rejected": {name: count for name, count in rejected if count >= 0},
-            "levels": {"motion": [int(n) for n in held["levels/motion"][k] if n >= 0]},
-            "root": roots[k],
-            "postures": postures,
-        }
-        if "answer/representatives" in held:
-            rows = [int(n) for n in held["answer/representatives"][k] if n >= 0]
-            chances = np.asarray(held["answer/probability"][k])[: len(rows)].tolist()
-            frame["answer"] = {"representatives": rows, "probability": chances}
-        frame |= {name: held[name][k] for name in ("unlisted", "unlisted_probability") if name in held}
-        frames.append(frame)
-    names = ("survivor", "share", "joints", "smoothed")
-    paths = zip(*(held[f"paths/{name}"] for name in names), strict=True) if "paths/survivor" in held else ()
-    return {
-        "unit": root.at("unit").text(),
-        "configuration_names": list(root.at("configuration_names").texts()),
-        "settings": parsed("settings", {}),
-        "frames": frames,
-        "paths": {"paths": [dict(zip(names, one, strict=True)) for one in paths]},
     }

@@ -18,10 +18,11 @@ from posekit.errors import refusal
 from posekit.files import write_bytes
 from posekit.formats.body_checks import METRES
 from posekit.formats.bvh import Bvh, holds
+from posekit.formats.layout import load_layout
 from posekit.formats.trc import even_step, one_recording
 from posekit.geometry import Array, rotation_from_quaternion, up_vector
 from posekit.geometry.rotations import coordinate_rotation, rotation_between, turned_near
-from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
+from posekit.skeleton import DOFS, POINT
 
 if TYPE_CHECKING:
     from posekit.body import Figure
@@ -31,72 +32,59 @@ if TYPE_CHECKING:
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 #: Axes of the three angles of a joint.
 AXIS_ORDER: Final = (0, 2, 1)
-#: Names of the figure's joints in BVH, by which animation programs find their own characters' joints. A file's Neck may
-#: lie anywhere between the shoulders and the head; NeckBase is the figure's.
-NAMES: Final = {
-    **{"pelvis": "Hips", "torso": "Spine", "neck": "NeckBase", "head": "Head", "nose": "Nose"},
-    **{
-        f"{side}_{part}": f"{side.capitalize()}{name}"
-        for side in SIDES
-        for part, name in (
-            *(("shoulder", "Arm"), ("elbow", "ForeArm"), ("wrist", "Hand"), ("hip", "UpLeg")),
-            *(("knee", "Leg"), ("ankle", "Foot"), ("eye", "Eye"), ("ear", "Ear")),
-        )
-    },
-}
 
 
 class Node(NamedTuple):
-    """A place of the tree: its name, its parent's index, the points whose mean it is, the link that turns with it."""
+    """A joint of the tree: its name, its name in BVH, its parent's index, the link that turns with it, its points."""
 
     name: str
+    bvh: str
     parent: int
-    points: tuple[str, ...]
     link: str
+    points: list[str]
 
 
 def _nodes() -> tuple[Node, ...]:
-    nodes = [Node("pelvis", -1, ("pelvis",), "hips"), Node("torso", 0, ("pelvis",), "torso")]
-
-    def add(name: str, parent: str, link: str = "", points: tuple[str, ...] = ()) -> None:
-        nodes.append(Node(name, [node.name for node in nodes].index(parent), points or (name,), link))
-
-    add("neck", "torso", "head")
-    add("head", "neck", points=("right_ear", "left_ear"))
-    for name in HEAD_POINTS:
-        add(name, "head")
-    for upper, top, links in (
-        (("shoulder", "elbow", "wrist"), "torso", ("upper_arm", "forearm", "")),
-        (("hip", "knee", "ankle"), "pelvis", ("thigh", "shank", "")),
-    ):
-        for side in SIDES:
-            parent = top
-            for part, link in zip(upper, links, strict=True):
-                add(f"{side}_{part}", parent, f"{side}_{link}" if link else "")
-                parent = f"{side}_{part}"
-    return tuple(nodes)
+    rows = load_layout("bvh_posekit").fields["nodes"]
+    index = {row[0]: k for k, row in enumerate(rows)}
+    return tuple(Node(name, bvh, index.get(above, -1), *rest) for name, bvh, above, *rest in rows)
 
 
 #: Depth first, as a file lists them.
 NODES: Final = _nodes()
 
 
-def figure_of(motion: Motion) -> tuple[Figure, Array]:
-    """Return a figure of the person's lengths and the configurations (T, nq) of a motion.
+def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
+    """Return a figure of the person's lengths, and its tree over one recording.
 
     Stored configurations of the figure are used unchanged; otherwise they are computed from the joints in closed
     form. An unknown angle keeps the value of the nearest frame that has it; one that is never known stands at zero, or
     at its limit next to zero.
 
+    Parameters
+    ----------
+    motion : Motion
+    format : str
+        Name of the format, for errors.
+
+    Returns
+    -------
+    figure : Figure
+    root : array (T, 3)
+        The pelvis in the world, y up, metres.
+    angles : array (T, 21, 3)
+        Angles of each node against its parent (the first against the world), about x, z and y, radians.
+
     Raises
     ------
     InputError
-        If a frame has no torso, to which head and limbs are attached.
+        If there are several recordings, or a frame has no torso, to which head and limbs are attached.
     """
     from posekit.body import load_figure, scaled_to, segment_lengths
 
     figure = load_figure()
     if motion.joints is not None:
+        one_recording(motion, format)
         joints = motion.figure_joints
         lengths = segment_lengths(joints)
         if any(abs(lengths.get(name, own) - own) > 1e-6 for name, own in figure.lengths.items()):
@@ -119,7 +107,7 @@ def figure_of(motion: Motion) -> tuple[Figure, Array]:
         known = np.flatnonzero(np.isfinite(q[:, k]))
         middles = (known[1:] + known[:-1]) / 2
         q[:, k] = q[known[np.searchsorted(middles, np.arange(len(q)))], k] if len(known) else neutral
-    return figure, q
+    return figure, *_placed(figure, q, motion.up)
 
 
 def rest_place(figure: Figure, node: Node) -> Array:
@@ -134,16 +122,8 @@ def offsets(figure: Figure) -> Array:
     return np.asarray(np.stack(steps) @ TO_Y_UP.T)
 
 
-def placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
-    """Put configurations (T, nq) into the tree.
-
-    Returns
-    -------
-    root : array (T, 3)
-        The pelvis in the world, y up, metres.
-    angles : array (T, 21, 3)
-        Angles of each node against its parent (the first against the world), about x, z and y, radians.
-    """
+def _placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
+    """Put configurations (T, nq) into the tree: the root (T, 3) and the angles (T, 21, 3) of `figure_in_tree`."""
     W = rotation_between(up_vector(up or "+z"), up_vector("+y"))
     R_torso = W @ rotation_from_quaternion(q[:, 3:7]) @ TO_Y_UP.T
     pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
@@ -216,15 +196,12 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
         return
     if unit not in METRES:
         raise refusal(path, "unit", repr(unit), f"one of {', '.join(METRES)}", "state one of them")
-    if motion.joints is not None:
-        one_recording(motion, "BVH")
-    figure, q = figure_of(motion)
-    root, angles = placed(figure, q, motion.up)
+    figure, root, angles = figure_in_tree(motion, "BVH")
     scale = 1.0 / METRES[unit]
-    values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(q), -1)])
+    values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(root), -1)])
     values = np.round(values, 6) + 0.0  # no -0.000000
     hierarchy = "".join(_block(0, offsets(figure) * scale, 0))
-    head = f"HIERARCHY\n{hierarchy}MOTION\nFrames: {len(q)}\nFrame Time: {even_step(motion, 'BVH'):.10f}\n"
+    head = f"HIERARCHY\n{hierarchy}MOTION\nFrames: {len(root)}\nFrame Time: {even_step(motion, 'BVH'):.10f}\n"
     row = " ".join("%.6f" if column.any() else "%d" for column in values.T) + "\n"
     write_bytes(path, (head + "".join(row % tuple(one) for one in values.tolist())).encode("ascii"))
 
@@ -236,7 +213,7 @@ def _block(k: int, steps: Array, depth: int) -> list[str]:
     turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in AXIS_ORDER)
     moves = "Xposition Yposition Zposition "
     lines = [
-        f"{tab}{'JOINT' if depth else 'ROOT'} {NAMES[node.name]}\n{tab}{{\n",
+        f"{tab}{'JOINT' if depth else 'ROOT'} {node.bvh}\n{tab}{{\n",
         f"{tab}\tOFFSET {x:.8f} {y:.8f} {z:.8f}\n",
         f"{tab}\tCHANNELS {3 if depth else 6} {'' if depth else moves}{turns}\n",
     ]

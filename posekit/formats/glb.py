@@ -19,8 +19,8 @@ from scipy.spatial import ConvexHull
 
 from posekit.errors import refusal
 from posekit.files import write_bytes
-from posekit.formats.figure_tree import NODES, TO_Y_UP, euler_rotation, figure_of, offsets, placed, rest_place
-from posekit.formats.trc import one_recording, seconds
+from posekit.formats.figure_tree import NODES, TO_Y_UP, euler_rotation, figure_in_tree, offsets, rest_place
+from posekit.formats.trc import seconds
 from posekit.geometry import Array, Ints, cross, quaternion_from_rotation
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 SIDE_COLOURS: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
 #: Corners of a capsule's rings, and rings of a half sphere: faces lie inside the capsule by under 1 % of its radius.
 RING_CORNERS, HALF_SPHERE_RINGS = 24, 6
-_FLOAT, _UINT16, _VERTICES, _INDICES = 5126, 5123, 34962, 34963
+_FLOAT, _UINT16 = 5126, 5123
 
 
 class _Glb:
@@ -51,20 +51,20 @@ class _Glb:
         items.append(item)
         return len(items) - 1
 
-    def accessor(self, values: NDArray[Any], kind: int = _FLOAT, target: int = 0, ends: bool = False) -> int:
-        """Add numbers (N,), (N, 3) or (N, 4) and return the index of their accessor."""
-        data = np.ascontiguousarray(values, dtype="<u2" if kind == _UINT16 else "<f4")
+    def accessor(self, values: NDArray[Any]) -> int:
+        """Add numbers (N,), (N, 3) or (N, 4) and return the index of their accessor; whole numbers are indices."""
+        kind, spelt = (_UINT16, "<u2") if values.dtype.kind == "i" else (_FLOAT, "<f4")
+        data = np.ascontiguousarray(values, dtype=spelt)
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": data.nbytes}
-        view |= {"target": target} if target else {}
         table = data.reshape(len(data), -1)
-        accessor: dict[str, Any] = {
+        accessor = {
             "bufferView": self.append("bufferViews", view),
             "componentType": kind,
             "count": len(data),
             "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[table.shape[1]],
+            "min": table.min(axis=0).tolist(),
+            "max": table.max(axis=0).tolist(),
         }
-        if ends:
-            accessor |= {"min": table.min(axis=0).tolist(), "max": table.max(axis=0).tolist()}
         self.data += data.tobytes() + bytes(-data.nbytes % 4)
         return self.append("accessors", accessor)
 
@@ -86,17 +86,14 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
     InputError
         If the motion has no body, several recordings, or alternative postures of a frame.
     """
-    if motion.joints is not None:
-        one_recording(motion, "GLB")
-    figure, q = figure_of(motion)
-    root, angles = placed(figure, q, motion.up)
+    figure, root, angles = figure_in_tree(motion, "GLB")
     glb = _Glb()
     origin = np.round((root.min(axis=0) + root.max(axis=0)) / 2)
     world = glb.append("nodes", {"name": "origin", "translation": (origin + 0.0).tolist(), "children": [1]})
     glb.document["scenes"][0]["nodes"] = [world]
     turns, away = _turns(angles), root - origin
     _body(glb, figure, away[0], turns[0])
-    if len(q) > 1:
+    if len(root) > 1:
         _animate(glb, path, away, turns, seconds(motion))
     write_bytes(path, glb.packed())
 
@@ -124,11 +121,8 @@ def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
         half = capsule.half_length * axis
         vertices, normals, faces = _capsule(middle - half, middle + half, capsule.radius)
         shapes[capsule.link] = {
-            "attributes": {
-                "POSITION": glb.accessor(vertices, target=_VERTICES, ends=True),
-                "NORMAL": glb.accessor(normals, target=_VERTICES),
-            },
-            "indices": glb.accessor(faces.ravel(), _UINT16, _INDICES),
+            "attributes": {"POSITION": glb.accessor(vertices), "NORMAL": glb.accessor(normals)},
+            "indices": glb.accessor(faces.ravel()),
         }
     return shapes
 
@@ -157,7 +151,7 @@ def _animate(glb: _Glb, path: str | Path, away: Array, turns: Array, time: Array
     if not (np.diff(keys) > 0).all():
         got = f"frames {float(np.diff(time).min()):g} s apart"
         raise refusal(path, "time", got, "times that differ in 32-bit floats", "cut the motion")
-    inputs = glb.accessor(keys, ends=True)
+    inputs = glb.accessor(keys)
     rotations = [(k, "rotation", turns[:, k]) for k, node in enumerate(NODES) if node.link]
     tracks = [(0, "translation", away), *rotations]
     channels, samplers = [], []

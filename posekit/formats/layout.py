@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -13,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import nearest, refusal, shown
-from posekit.files import DATA, read_bytes, text
+from posekit.files import DATA, parse_toml, read_bytes
 from posekit.geometry import Array, cross, dot, unit
 from posekit.motion.motion import NAMES
 from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side
@@ -67,19 +66,6 @@ class Layout:
     def sources(self) -> dict[str, tuple[str, ...]]:
         """Landmarks and feet to the file's names."""
         return {**self.landmarks, **self.feet}
-
-    def over(self, names: Sequence[str]) -> Layout:
-        """Return the part of the layout whose points are all among a file's names, spelt as the file spells them."""
-        there = {plain(name): name for name in reversed(names)}
-        landmarks, feet = (
-            {
-                ours: tuple(there[plain(part)] for part in parts)
-                for ours, parts in own.items()
-                if _in(parts, there)
-            }
-            for own in (self.landmarks, self.feet)
-        )
-        return Layout(name=self.name, points=tuple(names), landmarks=landmarks, feet=feet, fields=self.fields)
 
     def gather(self, points: Array, names: Sequence[str] = ()) -> dict[str, Array]:
         """Pick landmarks out of a file's points.
@@ -235,15 +221,7 @@ def load_layout(name: str | Path) -> Layout:
 
 @cache
 def _built_in(name: str) -> Layout:
-    return _layout(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")), name)
-
-
-def parse_toml(data: bytes, source: str) -> dict[str, Any]:
-    """Parse TOML, or refuse it with its line."""
-    try:
-        return tomllib.loads(text(data, source))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise refusal(source, "", str(error), "a TOML file", "correct the line") from None
+    return _layout(parse_toml(read_bytes(FOLDER / f"{name}.toml"), name), name)
 
 
 def _layout(table: dict[str, Any], name: str) -> Layout:

@@ -145,7 +145,7 @@ class Node:
 
 
 def as_numbers(value: Any) -> Array | None:
-    """Convert nested lists or an array of numbers and nulls to floats; return None if anything else is there."""
+    """Convert nested lists of numbers and nulls, or an array of numbers or booleans, to floats; None for others."""
     try:
         array: NDArray[Any] = np.asarray(value)
         if array.dtype.kind == "O" and {type(one) for one in array.flat} <= {int, float, type(None)}:
@@ -154,7 +154,8 @@ def as_numbers(value: Any) -> Array | None:
             return array.astype(np.float64)
     except (ValueError, TypeError, OverflowError):
         return None
-    return array.astype(np.float64) if array.dtype.kind in "iuf" else None
+    kinds = "iufb" if array is value else "iuf"  # true and false are no numbers in JSON
+    return array.astype(np.float64) if array.dtype.kind in kinds else None
 
 
 def points_by_name(nodes: Sequence[Node], names: Sequence[str], axes: int, kind: str) -> Array:

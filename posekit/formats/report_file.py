@@ -69,17 +69,12 @@ def read(document: Any, path: str | Path, options: Options) -> Report:
             if len(found[name]) and not (0 <= found[name].min() and found[name].max() < most):
                 expected = f"numbers from 0 to {most - 1}"
                 raise root.at(f"findings.{name}").refused(expected, "write the report again")
-        fields: dict[str, Any] = {name: _typed(root.at(name), kind, count) for name, kind in ROWS.items()}
-        fields |= {name: _typed(root.at(name), kind, count, checks) for name, kind in TABLES.items()}
-        fields |= {name: dict(root.at(name).object()) for name in MAPPINGS}
+        fields: dict[str, Any] = {name: dict(root.at(name).object()) for name in MAPPINGS}
+        for name, kind in {**ROWS, **TABLES}.items():
+            shape = (count, checks) if name in TABLES else (count,)
+            fields[name] = root.at(name).array(*shape, unknown=kind is np.float64).astype(kind)
         findings = {name: values.astype(FINDINGS.get(name, np.float64)) for name, values in found.items()}
         return Report(findings=findings, **texts, **fields)
-
-
-def _typed(node: Node, kind: Any, *shape: int) -> Any:
-    """Return an array of a type; truth values are kept as 0 and 1 in JSON."""
-    values = node.value.astype(np.float64) if getattr(node.value, "dtype", None) == np.bool_ else node.value
-    return Node(values, node.source, node.place).array(*shape, unknown=kind is np.float64).astype(kind)
 
 
 def write_json(path: str | Path, report: Report) -> None:
