@@ -183,8 +183,8 @@ class Motion(Record):
     @property
     def in_time(self) -> bool:
         """Whether every frame of a recording has one posture: alternative postures are not a motion."""
-        pairs = np.column_stack([np.asarray(self.clip), np.asarray(self.frame)])
-        return len(self) > 1 and len(np.unique(pairs, axis=0)) == len(self)
+        clip, frame = np.asarray(self.clip), np.asarray(self.frame)
+        return len(self) > 1 and len(np.unique(clip * (frame.max() + 1) + frame)) == len(self)
 
     def points(self, names: Sequence[str]) -> Array:
         """Return positions (T, len(names), 3) of named points; NaN for those that the motion does not have."""

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from posekit.geometry import Array, Flags, Ints, cross, dot
-from posekit.robots.kinematics import Kinematics
+from posekit.robots.kinematics import Kinematics, Site
 
 #: Configurations worked on at once: their squared distances stay in the processor's cache.
-BLOCK: Final = 256
+BLOCK: Final = 512
 #: Metres that hulls and capsules are taken larger, above the tolerance of coal's GJK.
 ROOM: Final = 1e-6
 #: Metres within which the depth of a penetration is computed.
@@ -59,8 +59,7 @@ class SelfCollision:
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
-        self.model, self._kinematics = model, Kinematics(model)
-        self._meshes, self._hulls = geometry, geometry.copy()
+        self.model, self._meshes, self._hulls = model, geometry, geometry.copy()
         bodies = list(self._hulls.geometryObjects)
         hulls: dict[int, coal.CollisionGeometry] = {}
         for body in bodies:
@@ -68,7 +67,6 @@ class SelfCollision:
                 key = body.geometry.id()
                 hulls[key] = hulls[key] if key in hulls else _hull(body.geometry)
                 body.geometry = hulls[key]
-        self._joint = np.array([body.parentJoint for body in bodies], dtype=np.intp)
         shapes, places = [body.geometry for body in bodies], [body.placement for body in bodies]
         self._exact = np.array(
             [isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_
@@ -77,7 +75,8 @@ class SelfCollision:
         boxes = [_box(one) for one in shapes]
         self._axes = np.array([M.rotation for M in places]).reshape(-1, 3, 3)
         centres = [M.act(centre) for M, (centre, _, _) in zip(places, boxes, strict=True)]
-        self._centre = np.array(centres).reshape(-1, 3)
+        sites = [Site(body.parentJoint, tuple(at.tolist())) for body, at in zip(bodies, centres, strict=True)]
+        self._kinematics = Kinematics(model, sites)
         self._size = np.array([half for _, half, _ in boxes]).reshape(-1, 3)
         radius = np.array([ball for _, _, ball in boxes])
         self._pair = np.full((len(bodies), len(bodies)), -1)
@@ -116,12 +115,10 @@ class SelfCollision:
 
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
         """Return the pairs that can be nearer than the margin: rows, pairs, and distances of capsules, else NaN."""
-        rotation, origin = self._kinematics.place(q)
-        axes = np.einsum("bijn,bjk->ikbn", rotation[self._joint], self._axes)
+        frames, centre = self._kinematics.place(q)
+        axes = np.einsum("jbin,bjk->ikbn", frames, self._axes)
         # Positions near the robot, so that their squares keep their digits.
-        turned = np.einsum("bijn,bj->bin", rotation[self._joint], self._centre)
-        centre = (origin - origin[-1:])[self._joint] + turned
-        points = np.ascontiguousarray(centre.transpose(2, 0, 1))
+        points = np.ascontiguousarray((centre - centre[-1:]).transpose(2, 0, 1))
         squared, one = dot(points, points)[..., None], np.ones((*points.shape[:2], 1))
         left = np.concatenate([points, squared, one], axis=2)
         right = np.concatenate([-2 * points, one, squared], axis=2)

@@ -239,11 +239,7 @@ class Robot(Record):
         for row, column in np.argwhere(~np.isfinite(q))[:1]:
             place = f"row {row}: {self.configuration_names[column]}"
             check(False, place, shown(float(q[row, column])), "a finite number", "leave the row out")
-        turning: dict[int, list[int]] = {}
-        for k, entry in enumerate(entries_of(self.model)):
-            if len(entry.suffix) > 1:
-                turning.setdefault(entry.joint, []).append(k)
-        for joint, columns in turning.items():
+        for joint, columns in self._turning.items():
             length = np.linalg.norm(q[:, columns], axis=1)
             for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
                 what = "a quaternion" if len(columns) == 4 else "a cosine and sine"
@@ -251,6 +247,15 @@ class Robot(Record):
                 check(False, f"row {row}: {self.model.names[joint]}", got, "length 1", remedy)
             q[:, columns] /= length[:, None]
         return q
+
+    @cached_property
+    def _turning(self) -> dict[int, list[int]]:
+        """The columns of q with a quaternion, or with a cosine and a sine, by the index of their joint."""
+        found: dict[int, list[int]] = {}
+        for k, entry in enumerate(entries_of(self.model)):
+            if len(entry.suffix) > 1:
+                found.setdefault(entry.joint, []).append(k)
+        return found
 
     def with_mimics(self, q: Array) -> Array:
         """Return configurations (N, nq) whose mimicking joints have the values of their targets."""
