@@ -126,13 +126,13 @@ class Settings(Record):
     rules : sequence of int
         Rules of walking, 1 to 5, for the check ``walking``.
     walkers : {"paper", "people", "paper-printed"}
-        Source of their thresholds: the paper, real walkers, or the paper as printed.
+        Source of the walking rules' thresholds: the paper, real walkers, or the paper as printed.
     contact_margin : float
         Distance that bodies must keep, metres; negative allows penetration.
     rigid_tolerance : float, optional
-        Distances within rigid parts may differ by this, metres.
+        Allowed difference of distances within rigid parts, metres.
     angle_tolerance : float, optional
-        Joint angles may exceed their range by this, degrees.
+        Allowed excess of joint angles beyond their range, degrees.
     """
 
     checks: Sequence[Any] | None = None
@@ -235,7 +235,7 @@ class RecoverSettings(Settings):
     Parameters
     ----------
     tangent_tolerance : float, optional
-        A segment may be too short for its image by this, metres.
+        Allowed shortfall of a segment against its image, metres.
     deviation : float, optional
         Standard deviation of the image points, pixels. The view's own by default.
     length_deviation : float, optional
@@ -245,21 +245,21 @@ class RecoverSettings(Settings):
     root : {"auto", "given", "head", "torso", "search"}
         Source of the neck's place: the view, six head points, or the body. ``search`` is ``auto``.
     proportions : {"auto", "figure", "people", "taylor"}
-        Relative lengths of a person whose lengths are not given: the figure's; those between the joints of people, by
-        default behind key points and photographs; or, without a camera, Taylor's Table 1.
+        Relative lengths of a person whose lengths are not given: the figure's; those of people's joints, the default
+        for key points and photographs; or, without a camera, Taylor's Table 1.
     scale : str, optional
         Scale of an uncalibrated view: ``min``, ``likely``, a number in pixels a metre, ``stature:PX`` or constraints
         such as ``closure:1,coplanar:0.5``.
     nearer : mapping or sequence of mapping, optional
         Flips given by hand: segment to the name of its nearer end, for all frames or one mapping a frame.
     infer : bool
-        Complete joints that were not seen.
+        Infer the positions of unseen joints.
     refine : bool, optional
-        Treat image points as noisy. By default wherever the points cannot be exact.
+        Treat image points as noisy. By default only if the points cannot be exact.
     coverage : float
-        Share of the probability that the listed postures hold at least.
+        Least share of the probability that the listed postures hold, 0 to 1.
     group : float, optional
-        Group survivors that are within this distance, metres.
+        Distance within which survivors form a group, metres.
     follow : int
         Number of paths through the frames to follow; 0 for none.
 
