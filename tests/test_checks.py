@@ -18,8 +18,8 @@ import pytest
 
 import posekit
 from posekit.errors import InputError
+from posekit.geometry import segment_distance
 from posekit.motion import Motion
-from posekit.robots.collision import segment_distance
 from posekit.settings import EXACT, ValidateSettings
 from posekit.skeleton import DOFS, JOINT, JOINTS
 from posekit.synthesis.walker import Walker

@@ -13,6 +13,7 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.robots import Robot, load_robot, robot_names
+from posekit.settings import ValidateSettings
 from posekit.validators import Validator
 
 LIMIT = '<limit lower="-1" upper="2" effort="10" velocity="10"/>'
@@ -494,6 +495,10 @@ def test_mimicking_joints_follow_in_inverse_kinematics(tmp_path: Path) -> None:
     human = load_robot("human", bodies="none", joint_map=tmp_path / "map.toml")
     with pytest.raises(InputError, match="a frame of the model"):
         human.points(human.neutral)
+    # A given map is used by every door.
+    settings = ValidateSettings(joint_map=str(tmp_path / "map.toml"))
+    with pytest.raises(InputError, match="a frame of the model"):
+        Validator("human", settings=settings).check(np.zeros((2, 14, 3)))
 
 
 @pytest.mark.parametrize("name", ["human", "g1"])

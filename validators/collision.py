@@ -14,8 +14,7 @@ import numpy as np
 
 from posekit.body import Figure, load_figure
 from posekit.body.capsules import CAPSULE_AXES
-from posekit.geometry import dot, unit
-from posekit.robots.collision import segment_distance
+from posekit.geometry import dot, segment_distance, unit
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree.steps import CAPSULES, Step, step
 from posekit.validators.body import Body, hips_share

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -477,10 +477,12 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
         except InputError:  # another robot, or the error that loading it as one words better
             pass
 
+    load = partial(load_robot, name, srdf=settings.srdf, package_dirs=settings.package_dirs)
+    joint_map = settings.joint_map or ""
     bodies = "meshes" if settings.bodies == "auto" else settings.bodies
-    found = load_robot(name, srdf=settings.srdf, bodies=bodies, package_dirs=settings.package_dirs)
+    found = load(bodies=bodies, joint_map=joint_map)
     if settings.bodies == "auto" and not found.collision_pairs:
-        return load_robot(name, srdf=settings.srdf, bodies="capsules", package_dirs=settings.package_dirs)
+        return load(bodies="capsules", joint_map=joint_map)
     return found
 
 

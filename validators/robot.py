@@ -49,10 +49,9 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
     names, table = list(robot.configuration_names), load_ranges(body.settings.ranges)
     # Tables of another kind are of people.
     limits = table["limits"] if table is not None and table["kind"] == "joints" else {}
-    for name, ends in limits.items():
-        if name in names:
-            at = names.index(name)
-            lower[at], upper[at] = np.array(ends) / factor
+    for at, name in enumerate(names):
+        if name in limits:
+            lower[at], upper[at] = np.array(limits[name]) / factor
     bounded = np.isfinite(lower) | np.isfinite(upper)
     which = [k for k, own in enumerate(robot.units) if own == unit_of_q and bounded[k]]
     if not which:
@@ -173,7 +172,7 @@ def sole_points(robot: Robot, q: Array) -> Array:
     if soles is not None:
         from posekit.robots.kinematics import Kinematics, Site
 
-        sites = [Site(joint, tuple(place.tolist())) for joint, place in zip(*soles, strict=True)]
+        sites = [Site(joint, place) for joint, place in zip(*soles, strict=True)]
         known = np.asarray(np.isfinite(q).all(axis=1))
         points[known] = Kinematics(robot.model, sites).positions(q[known])
     return points

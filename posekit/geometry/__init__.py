@@ -29,6 +29,7 @@ from posekit.geometry.rotations import rotation_between as rotation_between
 from posekit.geometry.rotations import rotation_from_vector as rotation_from_vector
 from posekit.geometry.rotations import turned_near as turned_near
 from posekit.geometry.rotations import vector_from_rotation as vector_from_rotation
+from posekit.geometry.segments import segment_distance as segment_distance
 from posekit.geometry.units import FARTHEST_COORDINATE as FARTHEST_COORDINATE
 from posekit.geometry.units import PER_METRE as PER_METRE
 from posekit.geometry.units import UP_AXES as UP_AXES

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 #: Metres: a shorter part gets no capsule.
 SHORTEST: Final = 1e-3
 
+BODY: Final = pin.FrameType.BODY
+
 #: Parts of a humanoid, named as the stick figure's links, and the joints at their ends.
 PARTS: Final[Mapping[str, tuple[str, str]]] = {
     "torso": ("neck", "pelvis"),
@@ -57,7 +59,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
         for body in link.findall("collision"):
             if body.find("geometry/mesh") is not None:
                 link.remove(body)
-                frame = model.getFrameId(link.get("name", ""), pin.FrameType.BODY)
+                frame = model.getFrameId(link.get("name", ""), BODY)
                 meshed.add(int(model.frames[frame].parentJoint))
     geometry = build_bodies(model, plain, (), robot.source, "collision")
     try:
@@ -120,10 +122,6 @@ def _capsule(
     """Return a capsule between two places in a joint's frame, on the link of the joint."""
     length = float(np.linalg.norm(b - a))
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b - a) / length)
-    frames = [
-        (frame.type != pin.FrameType.BODY, k)
-        for k, frame in enumerate(model.frames)
-        if frame.parentJoint == joint
-    ]
+    carried = (k for k, one in enumerate(model.frames) if one.parentJoint == joint and one.type == BODY)
     placement = pin.SE3(turn.toRotationMatrix(), (a + b) / 2)
-    return pin.GeometryObject(name, joint, min(frames)[1], placement, coal.Capsule(radius, length))
+    return pin.GeometryObject(name, joint, next(carried), placement, coal.Capsule(radius, length))

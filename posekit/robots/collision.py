@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.geometry import Array, Flags, Ints, cross, dot
+from posekit.geometry import Array, Flags, Ints, dot, segment_distance
 from posekit.robots.kinematics import Kinematics, Site
 
 #: Configurations worked on at once: their squared distances stay in the processor's cache.
@@ -19,8 +19,6 @@ ROOM: Final = 1e-6
 DEPTH: Final = 1e-5
 #: Least extent of a mesh over its size below which it is flat.
 FLAT: Final = 1e-6
-#: Squared sine of the angle of two segments below which they are parallel.
-PARALLEL: Final = 1e-30
 
 
 class Contacts(NamedTuple):
@@ -75,7 +73,7 @@ class SelfCollision:
         boxes = [_box(one) for one in shapes]
         self._axes = np.array([M.rotation for M in places]).reshape(-1, 3, 3)
         centres = [M.act(centre) for M, (centre, _, _) in zip(places, boxes, strict=True)]
-        sites = [Site(body.parentJoint, tuple(at.tolist())) for body, at in zip(bodies, centres, strict=True)]
+        sites = [Site(body.parentJoint, at) for body, at in zip(bodies, centres, strict=True)]
         self._kinematics = Kinematics(model, sites)
         self._size = np.array([half for _, half, _ in boxes]).reshape(-1, 3)
         radius = np.array([ball for _, _, ball in boxes])
@@ -188,39 +186,3 @@ def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, float]:
         points = np.array([shape.point(k) for k in range(shape.num_points)])
         return centre, half, float(np.linalg.norm(points - centre, axis=1).max())
     return centre, half, float(np.linalg.norm(half))
-
-
-def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
-    r"""Return the distance between two segments, in closed form.
-
-    Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained minimum is
-    clamped in s, t follows and is clamped, and s follows that (Ericson 2005, *Real-Time Collision Detection*, §5.1.9).
-    If the segments are nearly parallel that minimum is ill-conditioned; the four ends, each against the other segment,
-    are tried as well.
-
-    Parameters
-    ----------
-    gap : array (N, 3)
-        From a's middle to b's, metres.
-    half_a, half_b : array (N, 3)
-        From each middle to one end, metres; zero for a point.
-
-    Returns
-    -------
-    array (N,)
-    """
-    aa, bb, ab = dot(half_a, half_a), dot(half_b, half_b), dot(half_a, half_b)
-    ag, bg, normal = dot(half_a, gap), dot(half_b, gap), cross(half_a, half_b)
-    determinant = dot(normal, normal)
-    parallel = determinant <= PARALLEL * aa * bb
-    aa, bb = np.where(aa > 0, aa, 1.0), np.where(bb > 0, bb, 1.0)
-    # Lagrange's identity: the products of cross products keep the digits that aa bb - ab^2 cancels.
-    s = np.where(parallel, 0.0, dot(normal, cross(gap, half_b)) / np.where(parallel, 1.0, determinant))
-    inner, one = np.clip((np.clip(s, -1.0, 1.0) * ab - bg) / bb, -1.0, 1.0), np.ones(len(gap))
-    least = np.full(len(gap), np.inf)
-    tried = [(np.clip((ag + t * ab) / aa, -1.0, 1.0), t) for t in (inner, -one, one)]
-    tried += [(s, np.clip((s * ab - bg) / bb, -1.0, 1.0)) for s in (-one, one)]
-    for s, t in tried:
-        apart = gap + t[:, None] * half_b - s[:, None] * half_a
-        least = np.minimum(least, dot(apart, apart))
-    return np.asarray(np.sqrt(least))

@@ -10,8 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from posekit.errors import nearest, shown
+from posekit.errors import cut, nearest, shown
 from posekit.geometry import Array
+from posekit.robots.kinematics import entries_of
 from posekit.robots.urdf import FREEDOM, Element, need, numbers
 
 if TYPE_CHECKING:
@@ -25,10 +26,6 @@ class Mimic(NamedTuple):
     target: str
     multiplier: float
     offset: float
-
-    def value(self, target: Array) -> Array:
-        """Return the joint's values for those of its target."""
-        return self.multiplier * target + self.offset
 
 
 def mimics_of(robot: Element) -> tuple[Mimic, ...]:
@@ -53,16 +50,6 @@ def joint_values(model: pin.Model, q: Array, joint: str) -> Array:
     return np.arctan2(q[:, at + 1], q[:, at]) if model.nqs[index] == 2 else q[:, at]
 
 
-def set_joint(model: pin.Model, q: Array, joint: str, values: Array) -> None:
-    """Set a joint of one degree of freedom, in place."""
-    index = model.getJointId(joint)
-    at = model.idx_qs[index]
-    if model.nqs[index] == 2:
-        q[:, at], q[:, at + 1] = np.cos(values), np.sin(values)
-    else:
-        q[:, at] = values
-
-
 def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
     """Order the columns of a table as q: see `Robot.q_from_columns`."""
     table, check = np.asarray(values, dtype=np.float64), partial(need, "")
@@ -83,28 +70,23 @@ def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple
     ok = bool(columns) and len(ignored) <= len(names) / 2
     check(ok, "columns", shown(ignored), f"joints of {robot.name}", remedy)
     q = np.tile(robot.neutral, (len(table), 1))
-    for key, column in columns.items():
-        q[:, entries[key]] = column
-    following = {_key(mimic.joint): mimic for mimic in robot.mimics}
-    for key, mimic in following.items():
-        if not {key, f"{key}.cos"} & columns.keys():
-            set_joint(robot.model, q, mimic.joint, mimic.value(joint_values(robot.model, q, mimic.target)))
-    absent = [name for name in robot.configuration_names if _key(name) not in columns]
-    left = [name for name in absent if _key(name).removesuffix(".cos").removesuffix(".sin") not in following]
-    notes = []
-    if left:
-        notes.append(
-            f"{len(left)} of {len(entries)} entries have no column and are neutral: {_listed(left)}."
-        )
-    if ignored:
-        notes.append(f"Columns that are not a joint of {robot.name} are ignored: {_listed(ignored)}.")
-    return q, tuple(notes)
+    at, given = [entries[key] for key in columns], np.array(list(columns.values())).T
+    q[:, at] = given
+    q = robot.with_mimics(q)
+    q[:, at] = given  # mimicking joints may have columns of their own
+    following = {mimic.joint for mimic in robot.mimics}
+    left = [
+        entry.name
+        for entry in entries_of(robot.model)
+        if _key(entry.name) not in columns and robot.model.names[entry.joint] not in following
+    ]
+    notes = {
+        f"{len(left)} of {len(entries)} entries have no column and are neutral": left,
+        f"Columns that are not a joint of {robot.name} are ignored": ignored,
+    }
+    return q, tuple(f"{note}: {cut(', '.join(some))}." for note, some in notes.items() if some)
 
 
 def _key(name: str) -> str:
     """Return a name of a column without case and without ``_joint`` at the end of the joint's name."""
     return str(name).strip().lower().replace("_joint.", ".").removesuffix("_joint")
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:6]) + (", …" if len(names) > 6 else "")

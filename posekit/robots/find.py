@@ -49,12 +49,8 @@ def find(name_or_path: str | Path) -> RobotFiles:
     if name.endswith(".xacro"):
         raise refusal(name, "", "a xacro file", "a URDF", "expand it first: xacro FILE > FILE.urdf")
     if name not in known and not is_path:
-        some = nearest(name, known)
-        if not some.startswith("did"):
-            some = f"some names are {', '.join((FIGURE[0], 'human', *_short_names()))}"
-        remedy = (
-            some if len(known) > len(FIGURE) else f"install {ROBOT_PACKAGE}, or write ./ before a file's name"
-        )
+        install = f"install {ROBOT_PACKAGE}, or write ./ before a file's name"
+        remedy = nearest(name, known) if len(known) > len(FIGURE) else install
         raise refusal("", "robot", shown(name), "the name of a robot or the path of a URDF", remedy)
     path = Path(name)
     urdf, srdf = known.get(name, (path, path.with_suffix(".srdf")))
@@ -75,12 +71,6 @@ def robot_names() -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1)
-def _short_names() -> dict[str, list[str]]:
-    table: dict[str, list[str]] = tomllib.loads((DATA / "robots.toml").read_text(encoding="utf-8"))["robots"]
-    return table
-
-
-@lru_cache(maxsize=1)
 def _published() -> dict[str, tuple[Path, Path]]:
     """Map names to the URDF and SRDF files of the figure and, if it is installed, of example-robot-data.
 
@@ -96,7 +86,8 @@ def _published() -> dict[str, tuple[Path, Path]]:
     known = dict.fromkeys(FIGURE, (DATA / "stick_figure.urdf", DATA / "stick_figure.srdf"))
     for urdf in sorted(robots.glob("*/*/*.urdf")):
         known.setdefault(urdf.stem, (urdf, urdf.parents[1] / "srdf" / f"{urdf.stem}.srdf"))
-    for name, (short, srdf) in _short_names().items():
+    short_names = tomllib.loads((DATA / "robots.toml").read_text(encoding="utf-8"))["robots"]
+    for name, (short, srdf) in short_names.items():
         urdf = robots / f"{short}.urdf"
         if urdf.is_file():
             known[name] = urdf, urdf.parents[1] / "srdf" / f"{srdf}.srdf"

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from posekit.geometry import Array, cross, rotation_from_quaternion
 
@@ -23,10 +24,10 @@ SUFFIXES: Final = {
 
 
 class Site(NamedTuple):
-    """A place on a body: a joint's index, and metres in the joint's frame."""
+    """A place on a body: the joint's index, and an offset (3,) in metres in the joint's frame."""
 
     joint: int
-    offset: tuple[float, float, float]
+    offset: ArrayLike
 
 
 class Kinematics:
@@ -164,18 +165,23 @@ def _local(entries: Array) -> tuple[Array, Array]:
 
 
 class Entry(NamedTuple):
-    """An entry of q: its name, the joint's index, and its suffix (x, qx, cos, …) if the joint has several."""
+    """An entry of q: its name, the joint's index, its suffix (x, qx, cos, …) if the joint has several, and its unit."""
 
     name: str
     joint: int
     suffix: str
+    unit: str
 
 
 def entries_of(model: pin.Model) -> list[Entry]:
     """List the entries of q. The seven of a floating root have no prefix: x, y, z, qx, qy, qz, qw."""
     entries = []
     for joint in range(1, model.njoints):
-        suffixes, name = SUFFIXES.get(model.joints[joint].shortname(), ("",)), str(model.names[joint])
+        kind, name = model.joints[joint].shortname(), str(model.names[joint])
+        suffixes = SUFFIXES.get(kind, ("",))
         root = joint == 1 and len(suffixes) == 7
-        entries += [Entry(end if root else f"{name}.{end}" if end else name, joint, end) for end in suffixes]
+        units = {"": "m" if kind.startswith("JointModelP") else "rad", **dict.fromkeys("xyz", "m")}
+        for end in suffixes:
+            entry = end if root else f"{name}.{end}" if end else name
+            entries.append(Entry(entry, joint, end, units.get(end, "")))
     return entries

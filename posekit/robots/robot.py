@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,16 +20,16 @@ from posekit.files import read_bytes, text
 from posekit.geometry import Array, Flags, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
 from posekit.robots.capsules import capsule_bodies
-from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of, set_joint
+from posekit.robots.collision import Contacts, SelfCollision
+from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of
 from posekit.robots.find import FIGURE, find
+from posekit.robots.inverse import solve
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics, entries_of
 from posekit.robots.pairs import Pairs, disabled_pairs, set_pairs
+from posekit.robots.scaling import scaled
 from posekit.robots.urdf import check_urdf, need, text_with
 from posekit.skeleton import JOINTS, POINTS
-
-if TYPE_CHECKING:
-    from posekit.robots.collision import Contacts, SelfCollision
 
 Bodies = Literal["meshes", "capsules", "none"]
 
@@ -165,10 +165,7 @@ class Robot(Record):
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Unit of each entry of q: ``rad``, ``m``, or empty for quaternions, cosines and sines."""
-        sliding = {one.get("name") for one in self.tree.findall("joint") if one.get("type") == "prismatic"}
-        units = {"": "rad", "x": "m", "y": "m", "z": "m"}
-        names, entries = self.model.names, entries_of(self.model)
-        return tuple("m" if names[one.joint] in sliding else units.get(one.suffix, "") for one in entries)
+        return tuple(entry.unit for entry in entries_of(self.model))
 
     @cached_property
     def mimics(self) -> tuple[Mimic, ...]:
@@ -239,37 +236,40 @@ class Robot(Record):
         for row, column in np.argwhere(~np.isfinite(q))[:1]:
             place = f"row {row}: {self.configuration_names[column]}"
             check(False, place, shown(float(q[row, column])), "a finite number", "leave the row out")
-        for joint, columns in self._turning.items():
-            length = np.linalg.norm(q[:, columns], axis=1)
-            for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
-                what = "a quaternion" if len(columns) == 4 else "a cosine and sine"
-                got, remedy = f"{what} of length {length[row]:.4g}", "check the order of q, and normalise it"
-                check(False, f"row {row}: {self.model.names[joint]}", got, "length 1", remedy)
-            q[:, columns] /= length[:, None]
+        for joint, (at, count) in enumerate(zip(self.model.idx_qs, self.model.nqs, strict=True)):
+            if count > 1:  # x, y, z before a quaternion, x, y before the cosine and sine of a planar joint
+                turn = q[:, at + count - (4 if count == 7 else 2) : at + count]
+                length = np.linalg.norm(turn, axis=1)
+                for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
+                    got = (
+                        f"{'a quaternion' if count == 7 else 'a cosine and sine'} of length {length[row]:.4g}"
+                    )
+                    place, remedy = (
+                        f"row {row}: {self.model.names[joint]}",
+                        "check the order of q, and normalise it",
+                    )
+                    check(False, place, got, "length 1", remedy)
+                turn /= length[:, None]
         return q
-
-    @cached_property
-    def _turning(self) -> dict[int, list[int]]:
-        """The columns of q with a quaternion, or with a cosine and a sine, by the index of their joint."""
-        found: dict[int, list[int]] = {}
-        for k, entry in enumerate(entries_of(self.model)):
-            if len(entry.suffix) > 1:
-                found.setdefault(entry.joint, []).append(k)
-        return found
 
     def with_mimics(self, q: Array) -> Array:
         """Return configurations (N, nq) whose mimicking joints have the values of their targets."""
         q = q.copy()
         for mimic in self.mimics:
-            set_joint(self.model, q, mimic.joint, mimic.value(joint_values(self.model, q, mimic.target)))
+            index = self.model.getJointId(mimic.joint)
+            at = self.model.idx_qs[index]
+            value = mimic.multiplier * joint_values(self.model, q, mimic.target) + mimic.offset
+            if self.model.nqs[index] == 2:
+                q[:, at], q[:, at + 1] = np.cos(value), np.sin(value)
+            else:
+                q[:, at] = value
         return q
 
     def mimic_errors(self, q: Array) -> Array:
         """Return the deviations (N, M) of mimicking joints from their targets' values, rad or m; see `mimics`."""
-        out = np.zeros((len(q), len(self.mimics)))
+        out, followed = np.zeros((len(q), len(self.mimics))), self.with_mimics(q)
         for k, mimic in enumerate(self.mimics):
-            value, target = (joint_values(self.model, q, joint) for joint in mimic[:2])
-            out[:, k] = value - mimic.value(target)
+            out[:, k] = np.subtract(*(joint_values(self.model, one, mimic.joint) for one in (q, followed)))
             if self.units[self.model.idx_qs[self.model.getJointId(mimic.joint)]] != "m":
                 out[:, k] = (out[:, k] + np.pi) % (2 * np.pi) - np.pi
         return out
@@ -358,20 +358,14 @@ class Robot(Record):
         distance : array (N,)
             Largest distance of a known joint from its place, metres.
         """
-        from posekit.robots.inverse import solve
-
         return solve(self, joints, start=start)
 
     def scaled(self, joints: ArrayLike) -> Robot:
         """Return the robot with the segment lengths of a person: see `posekit.robots.scaling`."""
-        from posekit.robots.scaling import scaled
-
         return scaled(self, joints)
 
     @cached_property
     def _collision(self) -> SelfCollision:
-        from posekit.robots.collision import SelfCollision
-
         return SelfCollision(self.model, self.geometry)
 
     @cached_property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 from xml.etree import ElementTree
@@ -52,62 +51,51 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     given = np.asarray(joints, dtype=np.float64).reshape(-1, *np.shape(joints)[-2:])[:, : len(JOINTS)]
     model, tree, data = robot.model, copy.deepcopy(robot.tree), robot.model.createData()
     wanted = _wanted(robot.points(pin.neutral(model))[0], given, robot.source)
-    joints_of = {end.get("link", ""): one for one in tree.findall("joint") for end in one.findall("child")}
-    child_of = {joint.get("name", ""): link for link, joint in joints_of.items()}
     links = {link.get("name", ""): link for link in tree.findall("link")}
-    root = next(name for name in links if name not in joints_of)
+    joint_of = {end.get("link", ""): one for one in tree.findall("joint") for end in one.findall("child")}
+    above = {link: end.get("link", "") for link, one in joint_of.items() for end in one.findall("parent")}
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    frames = enumerate(model.frames)
-    place = {str(frame.name): data.oMf[k] for k, frame in frames if frame.type == pin.FrameType.BODY}
-    moved, grown = set[str](), set[str]()
+    place, carrier = dict[str, pin.SE3](), dict[int, str]()
+    for frame, M in zip(model.frames, data.oMf, strict=True):
+        if frame.type == pin.FrameType.BODY:
+            place[frame.name] = M
+            carrier.setdefault(frame.parentJoint, frame.name)
+    # New origins (m) at neutral of the root and of the links in scaled chains. Rotations at neutral stay.
+    origin = {link: place[link].translation for link in links.keys() - joint_of.keys()}
+    grown = set[str]()
     for name in ("pelvis", *JOINTS):
-        if name in robot.joint_map and np.isfinite(wanted[JOINT[name]]).all():
-            site = robot.joint_map[name]
-            link = child_of.get(str(model.names[site.joint]), root)
-            end = wanted[JOINT[name]] - place[link].rotation @ np.array(site.offset)
-            path = []
-            while link in joints_of and link not in moved:
-                path.append(link)
-                link = _parent(joints_of[link])
-            if path:
-                moved |= _stretch(joints_of, place, path, end, links, grown)
+        if name not in robot.joint_map or not np.isfinite(wanted[JOINT[name]]).all():
+            continue
+        site = robot.joint_map[name]
+        last = base = carrier[site.joint]
+        end, path = wanted[JOINT[name]] - place[last].rotation @ np.array(site.offset), list[str]()
+        while base not in origin:
+            path.append(base)
+            base = above[base]
+        stretch = _stretch(place[last].translation - place[base].translation, end - origin[base])
+        for link in path:
+            # Other links that start at the same place stay with the chain, as the second of two clavicles.
+            for other in (one for one in above if above[one] == above[link]):
+                offset = place[other].translation - place[last].translation
+                if np.allclose(place[other].translation, place[link].translation, atol=SAME):
+                    origin[other] = end + stretch @ offset
+            if above[link] in joint_of and above[link] not in grown:
+                grown.add(above[link])
+                _grow(links[above[link]], float(np.linalg.norm(stretch[0])))
+    for link in origin.keys() & joint_of.keys():
+        if joint_of[link].find("origin") is None:
+            ElementTree.SubElement(joint_of[link], "origin")
+        offset = place[above[link]].rotation.T @ (origin[link] - origin[above[link]])
+        _set(joint_of[link].findall("origin")[0], "xyz", offset)
     return replace(robot, urdf=ElementTree.tostring(tree, encoding="unicode"))
 
 
-def _stretch(
-    joints: Mapping[str, Element],
-    place: Mapping[str, pin.SE3],
-    path: Sequence[str],
-    end: Array,
-    links: Mapping[str, Element],
-    grown: set[str],
-) -> set[str]:
-    """Scale and turn the origins of a chain of links, the last one first, so that it ends at a place at neutral.
-
-    Links that carry the chain grow with it, once each. Returns the links whose origins were changed: those of the
-    chain, and those that start where one of them did, as the second of two clavicles.
-    """
-    base = _parent(joints[path[-1]])
-    old, new = place[path[0]].translation - place[base].translation, end - _origin(base, joints, place)
+def _stretch(old: Array, new: Array) -> Array:
+    """Return the matrix (3, 3) that turns and scales a vector into another; the identity if one of them is zero."""
     size, length = float(np.linalg.norm(old)), float(np.linalg.norm(new))
-    stretched = min(size, length) > SAME
-    ratio = length / size if stretched else 1.0
-    turn = rotation_between(old / size, new / length) if stretched else np.eye(3)
-    changed = set()
-    for link in path:
-        above, before = _parent(joints[link]), _xyz(joints[link])
-        R = place[above].rotation
-        after = R.T @ (ratio * turn @ R @ before if stretched or link != path[-1] else new)
-        for other, joint in joints.items():
-            if _parent(joint) == above and np.allclose(_xyz(joint), before, atol=SAME):
-                changed.add(other)
-                if joint.find("origin") is None:
-                    ElementTree.SubElement(joint, "origin")
-                _set(joint.findall("origin")[0], "xyz", after)
-        if above in joints and above not in grown:
-            grown.add(above)
-            _grow(links[above], ratio)
-    return changed
+    if min(size, length) <= SAME:
+        return np.eye(3)
+    return np.asarray(length / size * rotation_between(old / size, new / length))
 
 
 def _grow(link: Element, ratio: float) -> None:
@@ -117,22 +105,6 @@ def _grow(link: Element, ratio: float) -> None:
     for shape in link.findall("*/geometry/*"):
         for attribute in SIZES[shape.tag] or ("scale",):
             _set(shape, attribute, ratio * np.array(numbers(shape, attribute, "1 1 1")))
-
-
-def _origin(link: str, joints: Mapping[str, Element], place: Mapping[str, pin.SE3]) -> Array:
-    """Return the new origin of a link at neutral: rotations there do not change."""
-    if link not in joints:
-        return np.array(place[link].translation)
-    above = _parent(joints[link])
-    return np.array(_origin(above, joints, place) + place[above].rotation @ _xyz(joints[link]))
-
-
-def _parent(joint: Element) -> str:
-    return next(parent.get("link", "") for parent in joint.findall("parent"))
-
-
-def _xyz(joint: Element) -> Array:
-    return np.array(next((numbers(one, "xyz", "0 0 0") for one in joint.findall("origin")), [0.0] * 3))
 
 
 def _set(element: Element, attribute: str, values: Array) -> None:

@@ -49,13 +49,22 @@ SIZES: Final[dict[str, tuple[str, ...]]] = {
     **{"box": ("size",), "sphere": ("radius",), "mesh": ()},
     **dict.fromkeys(("cylinder", "capsule"), ("radius", "length")),
 }
-MOMENTS: Final = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_SINGLE: Final = ("lower", "upper", "effort", "velocity", "multiplier", "offset", "value", "radius", "length")
-#: Numbers that an attribute holds.
-_COUNTS: Final = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, **dict.fromkeys((*_SINGLE, *MOMENTS), 1)}
-#: Elements with numbers.
-_NUMERIC: Final = ("origin", "axis", "limit", "mimic", "mass", "inertia", *SIZES)
-_BOUNDED: Final = ("xyz", "rpy", "size", "radius", "length", "scale")
+#: Attributes with three numbers, and with one.
+_TRIPLES: Final = ("xyz", "rpy", "size", "scale")
+_SINGLES: Final = (
+    "lower",
+    "upper",
+    "effort",
+    "velocity",
+    "multiplier",
+    "offset",
+    "value",
+    "radius",
+    "length",
+)
+#: Elements with numbers, and those whose numbers are coordinates and sizes.
+_PLACED: Final = ("origin", "axis", *SIZES)
+_NUMERIC: Final = ("limit", "mimic", "mass", *_PLACED)
 #: Children of links and joints that a model is made of; others, as of simulators, are removed.
 _KEPT: Final = {
     "link": ("inertial", "collision", "visual", "collision_checking"),
@@ -137,7 +146,7 @@ def check_urdf(text: str, source: str) -> Element:
     _check_joints({joint.get("name", ""): joint for joint in joints}, check)
     materials = {material.get("name") for material in robot.findall("material")}
     for link in links:
-        _check_link(link, f"link {link.get('name')!r}", check)
+        _check_link(link, check)
         for visual in link.findall("visual"):
             for material in visual.findall("material"):
                 if not material.get("name") or not (len(material) or material.get("name") in materials):
@@ -166,10 +175,8 @@ def _check_tree(robot: Element, check: Need) -> None:
     """Refuse repeated and unprintable names, and links and joints that are not one tree."""
     for kind in _KEPT:
         for name, times in Counter(part.get("name", "") for part in robot.findall(kind)).items():
-            got = f"{kind} {shown(name)} {times} times"
-            check(times == 1, "", got, "each name once", "rename or remove the others")
-            good = name and name.isprintable() and (kind, name) != ("joint", "universe")
-            check(good, "", f"a {kind} named {shown(name)}", "a printable name", "rename it")
+            got, good = f"{kind} {shown(name)} {times} times", times == 1 and name and name.isprintable()
+            check(good, "", got, "printable names, each once", "rename or remove the others")
     known = {link.get("name", "") for link in robot.findall("link")}
     parents: dict[str, str] = {}
     for joint in robot.findall("joint"):
@@ -184,11 +191,11 @@ def _check_tree(robot: Element, check: Need) -> None:
     got = f"{len(roots)} links that hang on no joint ({', '.join(roots[:5]) or 'none, or a cycle'})"
     check(len(roots) == 1, "", got, "one root link", "join the parts to one tree")
     for link in parents:
-        steps, above = 1, link
-        while above in parents and steps <= MAX_CHAIN:
-            steps, above = steps + 1, parents[above]
+        chain = [link]
+        while chain[-1] in parents and len(chain) <= MAX_CHAIN:
+            chain.append(parents[chain[-1]])
         got = f"link {link!r} at the end of a cycle or of more than {MAX_CHAIN} links"
-        check(steps <= MAX_CHAIN, "", got, "a tree", "remove the cycle, or merge fixed links")
+        check(len(chain) <= MAX_CHAIN, "", got, "a tree", "remove the cycle, or merge fixed links")
 
 
 def _check_numbers(part: Element, place: str, check: Need) -> None:
@@ -196,27 +203,36 @@ def _check_numbers(part: Element, place: str, check: Need) -> None:
     for element in (one for child in part if child.tag != "visual" for one in child.iter()):
         check("quat_xyzw" not in element.attrib, place, "a rotation as quat_xyzw", "rpy", "write it as rpy")
         for attribute, text in element.items():
-            if attribute in _COUNTS and element.tag in _NUMERIC:
-                count, words = _COUNTS[attribute], text.split()
-                field = f"{place}: <{element.tag} {attribute}=…>"
+            if element.tag in _NUMERIC and attribute in (*_TRIPLES, *_SINGLES):
+                words, count = text.split(), 3 if attribute in _TRIPLES else 1
                 good = len(words) == count and all(map(_NUMBER.fullmatch, words))
-                expected = "a finite number" if count == 1 else f"{count} finite numbers"
-                remedy = "expand the xacro first" if "${" in text else "correct it"
-                check(good, field, shown(text), expected, remedy)
-                most = MAX_NUMBER if attribute in _BOUNDED else sys.float_info.max
-                small = all(abs(float(word)) <= most for word in words)
-                check(small, field, shown(text), f"at most {most:,.4g}", "write metres and radians")
+                most = MAX_NUMBER if element.tag in _PLACED else sys.float_info.max
+                good = good and all(abs(float(word)) <= most for word in words)
+                expected = f"{count} finite numbers" if count > 1 else "a finite number"
+                remedy = "expand the xacro first" if "${" in text else "write it in metres and radians"
+                check(good, f"{place}: <{element.tag} {attribute}=…>", shown(text), expected, remedy)
                 element.set(attribute, " ".join(words))
 
 
 def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
+    """Refuse types, limits, axes and mimics that a model would not have as they are meant."""
     large: dict[str, float] = {}
     for name, joint in joints.items():
-        place, kind = f"joint {name!r}", joint.get("type", "")
+        place, kind, limit = f"joint {name!r}", joint.get("type", ""), joint.find("limit")
         check(kind in FREEDOM, place, f"the type {shown(kind)}", f"one of {', '.join(FREEDOM)}", "correct it")
-        largest = _check_limit(joint, kind, place, check)
-        if kind == "revolute" and DEGREES[0] < largest < DEGREES[1]:
-            large[name] = largest
+        if limit is None:
+            remedy = 'add <limit lower="…" upper="…" effort="…" velocity="…"/>, or make it continuous'
+            check(kind not in ("revolute", "prismatic"), place, "no <limit>", "limits in rad or m", remedy)
+        else:
+            missing = [key for key in ("effort", "velocity") if key not in limit.attrib]
+            check(
+                not missing, f"{place}: <limit>", f"no {' and no '.join(missing)}", "both numbers", "add them"
+            )
+            lower, upper = (numbers(limit, end, "0")[0] for end in ("lower", "upper"))
+            got = f"lower limit {lower:g} above upper limit {upper:g}"
+            check(lower <= upper, place, got, "lower <= upper", "exchange them")
+            if kind == "revolute" and DEGREES[0] < max(-lower, upper) < DEGREES[1]:
+                large[name] = max(-lower, upper)
         for axis in joint.findall("axis"):
             length = math.hypot(*numbers(axis, "xyz", "1 0 0"))
             good = abs(length - 1) < 1e-3 if kind == "prismatic" else length > 1e-6 or kind in UNTURNED
@@ -235,42 +251,15 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
         check(False, f"joint {name!r}", got, "limits in radians", remedy)
 
 
-def _check_limit(joint: Element, kind: str, place: str, check: Need) -> float:
-    """Return the largest limit in size; 0 if there is none."""
-    limit = joint.find("limit")
-    if limit is None:
-        remedy = 'add <limit lower="…" upper="…" effort="…" velocity="…"/>, or make it continuous'
-        check(kind not in ("revolute", "prismatic"), place, "no <limit>", "limits in rad or m", remedy)
-        return 0.0
-    missing = [key for key in ("effort", "velocity") if key not in limit.attrib]
-    check(not missing, f"{place}: <limit>", f"no {' and no '.join(missing)}", "both numbers", "add them")
-    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
-    got = f"lower limit {lower:g} above upper limit {upper:g}"
-    check(lower <= upper, place, got, "lower <= upper", "exchange them")
-    return max(abs(lower), abs(upper))
-
-
-def _check_link(link: Element, place: str, check: Need) -> None:
-    for inertial in link.findall("inertial"):
-        held = {name: value for part in inertial for name, value in part.items()}
-        expected = f"<mass value=…> and <inertia> with {', '.join(MOMENTS)}"
-        check(held.keys() >= {"value", *MOMENTS}, place, "parts of <inertial>", expected, "complete it")
-        check(float(held["value"]) >= 0, place, f"a mass of {held['value']} kg", "at least 0", "correct it")
-    capsules = {capsule.get("name") for capsule in link.findall("collision_checking/capsule")}
+def _check_link(link: Element, check: Need) -> None:
+    """Refuse bodies of a link that are not one shape of positive size."""
     for body in link.findall("collision"):
-        where, found = f"{place}: <collision>", body.findall("geometry/*")
+        place, found = f"link {link.get('name')!r}: <collision>", body.findall("geometry/*")
         got = f"{', '.join(cut(one.tag) for one in found[:4]) or 'no shape'}"
         ok = len(found) == 1 == len(body.findall("geometry")) and found[0].tag in SIZES
-        check(ok, where, got, f"one of {', '.join(SIZES)}", "give each shape a body of its own")
+        check(ok, place, got, f"one of {', '.join(SIZES)}", "give each shape a body of its own")
         shape = found[0]
         for attribute in SIZES[shape.tag]:
             got = f"a {shape.tag} with {attribute} {shown(shape.get(attribute))}"
             least = min(numbers(shape, attribute), default=0)
-            check(least > 0, where, got, f"a positive {attribute}", "correct it")
-        if shape.tag == "mesh":
-            good = shape.get("filename") and 0.0 not in numbers(shape, "scale", "1 1 1")
-            check(good, where, "a mesh without file or of scale 0", '<mesh filename="…"/>', "correct it")
-        if shape.tag == "cylinder" and body.get("name") in capsules:
-            shape.tag = "capsule"  # <collision_checking> is the spelling of URDF 1.0; radius and length stay
-    for element in link.findall("collision_checking"):
-        link.remove(element)
+            check(least > 0, place, got, f"a positive {attribute}", "correct it")
