@@ -57,6 +57,19 @@ def test_hands_that_reach_the_ground_carry_a_body(height: float, found: bool) ->
     assert rows.frame.tolist() == (list(range(60, 81)) if found else [])
 
 
+@pytest.mark.parametrize("drifts", [False, True])
+def test_feet_of_a_body_on_its_knees_may_drag(drifts: bool) -> None:
+    joints = standing()
+    knees = [JOINT["right_knee"], JOINT["left_knee"]]
+    joints[..., 2] += 0.05 - joints[:, knees, 2].mean()
+    joints[:, FEET] = joints[:, knees] + [-0.4, 0.0, 0.0]
+    way = -0.2 * np.clip(np.arange(N) / RATE - 1.0, 0.0, 2.0)
+    joints[:, slice(None) if drifts else FEET, 0] += way[:, None]
+    rows = rows_of(judged(joints, checks=["sliding"]), "sliding")
+    assert bool(len(rows)) == drifts
+    assert not drifts or rows.value.max() == pytest.approx(0.2, abs=0.02)
+
+
 def leaning(way: float) -> np.ndarray:
     """Return a person who stands still with all joints but the ankles moved forward."""
     joints = np.repeat(standing(30)[:1], N, axis=0)

@@ -25,6 +25,9 @@ from posekit.validators.motion.timeline import median_of_five, timeline_of
 #: cm, and are faster.
 DOWN_METRES: Final = 0.04
 
+#: Height up to which any joint may carry the body, metres: hands and knees of crawling bodies do.
+LOW_METRES: Final = 0.1
+
 #: Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`.
 FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
 
@@ -51,6 +54,9 @@ LEAST_DRIFT, LONGEST_DRIFT = 0.05, 1.0
 #: Least duration of a drift, and the windows whose median velocity is a candidate for its velocity, seconds.
 DRIFT_SECONDS, CANDIDATE_SECONDS = 0.8, 0.4
 
+#: Least share of the slots of a drift in which a foot is down.
+KNOWN_SHARE: Final = 0.6
+
 #: Mean distance of velocities from a drift's, as a share of its speed, at most.
 DRIFT_FIT: Final = 0.55
 
@@ -76,11 +82,14 @@ def sliding(
         Metres a second that a foot on the ground goes up or down at most.
     """
     needs_rate(body, SLIDING_RATE)
-    line, up, (feet, height) = timeline_of(body), up_of(body), soles(body)
+    line, up, (feet, height), ground = timeline_of(body), up_of(body), soles(body), ground_of(body)
     hips = body.height[:, both("hip")].min(axis=1)[:, None]
     crawls = hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(body)
-    down = line.spread((~crawls & (height < _base(body) + DOWN_METRES)).astype(np.float64)) > 0
-    placed = line.spread(feet)
+    highest = (ground.low + ground.high + ground.lifted)[:, None]
+    bearing = line.spread(np.concatenate([feet, body.joints], axis=1))
+    over = line.spread(np.concatenate([height, body.height], axis=1) - highest)
+    placed = bearing[:, : feet.shape[1]]
+    down = line.spread(np.where(crawls, np.nan, height - highest)) < DOWN_METRES
     count = max(3, round(lasting * (SLOW_FACTOR if body.rate < VIDEO_RATE else 1.0) / body.dt))
     noise = 3 * np.sqrt(2) * body.noise / body.dt
     bounds = fastest, uneven, rising, noise
@@ -94,7 +103,7 @@ def sliding(
             way = (known @ along / norm(along)).mean(axis=1)
             first, last = _ends(np.diff(way) - speed * body.dt / 2, start, stop - 1, count)
             value[first + 1 : last + 1, side] = speed
-    drift = _drift(_stance_velocity(body), body.dt)
+    drift = _drift(_stance_way(bearing, over < LOW_METRES, up) / body.dt, body.dt)
     if drift is not None and drift[2] > fastest + noise:
         start, stop, speed = drift
         for first, last in runs(np.asarray(value.any(axis=1))):
@@ -137,23 +146,25 @@ def _slides(
     return slides
 
 
-def _stance_velocity(body: Body) -> Array:
-    """Return the velocity along the ground of the slowest point of both feet that is down (S, 3), metres a second.
+def _stance_way(points: Array, low: Flags, up: Array) -> Array:
+    """Return the way along the ground, since the slot before, of the slowest low point of the body (S, 3), metres.
 
-    One foot of a walker always stands, so that it is near zero in every frame; NaN in frames without a foot down.
+    Something that carries a body stands still, so that the way is near zero in every slot; NaN in slots without a low
+    point.
+
+    Parameters
+    ----------
+    points : array (S, P, 3)
+        Points that may carry the body.
+    low : bool array (S, P)
+        Whether each point is near the ground.
+    up : array (3,)
+        Unit vector against gravity.
     """
-    line, up, (feet, height) = timeline_of(body), up_of(body), soles(body)
-    down = line.spread(np.where(height < _base(body) + 2 * DOWN_METRES, 1.0, np.nan))
-    velocity = perpendicular(np.diff(line.spread(feet), axis=0, prepend=np.nan) / body.dt, up)
-    speed = np.nan_to_num(norm(velocity) * down, nan=np.inf)
-    slowest = np.take_along_axis(velocity, speed.argmin(axis=1)[:, None, None], axis=1)[:, 0]
-    return np.where(np.isfinite(speed.min(axis=1))[:, None], slowest, np.nan)
-
-
-def _base(body: Body) -> Array:
-    """Return the highest level of the ground in each frame (T, 1), metres along up."""
-    ground = ground_of(body)
-    return np.asarray((ground.low + ground.high + ground.lifted)[:, None])
+    ways = perpendicular(np.diff(points, axis=0, prepend=np.nan), up)
+    lengths = np.where(low, np.nan_to_num(norm(ways), nan=np.inf), np.inf)
+    slowest = np.take_along_axis(ways, lengths.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+    return np.where(np.isfinite(lengths.min(axis=1))[:, None], slowest, np.nan)
 
 
 def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
@@ -167,7 +178,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
     at_rest, best, most = norm(velocity), None, 0.0
     for first in range(0, len(velocity) - count, max(count // 2, 1)):
         seen = velocity[first : first + count][known[first : first + count]]
-        if len(seen) < 0.6 * count:
+        if len(seen) < KNOWN_SHARE * count:
             continue
         common = np.median(seen, axis=0)
         for _ in range(2):
@@ -179,7 +190,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
             stop = int(np.argmax(total - np.minimum.accumulate(total)))
             start = int(np.argmin(total[: stop + 1]))
             inside = velocity[start:stop][known[start:stop]]
-            if len(inside) < 3:
+            if len(inside) < max(3, KNOWN_SHARE * (stop - start)):
                 break
             common = np.median(inside, axis=0)
             speed = float(np.linalg.norm(common))
