@@ -161,10 +161,28 @@ def test_follow_answers_line_by_line(run: Any) -> None:
     assert json.loads(out.split("\n")[0])
 
 
-def test_inspect_convert_settings_and_samples(run: Any, tmp_path: Path) -> None:
-    code, out, _ = run("inspect", "jump.bvh")
-    assert code == 0
-    assert "90" in out
+@pytest.mark.parametrize(
+    ("file", "facts"),
+    [
+        ("jump.bvh", "kind motion, layout bvh_posekit, unit cm, frames 90, rate 30 a second, up +y"),
+        ("robot.npz", "kind motion, time 0 to 2.96667 s, up +z, robot g1"),
+        (
+            "keypoints",
+            "kind detections, layout body_25, pictures 12, people 12 in 12 pictures, size not known",
+        ),
+        ("walk.json", "kind view, frames 5, time 0 to 0.8 s, seen 100% of the joints, given truth"),
+        ("calibration.toml", "kind cameras"),
+    ],
+)
+def test_inspect_lists_what_was_understood(run: Any, file: str, facts: str) -> None:
+    code, out, _ = run("inspect", file)
+    rows = dict(line.split(maxsplit=1) for line in out.split("\n") if line)
+    assert code == 0 and rows["file"] == file
+    for name, fact in (one.split(maxsplit=1) for one in facts.split(", ")):
+        assert rows[name].startswith(fact), name
+
+
+def test_convert_settings_and_samples(run: Any, tmp_path: Path) -> None:
     assert run("convert", "jump.bvh", str(tmp_path / "jump.trc"))[0] == 0
     code, out, _ = run("settings", "recover")
     assert code == 0

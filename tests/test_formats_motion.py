@@ -17,7 +17,6 @@ import pytest
 
 import posekit
 from posekit.formats.bvh import with_values
-from posekit.formats.inspect import inspect
 from posekit.geometry import rotation_about
 from posekit.motion import Motion
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, POINTS
@@ -742,29 +741,6 @@ def test_a_gzip_file_that_unpacks_without_end_is_refused(tmp_path: Path, monkeyp
     (tmp_path / "big.csv.gz").write_bytes(gzip.compress(b"0" * 5_000_000))
     with pytest.raises(posekit.InputError, match="more than 1,000,000 bytes"):
         posekit.open(tmp_path / "big.csv.gz")
-
-
-def test_inspect_opens_the_file_once_and_loads_little(tmp_path: Path) -> None:
-    import subprocess
-
-    bvh_of(walking(), tmp_path)
-    code = (
-        "import sys; opened = []\n"
-        "sys.addaudithook(lambda event, args: event == 'open' and 'walk.bvh' in str(args[0]) and opened.append(1))\n"
-        "from posekit.formats.inspect import inspect; inspect(sys.argv[1])\n"
-        "print(len(opened), sum(name.startswith('posekit') for name in sys.modules))"
-    )
-    command = [sys.executable, "-c", code, str(tmp_path / "walk.bvh")]
-    told = subprocess.run(command, capture_output=True, text=True, check=True)
-    opens, modules = map(int, told.stdout.split())
-    assert opens == 1 and modules <= 60
-
-
-def test_inspect_lists_what_was_understood(tmp_path: Path) -> None:
-    bvh_of(walking(), tmp_path)
-    table = inspect(tmp_path / "walk.bvh")
-    for words in ("bvh_posekit", "30 a second", "+y", "cm", "left_ankle"):
-        assert words in table
 
 
 @pytest.mark.parametrize("ending", [".bvh", ".trc", ".csv", ".npz", ".c3d", ".parquet", ".pkl", ".npy"])

@@ -78,7 +78,7 @@ def parse(data: bytes, source: str) -> C3d:
         raise damaged("POINT:USED", "no points", "points in space")
     if not section < start <= len(data):
         raise damaged("header", f"frames from byte {start:,}", "frames after the parameters")
-    parameters = _parameters(data, section + 4, start, processor, damaged)
+    parameters = _parameters(data[section + 4 : start], processor, damaged)
     scale = next(iter(_numbers(parameters, "POINT:SCALE")), scale)
     if not math.isfinite(scale) or scale == 0:
         raise damaged("POINT:SCALE", f"{scale:g}", "a finite number that is not 0")
@@ -131,43 +131,40 @@ def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width:
     return count
 
 
-def _parameters(data: bytes, place: int, end: int, processor: int, damaged: Any) -> dict[str, Any]:
+def _parameters(section: bytes, processor: int, damaged: Any) -> dict[str, Any]:
     """Return parameters by group and name, ``POINT:FRAMES``: lists of text, or arrays of numbers."""
-    order = ">" if processor == 86 else "<"
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Any]] = []
+    place = 0
 
-    def inside(at: int, bound: int) -> None:
-        if at > bound:
-            raise damaged(f"parameters, byte {place}", f"an end at byte {at}", f"one by byte {bound}")
+    def taken(count: int) -> bytes:
+        nonlocal place
+        if place + count > len(section):
+            raise damaged(
+                "parameters", f"an end {len(section) - place} bytes after byte {place}", f"{count} bytes"
+            )
+        place += count
+        return section[place - count : place]
 
-    while place + 2 <= end and data[place] != 0:
+    while section[place : place + 2] and section[place] != 0:
         if len(groups) + len(found) > MAX_PARAMETERS:
             raise damaged("parameters", f"more than {MAX_PARAMETERS:,}", "fewer")
-        length, group = struct.unpack_from("bb", data, place)
-        after_name = place + 2 + abs(length)
-        inside(after_name + 2, end)
-        name = data[place + 2 : after_name].decode("latin-1").strip().upper()
-        (offset,) = struct.unpack_from(f"{order}H", data, after_name)
-        after = after_name + offset if offset else end
-        inside(after, end)
+        length, group = struct.unpack("bb", taken(2))
+        name = taken(abs(length)).decode("latin-1").strip().upper()
+        (offset,) = struct.unpack(">H" if processor == 86 else "<H", taken(2))
+        start = place
         if group < 0:
             groups[-group] = name
         else:
-            at = after_name + 2
-            inside(at + 2, after)
-            kind, ranks = struct.unpack_from("bB", data, at)
-            begin = at + 2 + ranks
+            kind, ranks = struct.unpack("bB", taken(2))
+            dimensions = tuple(taken(ranks))
             if kind not in _SIZES:
-                raise damaged(f"parameters, byte {place}", f"type {kind}", "one of -1, 1, 2, 4")
-            inside(begin, after)
-            dimensions = tuple(data[at + 2 : begin])
-            stop = begin + math.prod(dimensions) * _SIZES[kind]
-            inside(stop, after)
-            found.append((group, name, _value(kind, dimensions, data[begin:stop], processor)))
+                raise damaged(f"parameters, {shown(name)}", f"type {kind}", "one of -1, 1, 2, 4")
+            value = _value(kind, dimensions, taken(math.prod(dimensions) * _SIZES[kind]), processor)
+            found.append((group, name, value))
         if not offset:
             break
-        place = max(after, after_name + 2)
+        taken(max(start + offset - 2 - place, 0))
     for group, name, _ in found:
         if group not in groups:
             raise damaged("parameters", f"{shown(name)} in no group", "a group of each parameter")
