@@ -119,7 +119,7 @@ class Judgement(Record):
     @cached_property
     def margin(self) -> Array:
         """Distance inside the nearer bound, tolerance included (T, K): negative outside, NaN undecided."""
-        low, high = self.low, self.high
+        low, high = self.lower - self.tolerance, self.upper + self.tolerance
         with np.errstate(invalid="ignore"):  # an infinite value has no distance from an infinite bound
             nearer = np.fmin(self.value - low, high - self.value)
         return np.where(np.isnan(low) | np.isnan(high), np.nan, nearer)

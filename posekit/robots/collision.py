@@ -8,11 +8,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.geometry import Array, Flags, Ints, dot, segment_distance
+from posekit.geometry import Array, Flags, Ints, segment_distance
 from posekit.robots.kinematics import Kinematics, Site
 
-#: Configurations worked on at once: their squared distances stay in the processor's cache.
-BLOCK: Final = 512
+#: Number of pairs of bodies that are measured at once and stay in the processor's cache, and least number of
+#: configurations, which spreads NumPy's overhead.
+PAIRS_AT_ONCE, LEAST_AT_ONCE = 20_000, 128
 #: Metres that hulls and capsules are taken larger, above the tolerance of coal's GJK.
 ROOM: Final = 1e-6
 #: Metres within which the depth of a penetration is computed.
@@ -66,10 +67,8 @@ class SelfCollision:
                 hulls[key] = hulls[key] if key in hulls else _hull(body.geometry)
                 body.geometry = hulls[key]
         shapes, places = [body.geometry for body in bodies], [body.placement for body in bodies]
-        self._exact = np.array(
-            [isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_
-        )
-        self._half = self._exact * np.array([getattr(one, "halfLength", 0.0) for one in shapes])
+        rounded = np.array([isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_)
+        self._half = rounded * np.array([getattr(one, "halfLength", 0.0) for one in shapes])
         boxes = [_box(one) for one in shapes]
         self._axes = np.array([M.rotation for M in places]).reshape(-1, 3, 3)
         centres = [M.act(centre) for M, (centre, _, _) in zip(places, boxes, strict=True)]
@@ -77,10 +76,10 @@ class SelfCollision:
         self._kinematics = Kinematics(model, sites)
         self._size = np.array([half for _, half, _ in boxes]).reshape(-1, 3)
         radius = np.array([ball for _, _, ball in boxes])
-        self._pair = np.full((len(bodies), len(bodies)), -1)
-        for k, pair in enumerate(geometry.collisionPairs):
-            self._pair[pair.first, pair.second] = k
-        self._reach = radius[:, None] + radius
+        pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.intp)
+        self._first, self._second = pairs.reshape(-1, 2).T
+        self._reach = radius[self._first] + radius[self._second]
+        self._exact = rounded[self._first] & rounded[self._second]
         self._data, self._mesh_data = model.createData(), geometry.createData()
         self._hull_data = self._hulls.createData()
         for request in self._hull_data.collisionRequests:
@@ -99,9 +98,10 @@ class SelfCollision:
             Metres, at least 0; only touching pairs by default.
         """
         rows, pairs, distances = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
-        for start in range(0, len(q), BLOCK):
-            row, pair, distance = self._near(q[start : start + BLOCK], margin)
-            self._measure(q[start : start + BLOCK], row, pair, distance, margin)
+        step = max(PAIRS_AT_ONCE // max(len(self._reach), 1), LEAST_AT_ONCE)
+        for start in range(0, len(q), step):
+            row, pair, distance = self._near(q[start : start + step], margin)
+            self._measure(q[start : start + step], row, pair, distance, margin)
             kept = distance <= margin
             rows.append(row[kept] + start)
             pairs.append(pair[kept])
@@ -114,30 +114,27 @@ class SelfCollision:
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
         """Return the pairs that can be nearer than the margin: rows, pairs, and distances of capsules, else NaN."""
         frames, centre = self._kinematics.place(q)
-        axes = np.einsum("jbin,bjk->ikbn", frames, self._axes)
-        # Positions near the robot, so that their squares keep their digits.
-        points = np.ascontiguousarray((centre - centre[-1:]).transpose(2, 0, 1))
-        squared, one = dot(points, points)[..., None], np.ones((*points.shape[:2], 1))
-        left = np.concatenate([points, squared, one], axis=2)
-        right = np.concatenate([-2 * points, one, squared], axis=2)
-        apart = left @ right.transpose(0, 2, 1)  # squared distances: |a|^2 - 2 a b + |b|^2
-        reach = np.where(self._pair >= 0, (self._reach + margin + ROOM) ** 2, -np.inf)
-        row, a, b = np.unravel_index(np.flatnonzero(apart <= reach), apart.shape)
-        exact = self._exact[a] & self._exact[b]
+        axes = np.einsum("jbin,bjk->ikbn", frames, self._axes).reshape(3, 3, -1)
+        places, count = centre.transpose(1, 0, 2), len(q)
+        gap = places[:, self._second] - places[:, self._first]
+        reach = (self._reach + margin + ROOM) ** 2
+        row, pair = np.nonzero((np.einsum("ipn,ipn->pn", gap, gap) <= reach[:, None]).T)
+        gap = gap.reshape(3, -1).take(pair * count + row, axis=1)
+        a, b, exact = self._first[pair], self._second[pair], self._exact[pair]
         near, distance = np.ones(len(row), dtype=np.bool_), np.full(len(row), np.nan)
         i, j, n = a[exact], b[exact], row[exact]
-        half_a, half_b = ((axes[:, 2, k, n] * self._half[k]).T for k in (i, j))
-        between = segment_distance(points[n, j] - points[n, i], half_a, half_b)
+        half_a, half_b = (self._half[k] * axes[:, 2].take(k * count + n, axis=1) for k in (i, j))
+        between = segment_distance(gap[:, exact].T, half_a.T, half_b.T)
         distance[exact] = between - self._size[i, 0] - self._size[j, 0]
         near[exact] = distance[exact] <= margin
         i, j, n = a[~exact], b[~exact], row[~exact]
-        A, B, t = axes[:, :, i, n], axes[:, :, j, n], (points[n, j] - points[n, i]).T
+        (A, B), t = (axes.take(k * count + n, axis=2) for k in (i, j)), gap[:, ~exact]
         A_B = np.abs(A[0][:, None] * B[0] + A[1][:, None] * B[1] + A[2][:, None] * B[2])
         size_A, size_B = self._size.T[:, i], self._size.T[:, j]
         gap_A = np.abs(np.einsum("kin,kn->in", A, t)) - np.einsum("ijn,jn->in", A_B, size_B) - size_A
         gap_B = np.abs(np.einsum("kjn,kn->jn", B, t)) - np.einsum("ijn,in->jn", A_B, size_A) - size_B
         near[~exact] = np.maximum(gap_A, gap_B).max(axis=0) <= margin + ROOM
-        return row[near], self._pair[a, b][near], distance[near]
+        return row[near], pair[near], distance[near]
 
     def _measure(self, q: Array, row: Ints, pair: Ints, distance: Array, margin: float) -> None:
         """Fill in the distances that are NaN and within the margin, with coal."""
