@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -132,15 +132,23 @@ class LinkageFamily(Record):
 
     def placed(self, s: ArrayLike, depth: Array) -> Array:
         """Return the points (..., P, 3), units of length, at scales (...) and depths of the nodes (..., N)."""
-        place = self.place / np.asarray(s, dtype=np.float64)[..., None, None]
-        nodes = np.concatenate([np.broadcast_to(place, (*depth.shape, 2)), depth[..., None]], axis=-1)
-        return np.asarray(nodes[..., : len(self.linkage.points), :])
+        nodes = with_depth(self.place / np.asarray(s, dtype=np.float64)[..., None, None], depth)
+        return nodes[..., : len(self.linkage.points), :]
 
     def flips_of(self, points: ArrayLike) -> NDArray[np.int8]:
         """Return the flips (..., S) of postures given by their points (..., P, 3); 0 where both ends are level."""
         nodes = self.linkage.place_nodes(np.asarray(points, dtype=np.float64))
         ends = np.array(self.linkage.segments)
         return np.sign(nodes[..., ends[:, 1], 2] - nodes[..., ends[:, 0], 2]).astype(np.int8)
+
+    def flat_groups(self) -> Iterator[tuple[str, int, list[int]]]:
+        """Yield the kind, the dimension and the nodes of coplanar and collinear groups, as far as they are seen."""
+        groups = [("coplanar", 2, group) for group in self.linkage.coplanar]
+        groups += [("collinear", 1, group) for group in self.linkage.collinear]
+        for kind, rank, group in groups:
+            nodes = [node for node in group if self.incidence.placed[node]]
+            if len(nodes) >= rank + 2:
+                yield kind, rank, nodes
 
     @cached_property
     def incidence(self) -> Incidence:
@@ -224,9 +232,17 @@ class Incidence(Record):
             placed=part == largest,
         )
 
-    def spread(self, nodes: Sequence[int]) -> Array:
-        """Return the rows of B for some nodes of one piece, less their mean."""
-        rows = self.depth[list(nodes)]
-        centred = rows - rows.mean(axis=0)
-        centred[np.abs(centred) < ZERO_COEFFICIENT] = 0.0
-        return np.asarray(centred)
+
+def with_depth(place: Array, depth: Array) -> Array:
+    """Return points (..., N, 3) from their places (..., N, 2) and depths (..., N)."""
+    return np.concatenate([np.broadcast_to(place, (*depth.shape, 2)), depth[..., None]], axis=-1)
+
+
+def off_flat(points: Array, rank: int) -> Array:
+    """Return the distances (..., N, 3 - rank) of points (..., N, 3) from their best plane (rank 2) or line (rank 1).
+
+    The axes are those of the real parts: at the best plane the derivative is that with the plane held still.
+    """
+    centred = points - points.mean(axis=-2, keepdims=True)
+    _, axes = np.linalg.eigh(np.swapaxes(centred.real, -1, -2) @ centred.real)
+    return np.asarray(centred @ axes[..., : 3 - rank])

@@ -11,7 +11,7 @@ import numpy as np
 
 from posekit.errors import refusal
 from posekit.geometry import Array
-from posekit.recovery.objects.family import LinkageFamily
+from posekit.recovery.objects.family import LinkageFamily, off_flat, with_depth
 from posekit.recovery.objects.linkage import read_nearer
 
 
@@ -158,15 +158,11 @@ def _checks(
     for k in np.flatnonzero(hand & family.seen).tolist():
         slack = 1e-6 + float(between[k]) * (k not in family.incidence.basis)
         yield Check(f"nearer/{names[k]}", -hand[k] * across[[k]], np.ravel, slack)
-    groups = [("coplanar", group, 2) for group in linkage.coplanar]
-    groups += [("collinear", group, 1) for group in linkage.collinear]
-    for kind, group, rank in groups:
-        nodes = list(group)
-        if np.isfinite(place[nodes]).all():
-            shifts = np.abs(tree[nodes][:, None] - tree[nodes]) @ off
-            most_off = allowed.rigid + beside + float(np.sqrt((shifts**2).mean(axis=1)).min())
-            reason = f"{kind}/{'-'.join(linkage.nodes[k] for k in nodes)}"
-            yield Check(reason, tree[nodes] - tree[nodes[0]], partial(_bend, place[nodes], rank), most_off)
+    for kind, rank, nodes in family.flat_groups():
+        shifts = np.abs(tree[nodes][:, None] - tree[nodes]) @ off
+        most_off = allowed.rigid + beside + float(np.sqrt((shifts**2).mean(axis=1)).min())
+        reason = f"{kind}/{'-'.join(linkage.nodes[k] for k in nodes)}"
+        yield Check(reason, tree[nodes] - tree[nodes[0]], partial(_bend, place[nodes], rank), most_off)
     for pair in map(list, linkage.perpendicular):
         if family.seen[pair].all():
             most_off = allowed.rigid + float(between[pair].sum()) + 4 * beside
@@ -184,9 +180,8 @@ def _gap(extent: float, length: float, beside: float, off: float, depths: Array)
 
 def _bend(place: Array, rank: int, depths: Array) -> Array:
     """Return the root mean square distance of points from their best plane (rank 2) or line (rank 1)."""
-    points = np.concatenate([np.broadcast_to(place, (*depths.shape, 2)), depths[..., None]], axis=-1)
-    sizes = np.linalg.svd(points - points.mean(axis=1, keepdims=True), compute_uv=False)
-    return np.asarray(np.sqrt((sizes[:, rank:] ** 2).sum(axis=1) / len(place)))
+    off = off_flat(with_depth(place, depths), rank)
+    return np.asarray(np.sqrt((off**2).sum(axis=(1, 2)) / len(place)))
 
 
 def _skew(one: Array, two: Array, depths: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -14,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, nearest, refusal, shown
-from posekit.files import DATA
+from posekit.files import DATA, read_table
 from posekit.geometry import Array, Record, read_only
-
-LINKAGES: Final = DATA / "linkages"
 
 #: Largest number of segments of one object.
 MAX_SEGMENTS: Final = 2000
@@ -165,11 +162,11 @@ class Linkage(Record):
             If there is none of that name.
         """
         turned = [f"{self.nodes[b]}-{self.nodes[a]}" for a, b in self.segments]
-        for names in (self.segment_names, turned):
-            if name in names:
-                return names.index(name)
-        near = nearest(name, self.segment_names)
-        raise self._wrong("segment", shown(name), "one of its segments", near)
+        known = [*self.segment_names, *turned]
+        if name not in known:
+            near = nearest(name, self.segment_names)
+            raise self._wrong("segment", shown(name), "one of its segments", near)
+        return known.index(name) % len(turned)
 
     def place_nodes(self, points: Array) -> Array:
         """Add the midpoints to points or to their images: (..., P, D) to (..., N, D)."""
@@ -197,7 +194,7 @@ class Linkage(Record):
         segments : mapping
             Segment, as ``"a-b"`` or ``("a", "b")``, to its length.
         points : sequence of str, optional
-            Their order; by default as the segments name them, which then are pairs.
+            Their order; by default that in which the segments name them.
         midpoints : mapping, optional
             Name of a midpoint to the ends of its segment.
         coplanar, perpendicular, collinear
@@ -218,8 +215,8 @@ class Linkage(Record):
         """
         middles = dict(midpoints or {})
         if points is None:
-            named = dict.fromkeys(end for key in segments for end in key)
-            points = [point for point in named if point not in middles]
+            ends = (end for key in segments for end in (key.split("-") if isinstance(key, str) else key))
+            points = [end for end in dict.fromkeys(ends) if end not in middles]
         nodes = [*points, *middles]
 
         def find(node: str) -> int:
@@ -229,15 +226,12 @@ class Linkage(Record):
             return nodes.index(node)
 
         def split(key: str | tuple[str, str]) -> tuple[int, int]:
-            if isinstance(key, tuple):
-                return find(key[0]), find(key[1])
-            parts = key.split("-")
-            ways = [("-".join(parts[:k]), "-".join(parts[k:])) for k in range(1, len(parts))]
-            known = [way for way in ways if way[0] in nodes and way[1] in nodes]
-            if len(known) != 1:
-                expected = "two of its points, as a-b"
-                raise refusal(f"linkage {name}", "segments", shown(key), expected, "correct a name")
-            return find(known[0][0]), find(known[0][1])
+            if isinstance(key, str):
+                parts = key.split("-")
+                ways = [("-".join(parts[:k]), "-".join(parts[k:])) for k in range(1, len(parts))]
+                known = [way for way in ways if set(way) <= set(nodes)]
+                key = known[0] if len(known) == 1 else (key, key)
+            return find(key[0]), find(key[1])
 
         pairs = [split(key) for key in segments]
         made = Linkage(
@@ -255,7 +249,7 @@ class Linkage(Record):
 
 def linkage_names() -> tuple[str, ...]:
     """Return the names of the built-in linkages."""
-    return tuple(sorted(path.stem for path in LINKAGES.glob("*.toml")))
+    return tuple(sorted(path.stem for path in (DATA / "linkages").glob("*.toml")))
 
 
 def load_linkage(name: str | Path) -> Linkage:
@@ -278,18 +272,17 @@ def load_linkage(name: str | Path) -> Linkage:
     >>> len(human.points), len(human.segments)
     (12, 11)
     """
-    path = LINKAGES / f"{name}.toml" if str(name) in linkage_names() else Path(name)
-    if path.suffix.lower() != ".toml":
+    if str(name) not in linkage_names() and Path(name).suffix.lower() != ".toml":
         from posekit.robots import load_robot
 
         return linkage_of_robot(load_robot(str(name), bodies="none"))
+    table = read_table(str(name), "linkages", linkage_names(), "posekit.linkage/1", "linkage")
+    table |= table.pop("constraints", {})
+    table.pop("schema")
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        table |= table.pop("constraints", {})
-        table.pop("schema", "")
-        return Linkage.from_names(**{"name": path.stem} | table)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise refusal(name, "", shown(str(error)), "a TOML file of posekit.linkage/1", "correct it") from None
+        return Linkage.from_names(**{"name": Path(name).stem} | table)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise refusal(name, "", shown(str(error)), "the fields of posekit.linkage/1", "correct it") from None
 
 
 #: Minimum distance from all joints; nearer than this, the base or the end of a limb is not a separate point.

@@ -4,14 +4,15 @@ The scale is an angle, :math:`s = s_{min} / \cos\psi`, in which foreshortenings 
 starts at the bound with a vertical tangent; as a function of :math:`\psi` the segment that sets the bound has
 :math:`dZ = l \sin\psi`. Residuals are dimensionless: lengths are in units of the mean segment. A minimum is a root of
 the exact derivative, which is known to full precision where the residual, a sum of squares near zero, is known to half.
+The derivative is the imaginary part of the residual after an imaginary step of the angle (Squire & Trapp 1998).
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import nearest, refusal
 from posekit.geometry import Array, Record
-from posekit.recovery.objects.family import AT_BOUND, LinkageFamily
+from posekit.recovery.objects.family import AT_BOUND, ZERO_COEFFICIENT, LinkageFamily, off_flat, with_depth
 from posekit.recovery.objects.linkage import read_nearer
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
@@ -48,9 +49,12 @@ ZERO_SLOPE, ZERO_RESIDUAL, SAME_ANGLE = 1e-12, 1e-24, 1e-9
 #: Residuals that are evaluated at once.
 CHUNK: Final = 1 << 20
 
-#: Signed foreshortenings (..., S) and their derivative, shrinking of the image at the bound and its derivative, to a
-#: residual (...) and its derivative.
-Residual = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+#: Imaginary step of the angle: its square vanishes beside any real part.
+STEP: Final = 1e-30
+
+#: Signed foreshortenings (..., S) and the size of the image relative to that at the bound (...), complex, to a residual
+#: (...).
+Residual = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -142,27 +146,23 @@ class Constraints:
         self.terms = [(weight, term) for weight, segments, term in every if segments[0] in self.matter]
 
     def _terms(self, kind: str, unit: float) -> list[tuple[NDArray[np.intp], Residual]]:
-        """Make the residuals of one kind, each with the segments that it depends on."""
-        family, linkage = self.family, self.family.linkage
+        """Return the residuals of one kind, each with the segments that it depends on."""
+        family, linkage, incidence = self.family, self.family.linkage, self.family.incidence
         place = family.place / self.minimum
+        found: list[tuple[NDArray[np.intp], Residual]] = []
         if kind == "closure":
-            return [(np.flatnonzero(row), _closure(row)) for row in family.incidence.loops]
-        if kind == "perpendicular":
-            return [
-                (np.array(pair), _perpendicular(pair, linkage.segments, place, linkage.lengths / unit))
-                for pair in linkage.perpendicular
-                if family.seen[list(pair)].all()
-            ]
-        found = []
-        groups, rank = (linkage.coplanar, 2) if kind == "coplanar" else (linkage.collinear, 1)
-        for group in groups:
-            seen = [node for node in group if np.isfinite(family.place[node]).all()]
-            part = Counter(family.incidence.part[node] for node in seen).most_common(1)
-            nodes = [node for node in seen if family.incidence.part[node] == part[0][0]]
-            if len(nodes) >= rank + 2:
-                spread = family.incidence.spread(nodes)
-                centred = place[nodes] - place[nodes].mean(axis=0)
-                found.append((np.flatnonzero(np.abs(spread).max(axis=0)), _flatness(spread, centred, rank)))
+            found = [(np.flatnonzero(row), partial(_closure, row)) for row in incidence.loops]
+        elif kind == "perpendicular":
+            for pair in map(list, linkage.perpendicular):
+                if family.seen[pair].all():
+                    one, two = (place[b] - place[a] for a, b in np.array(linkage.segments)[pair])
+                    size = float((linkage.lengths[pair] / unit).prod())
+                    found.append((np.array(pair), partial(_perpendicular, pair, one @ two, size)))
+        for group_kind, rank, nodes in family.flat_groups():
+            if group_kind == kind:
+                depth = incidence.depth[nodes] - incidence.depth[nodes].mean(axis=0)
+                segments = np.flatnonzero(np.abs(depth).max(axis=0) > ZERO_COEFFICIENT)
+                found.append((segments, partial(_flatness, rank, place[nodes], depth)))
         return found
 
     def _add(self, block: list[int]) -> bool:
@@ -189,19 +189,12 @@ class Constraints:
 
     def evaluate(self, signs: Array, psi: Array) -> tuple[Array, Array]:
         """Return residual and derivative of flips (..., S) at angles that broadcast to (...)."""
-        sine, cosine = np.sin(psi)[..., None], np.cos(psi)[..., None]
-        reach = self.at_scale * sine
-        dZ = np.sqrt(self.rest + reach * reach)
-        # For the segment that sets the bound the ratio is one, at the bound too.
-        slope = np.divide(reach, dZ, out=np.ones_like(dZ), where=dZ > 0) * self.at_scale * cosine
-        parts = [
-            (weight, term(signs * dZ, signs * slope, np.cos(psi), -np.sin(psi)))
-            for weight, term in self.terms
-        ]
-        return (
-            np.asarray(sum(weight * value for weight, (value, _) in parts)),
-            np.asarray(sum(weight * change for weight, (_, change) in parts)),
-        )
+        turned = psi + 1j * STEP
+        reach = self.at_scale * np.sin(turned)[..., None]
+        dZ = np.where(self.bounding, reach, np.sqrt(self.rest + reach**2))
+        parts = [weight * term(signs * dZ, np.cos(turned)) for weight, term in self.terms]
+        residual = np.sum(parts, axis=0)
+        return residual.real, residual.imag / STEP
 
 
 def search(
@@ -282,11 +275,10 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
         envelope = np.minimum(envelope, value.min(axis=0))
         flat = (value * (np.sin(GRID) * np.cos(GRID)) ** 2).max(axis=1) <= FLAT_RESIDUAL
         row, cell = np.nonzero((slope[:, :-1] < 0) & (slope[:, 1:] >= 0) & ~flat[:, None])
-        level = np.abs(slope[:, 0]) <= ZERO_SLOPE
-        later = (slope[:, 1] > 0) & (value[:, 1] > value[:, 0])
         rows.append(row + start)
         cells.append(cell)
-        starts.append(((slope[:, 0] > ZERO_SLOPE) | (level & later)) & ~flat)
+        level = np.abs(slope[:, 0]) <= ZERO_SLOPE
+        starts.append((np.where(level, slope[:, 1], slope[:, 0]) > 0) & ~flat)
     row, cell = np.concatenate(rows), np.concatenate(cells)
 
     def slope_at(psi: Array, k: Array) -> Array:
@@ -317,52 +309,17 @@ def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
     return [matter[label[matter] == block].tolist() for block in dict.fromkeys(label[matter].tolist())]
 
 
-def _closure(loop: Array) -> Residual:
-    """Squared distance between the two ends of a loop that was cut open."""
-
-    def evaluate(signed: Array, slope: Array, shrink: Array, shrink_slope: Array) -> tuple[Array, Array]:
-        gap = signed @ loop
-        return gap * gap, 2 * gap * (slope @ loop)
-
-    return evaluate
+def _closure(loop: Array, signed: Array, shrink: Array) -> Array:
+    """Return the squared distance between the two ends of a loop that was cut open."""
+    return np.asarray((signed @ loop) ** 2)
 
 
-def _flatness(spread: Array, place: Array, rank: int) -> Residual:
-    """Sum of squared distances of points from their best plane (rank 2) or line (rank 1).
-
-    It is the smallest eigenvalue of their scatter matrix, or the sum of the two smallest. At a minimum over the plane
-    the derivative is that with the plane held still.
-    """
-
-    def points(signed: Array, shrink: Array) -> Array:
-        depth = signed @ spread.T
-        flat = shrink[..., None, None] * place
-        return np.concatenate([np.broadcast_to(flat, (*depth.shape, 2)), depth[..., None]], axis=-1)
-
-    def evaluate(signed: Array, slope: Array, shrink: Array, shrink_slope: Array) -> tuple[Array, Array]:
-        at, change = points(signed, shrink), points(slope, shrink_slope)
-        _, axes = np.linalg.eigh(np.swapaxes(at, -1, -2) @ at)
-        normals = axes[..., : 3 - rank]
-        off = at @ normals
-        return (off * off).sum(axis=(-1, -2)), 2 * (off * (change @ normals)).sum(axis=(-1, -2))
-
-    return evaluate
+def _flatness(rank: int, place: Array, depth: Array, signed: Array, shrink: Array) -> Array:
+    """Return the sum of squared distances of points from their best plane (rank 2) or line (rank 1)."""
+    points = with_depth(shrink[..., None, None] * place, signed @ depth.T)
+    return np.asarray((off_flat(points, rank) ** 2).sum(axis=(-1, -2)))
 
 
-def _perpendicular(
-    pair: tuple[int, int], segments: Sequence[tuple[int, int]], place: Array, lengths: Array
-) -> Residual:
-    """Squared cosine of the angle between two segments."""
-    (a, b), (c, d) = (segments[number] for number in pair)
-    product = float((place[b] - place[a]) @ (place[d] - place[c]))
-    size = float(lengths[list(pair)].prod())
-
-    def evaluate(signed: Array, slope: Array, shrink: Array, shrink_slope: Array) -> tuple[Array, Array]:
-        first, second = signed[..., pair[0]], signed[..., pair[1]]
-        cosine = (shrink**2 * product + first * second) / size
-        change = (
-            2 * shrink * shrink_slope * product + slope[..., pair[0]] * second + first * slope[..., pair[1]]
-        )
-        return cosine * cosine, 2 * cosine * change / size
-
-    return evaluate
+def _perpendicular(pair: list[int], product: float, size: float, signed: Array, shrink: Array) -> Array:
+    """Return the squared cosine of the angle between two segments."""
+    return np.asarray(((shrink**2 * product + signed[..., pair].prod(axis=-1)) / size) ** 2)
