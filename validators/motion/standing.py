@@ -98,9 +98,7 @@ def floating(
         if lasts >= shortest and not falls(ground.centre[start:stop], body.dt, fall):
             hovers = ground.lowest[start:stop] - ground.high
             over[start:stop] = np.maximum(over[start:stop], hovers + ground.lifted[start:stop])
-    tiptoe = 0.0
-    if stated is not None and not np.isfinite(body.feet[:, :2]).any():
-        tiptoe = HEEL_METRES
+    tiptoe = HEEL_METRES if stated is not None and not np.isfinite(body.feet[:, :2]).any() else 0.0
     return Judgement(("lowest",), over, upper=height, tolerance=2 * body.noise + tiptoe)
 
 

@@ -19,7 +19,7 @@ from posekit.validators.motion.timeline import centred, filtered, spaced
 TREMBLING_FRAMES: Final = 15
 
 #: Part of the second difference over three frames that fast motion leaves in the sixth difference.
-CURVED_SHARE: Final = 0.3
+CURVED_SHARE: Final = 0.4
 
 #: Standard deviations of noise that are subtracted from the trembling of a length: one number varies more than three.
 LENGTHS_NOISE: Final = 2.0
