@@ -310,6 +310,25 @@ def test_lenses_are_undone_up_to_the_fold(name):
     np.testing.assert_allclose(back, straight, atol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("fisheye", [False, True])
+def test_the_fold_is_where_the_image_first_stops_growing(fisheye, seed):
+    rng = np.random.default_rng(seed)
+    d = rng.uniform(-0.3, 0.3, 4) if fisheye else np.zeros(8)
+    if not fisheye:
+        d[[0, 1, 4, 5, 6, 7]] = rng.uniform(-0.4, 0.4, 6)
+    # The argument is r, or the angle of a fisheye lens.
+    argument = np.linspace(1e-4, 1.5 if fisheye else 4.0, 40_000)
+    radius = np.tan(argument) if fisheye else argument
+    place = distort(np.stack([radius, 0 * radius], axis=-1), d, fisheye=fisheye)[:, 0]
+    falls = np.flatnonzero((np.diff(place) <= 0) | (place[1:] < 0))
+    fold = fold_radius(d, fisheye=fisheye)
+    if falls.size:
+        assert fold == pytest.approx(argument[falls[0]], abs=2e-3)
+    else:
+        assert fold > argument[-1] - 2e-3
+
+
 @pytest.mark.parametrize("aside", [0.0, 3.0, 200.0, 1e4])
 @pytest.mark.parametrize("camera", [CAMERAS["orthographic"], ScaledOrthographicCamera(scale=3.7)])
 def test_a_segment_along_the_image_has_one_end_wherever_it_lies(camera, aside):

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 import posekit
+from posekit.body import segment_lengths, with_head
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.motion import Motion
 from posekit.skeleton import DOFS, JOINT, TREE_SEGMENTS
@@ -302,8 +303,20 @@ def test_the_eye_sees_all_of_the_bodies_and_little_else(
     seen = at[:, :2] / at[:, 3:]
     assert np.abs(seen).max() < 1
     assert max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1])) > 1.5
+    assert np.abs(seen.min(axis=0) + seen.max(axis=0)).max() < 0.25  # in the middle of the picture
     tilt = np.degrees(np.arcsin(worlds[0][2, 2]))
     assert tilt == pytest.approx(8.0 if elevation is None else elevation)
+
+
+def test_the_eye_sees_the_camera_of_the_bodies_too(motion: posekit.Motion) -> None:
+    subjects, _, _ = subjects_of(motion)
+    lines = np.array([[[0.0, 0.0, 0.0], [0.5, -1.0, 3.5]], [[1.0, 0.5, 1.0], [3.0, 0.0, 1.0]]])
+    worlds, clip = Stage(subjects, (lines, np.zeros((2, 3)))).eyes((640, 480), None)
+    points = np.concatenate([*(one.points[0] for one in subjects), lines.reshape(-1, 3)])
+    at = np.column_stack([points, np.ones(len(points))]) @ (clip @ np.linalg.inv(worlds[0])).T
+    seen = at[:, :2] / at[:, 3:]
+    assert np.abs(seen).max() < 1 and max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1])) > 1.3
+    assert np.abs(seen.min(axis=0) + seen.max(axis=0)).max() < 0.3
 
 
 @pytest.mark.parametrize("frames", [1, 3, 12])
@@ -314,6 +327,8 @@ def test_bodies_stand_side_by_side_in_order(motion: posekit.Motion, frames: int)
     gaps = [after[0] - before[1] for before, after in pairwise(spans)]
     assert all(0.19 < gap < 0.4 for gap in gaps)
     assert spans[0][0] + spans[-1][1] == pytest.approx(0.0, abs=0.05)
+    for one in subjects:
+        assert one.points[0, :, 1].min() + one.points[0, :, 1].max() == pytest.approx(0.0, abs=1e-9)
     assert [one.label for one in subjects] == ([f"frame {k}, {k / 30:.2f} s" for k in range(frames)])
 
 
@@ -350,3 +365,32 @@ def test_robots_are_drawn_by_what_is_seen_of_them(folder: Path) -> None:
         posekit.render(arm, folder / f"{name}.png", size=(200, 240))
         dark[name] = int((np.asarray(Image.open(folder / f"{name}.png"))[:196].min(axis=2) < 150).sum())
     assert dark["none"] > 3 * dark["both"]
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_an_overlay_paints_the_rays_that_meet_a_capsule(folder: Path, parallel: bool) -> None:
+    joints = random_views(1, np.random.default_rng(8)).truth
+    joints = joints - joints.mean(axis=1, keepdims=True) + [0.0, 0.0, 1.0]
+    camera: Any = PinholeCamera(K=np.array([[240, 0, 160], [0, 240, 120], [0, 0, 1.0]]), size=(320, 240))
+    if parallel:
+        camera, joints = ScaledOrthographicCamera(scale=200.0), joints + np.array([0.8, 0.6, 0.0])
+    seen = posekit.View(camera=camera, image=camera.project(joints), truth=joints, time=np.zeros(1))
+    Image.new("RGB", (320, 240), (80, 90, 90)).save(folder / "grey.png")
+    posekit.render(seen, folder / "painted.png", view=seen, over=folder / "grey.png")
+    painted = (
+        np.abs(np.asarray(Image.open(folder / "painted.png")).astype(int) - [80, 90, 90]).max(axis=2) > 8
+    )
+
+    pixels = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(1, -1, 2)
+    origin, direction = (one[0] for one in camera.rays(pixels))
+    met = np.zeros(pixels.shape[1], dtype=bool)
+    for capsule in FIGURE.scaled(segment_lengths(joints)).capsules:
+        middle, axis = capsule.place(with_head(joints))
+        if np.isfinite(middle).all():
+            for along in np.linspace(-capsule.half_length, capsule.half_length, 9):
+                centre = middle[0] + along * axis[0] - origin
+                across = centre - (centre * direction).sum(axis=1, keepdims=True) * direction
+                met |= np.linalg.norm(across, axis=1) < capsule.radius
+    met = met.reshape(240, 320)
+    share = (met & painted).sum() / (met | painted).sum()
+    assert met.mean() > 0.1 and share > 0.9 and (met & painted).sum() > 0.98 * met.sum()
