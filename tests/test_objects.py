@@ -205,7 +205,7 @@ def test_flips_by_hand_leave_one_posture():
     points = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)])
     family = LinkageFamily(linkage=linkage, image=points[:, :2] * 20.0)
     hand = name_nearer(linkage, family.flips_of(points))
-    np.testing.assert_array_equal(read_nearer(linkage, hand), family.flips_of(points))
+    np.testing.assert_array_equal(read_nearer(linkage, hand, 1)[0], family.flips_of(points))
     found = recover_object(linkage, [points[:, :2] * 20.0], scale=20.0, nearer=hand)
     assert len(found.points) == 1
     np.testing.assert_allclose(found.points[0], points, atol=1e-9)

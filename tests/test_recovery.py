@@ -11,13 +11,17 @@ from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import pa_mpjpe
 from posekit.recovery import Answer, Frames, Recovery, Survivors
 from posekit.recovery.answer import answers_of, joint_radius, lay, representatives
-from posekit.recovery.conductor import recover
 from posekit.recovery.scales import likely_scale
 from posekit.samples import samples
 from posekit.settings import EXACT
 from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, TREE_SEGMENTS
 from posekit.synthesis import random_views
 from posekit.validators import judge_postures
+
+
+def recover(view, **changes):
+    return posekit.recover(view, posekit.RecoverSettings(**changes))
+
 
 FIGURE = load_figure()
 LENGTHS = np.array([FIGURE.lengths[name] for name in SEGMENT_NAMES])

@@ -11,7 +11,7 @@ from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.papers.lee_chen_walks import allowed, closest, count_walks, grown, representatives, sequence
 from posekit.papers.taylor_objects import constrained_objects, scale_of
-from posekit.recovery.objects import LinkageFamily, name_nearer, search
+from posekit.recovery.objects import LinkageFamily, search
 from posekit.skeleton import TREE_SEGMENTS
 from posekit.synthesis.views import SEQUENCES
 
@@ -49,8 +49,7 @@ def draw_taylor(folder: Path) -> list[Path]:
     for one in constrained_objects():
         s = scale_of(one.points)
         family = LinkageFamily(linkage=one.linkage, image=one.points[:, :2] * s)
-        hands = name_nearer(one.linkage, family.flips_of(one.points))
-        found = search(family, {one.constraint: 1.0}, nearer=hands)
+        found = search(family, {one.constraint: 1.0}, family.flips_of(one.points))
         figure, title = _figure(6, 4), f"{one.figure}b: {one.constraint}"
         axis = figure.subplots()
         axis.semilogy(found.curve_s / s, np.maximum(found.curve(0), 1e-16))

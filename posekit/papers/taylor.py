@@ -117,8 +117,7 @@ def placed(family: LinkageFamily, s: float, signs: NDArray[Any]) -> Array:
     lengths = family.linkage.lengths
     depth = np.sqrt(np.maximum(lengths**2 - (family.extent / s) ** 2, 0.0))
     nodes = (signs * depth) @ family.incidence.depth.T
-    place = np.broadcast_to(family.place / s, (*nodes.shape, 2))
-    return np.concatenate([place, nodes[..., None]], axis=-1)[..., : len(family.linkage.points), :]
+    return family.placed(s, nodes)
 
 
 def _with_lengths(shape: Linkage, lengths: Array) -> Linkage:

@@ -17,7 +17,7 @@ import numpy as np
 
 from posekit.geometry import Array, cross, rotation_from_quaternion
 from posekit.papers.rows import Row, printed, row
-from posekit.recovery.objects import Linkage, LinkageFamily, load_linkage, name_nearer, search
+from posekit.recovery.objects import Linkage, LinkageFamily, load_linkage, search
 
 #: Size of an object in its picture, pixels.
 SIZE_PIXELS: Final = 600.0
@@ -93,7 +93,7 @@ class Constrained:
         """Return the posture of least residual, flips given by hand; None if no scale has a minimum."""
         flips = LinkageFamily(linkage=self.linkage, image=truth[:, :2] * s).flips_of(truth)
         family = LinkageFamily(linkage=self.linkage, image=image)
-        found = search(family, {self.constraint: 1.0}, nearer=name_nearer(self.linkage, flips))
+        found = search(family, {self.constraint: 1.0}, flips)
         if not len(found):
             return None
         return family.points(found.s[0], flips * ~family.vanished(found.s[0]))
@@ -134,8 +134,7 @@ def _picture_rows(one: Constrained) -> Iterator[Row]:
     """Find all scales that satisfy the constraint, and recover pictures with noise."""
     s, rng = scale_of(one.points), np.random.default_rng(SEED)
     exact = LinkageFamily(linkage=one.linkage, image=one.points[:, :2] * s)
-    nearer = name_nearer(one.linkage, exact.flips_of(one.points))
-    found = search(exact, {one.constraint: 1.0}, nearer=nearer)
+    found = search(exact, {one.constraint: 1.0}, exact.flips_of(one.points))
     zeros = found.s[found.residual < 1e-20] / s
     here = f"zero at {', '.join(f'{zero:.9g}' for zero in zeros) or 'no'} times the true s"
     yield row("zero", here, len(zeros) == 1 and bool(abs(zeros[0] - 1) < 1e-9), figure=one.figure)

@@ -10,7 +10,6 @@ from typing import Any, Final
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
 import posekit
 from posekit.body import Figure, LengthUncertainty, with_head
@@ -21,12 +20,13 @@ from posekit.progress import watched
 from posekit.ranking import Up, deviation_of_tolerance, log_terms
 from posekit.recovery.certify import certified, noisy_judge, solver_limits
 from posekit.recovery.gather import Gathering
-from posekit.recovery.person import person_of, uncertainty_of
+from posekit.recovery.objects import read_nearer
+from posekit.recovery.person import figure_of_view, uncertainty_of
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.scales import figure_linkage, from_near, from_usual_distance
 from posekit.recovery.sight import SHARP_PIXELS, Sight, sight_of
 from posekit.settings import EXACT, MEASURED, PHOTOGRAPH, RecoverSettings
-from posekit.skeleton import HEAD_POINTS, RIGID_SEGMENTS, SEGMENTS
+from posekit.skeleton import HEAD_POINTS, RIGID_SEGMENTS
 from posekit.solver import Modes, Problem, solve
 from posekit.tree import grow
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
@@ -52,9 +52,7 @@ LOOSE_TIMES, LOOSE_LENGTHS, LOOSE_CHI2 = 20.0, 0.1, 1e3
 NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
 
 
-def recover(
-    view: View, settings: RecoverSettings | None = None, *, figure: Figure | None = None, **changes: Any
-) -> Recovery:
+def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figure | None = None) -> Recovery:
     """Recover every posture behind a view that passes the checks.
 
     The result of a frame depends on that frame alone.
@@ -65,8 +63,6 @@ def recover(
     settings : RecoverSettings, optional
     figure : Figure, optional
         The built-in one by default; the view's own lengths, stature and head points are applied to it.
-    **changes
-        Fields of `RecoverSettings` that differ from `settings`.
 
     Raises
     ------
@@ -77,11 +73,11 @@ def recover(
     --------
     >>> import posekit
     >>> from posekit.recovery.conductor import recover
-    >>> len(recover(posekit.builtin_view("seq1"), contact_margin=0.01))
+    >>> len(recover(posekit.builtin_view("seq1"), posekit.RecoverSettings(contact_margin=0.01)))
     5
     """
-    settings = (settings or RecoverSettings()).changed(**changes)
-    person = person_of(view, settings, figure)
+    settings = settings or RecoverSettings()
+    person = figure_of_view(view, settings, figure)
     lengths = uncertainty_of(view, settings, own_figure=figure is not None)
     conductor = _Conductor(view, settings, person, lengths)
     for stage, at_once in conductor.stages():
@@ -115,7 +111,8 @@ class _Conductor:
         chosen = chosen_checks(settings, of_robot=False, in_time=False)
         self.checks = [check for check in chosen if not getattr(check, "over_time", False)]
         self.exact = PostureJudge(person, settings, self.tolerance, self.up.direction)
-        self.found = Gathering(view, self.sight, person, settings, _by_hand(view, settings, person))
+        nearer = read_nearer(figure_linkage(person), settings.nearer, len(view))
+        self.found = Gathering(view, self.sight, person, settings, nearer)
 
     @cached_property
     def noisy(self) -> PostureJudge:
@@ -299,21 +296,6 @@ class _Conductor:
             "versions": {name: module.__version__ for name, module in VERSIONED.items()},
         }
         return {"settings": settings, "tolerances": tolerances}
-
-
-def _by_hand(view: View, settings: RecoverSettings, person: Figure) -> NDArray[np.int8]:
-    """Return the flips that were given by hand for each frame (F, 17); 0 where none is given."""
-    if not settings.nearer:
-        return np.zeros((len(view), len(SEGMENTS)), dtype=np.int8)
-    hands = [settings.nearer] if isinstance(settings.nearer, Mapping) else settings.nearer
-    if len(hands) not in (1, len(view)):
-        raise refusal(
-            "", "nearer", f"{len(hands)} frames", f"{len(view)}, or one for all", "give one a frame"
-        )
-    from posekit.recovery.objects import read_nearer
-
-    flips = np.array([read_nearer(figure_linkage(person), hand) for hand in hands])
-    return np.broadcast_to(flips, (len(view), len(SEGMENTS)))
 
 
 def _why(nearest: Modes) -> str:

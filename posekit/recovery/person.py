@@ -27,7 +27,7 @@ def _by_segment(table: Mapping[str, float]) -> dict[str, float]:
     return {name: table[bare] for name, bare in sideless.items() if bare in table}
 
 
-def person_of(view: View, settings: RecoverSettings, figure: Figure | None) -> Figure:
+def figure_of_view(view: View, settings: RecoverSettings, figure: Figure | None) -> Figure:
     """Return the person's figure: the given or built-in one with the view's stature, lengths and head points."""
     head = {
         name: tuple(np.asarray(at, dtype=np.float64).tolist())

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from posekit.body import Figure
 from posekit.errors import refusal
 from posekit.geometry import Array
+from posekit.recovery.objects import Linkage, LinkageFamily, search
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS
 from posekit.solver import Problem
-
-if TYPE_CHECKING:
-    from posekit.recovery.objects import Linkage
 
 #: Root of a person's area in a picture: a convex body shows a quarter of its surface on average (Cauchy), an adult's
 #: surface is 1.8 square metres (Du Bois & Du Bois 1916).
@@ -93,8 +91,6 @@ def scales_of(
     points: Array, linkage: Linkage, how: str, weights: Mapping[str, float], stated: float, strict: bool
 ) -> tuple[list[float], dict[str, Any]]:
     """Return the scales of one picture, and what is known of its camera."""
-    from posekit.recovery.objects import LinkageFamily, search
-
     family = LinkageFamily(linkage=linkage, image=points)
     bound, segment = family.minimum_scale, family.bounding_segment
     chosen = [bound if how == "min" else stated]
@@ -113,8 +109,6 @@ def scales_of(
 
 def figure_linkage(person: Figure) -> Linkage:
     """Return the figure as a linkage of 14 points and 17 segments: torso and hips are closed loops."""
-    from posekit.recovery.objects import Linkage
-
     lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
     return Linkage(name="figure", points=JOINTS, segments=SEGMENTS, lengths=lengths, unit=1.0)
 

@@ -16,6 +16,7 @@ from posekit.cameras.head import HeadPoints, HeadPose, solve_pose
 from posekit.cameras.lee_chen import camera_position, rotation_to_paper
 from posekit.errors import PosekitError, refusal
 from posekit.geometry import Array, Record
+from posekit.recovery.objects import parse_scale
 from posekit.recovery.scales import (
     DISTANCE_DEVIATION,
     PHOTOGRAPH_OFFSETS,
@@ -251,8 +252,6 @@ def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: 
     model, reasons = view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert isinstance(model, ScaledOrthographicCamera)
-    from posekit.recovery.objects import parse_scale
-
     square = view.image * np.array([model.aspect, 1.0])
     text = settings.scale or ("likely" if model.scale is None else None)
     how, value, weights = parse_scale(text) if text is not None else ("value", 0.0, {})

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.errors import refusal
 from posekit.geometry import Array
 from posekit.recovery.objects.family import LinkageFamily, off_flat, with_depth
-from posekit.recovery.objects.linkage import read_nearer
 
 
 class Tolerance(NamedTuple):
@@ -60,7 +60,7 @@ class Check(NamedTuple):
 def grow_best(
     family: LinkageFamily,
     scales: Array,
-    nearer: Mapping[str, str],
+    hand: NDArray[np.int8],
     given: Tolerance | None,
     about: dict[str, Any],
 ) -> tuple[Array, Array, Array]:
@@ -85,7 +85,7 @@ def grow_best(
     closed = any(one["residual"] <= CLOSED_RESIDUAL for one in about["family"].get("minima", ()))
     for judged, allowed in ways:
         rejected: Counter[str] = Counter()
-        parts = [grow(family, s, nearer, allowed, rejected) for s in scales.tolist()]
+        parts = [grow(family, s, hand, allowed, rejected) for s in scales.tolist()]
         about["judged"] = "closed" if judged == "exact" and evidence <= 0 else judged
         about["rejected"] = dict(rejected)
         if any(len(part[0]) for part in parts) and (evidence > 0 or closed):
@@ -95,7 +95,7 @@ def grow_best(
 
 
 def grow(
-    family: LinkageFamily, s: float, nearer: Mapping[str, str], allowed: Tolerance, rejected: Counter[str]
+    family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance, rejected: Counter[str]
 ) -> tuple[Array, Array]:
     """Flip the segments of the basis one by one, and return postures (N, P, 3) and flips (N, S) at one scale.
 
@@ -104,7 +104,7 @@ def grow(
     linkage, basis = family.linkage, family.incidence.basis
     extent, lengths, names = family.extent / s, linkage.lengths, linkage.segment_names
     dZ = np.sqrt(np.maximum(lengths**2 - extent**2, 0.0))
-    checks = list(_checks(family, s, nearer, allowed))
+    checks = list(_checks(family, s, hand, allowed))
     signed = np.zeros((1, len(lengths)))
     for number, k in enumerate(basis):
         later = len(basis) - number - 1
@@ -132,9 +132,7 @@ def grow(
     return points, np.where(family.seen, family.flips_of(np.nan_to_num(points)), 0)
 
 
-def _checks(
-    family: LinkageFamily, s: float, nearer: Mapping[str, str], allowed: Tolerance
-) -> Iterator[Check]:
+def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance) -> Iterator[Check]:
     r"""List what loops, flips given by hand and shape demand.
 
     Where image points are off by p at most, a segment of length l that is seen e long has a depth between
@@ -154,7 +152,6 @@ def _checks(
     for k in np.setdiff1d(np.flatnonzero(family.seen), family.incidence.basis).tolist():
         measure = partial(_gap, extent[k], lengths[k], 2 * beside, between[k])
         yield Check(f"closure/{names[k]}", across[[k]], measure, allowed.rigid)
-    hand = read_nearer(linkage, nearer)
     for k in np.flatnonzero(hand & family.seen).tolist():
         slack = 1e-6 + float(between[k]) * (k not in family.incidence.basis)
         yield Check(f"nearer/{names[k]}", -hand[k] * across[[k]], np.ravel, slack)

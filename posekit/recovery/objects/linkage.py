@@ -305,27 +305,43 @@ def linkage_of_robot(robot: Any) -> Linkage:
     InputError
         If fewer than two points remain, or no rigid segments join them all.
     """
+    import pinocchio as pin
+
     model = robot.model
-    names, places = _robot_frames(robot)
-    ends = [name for name in names if name not in model.names]
+    # Beyond a sliding joint no distance to the rest is fixed.
+    kinds = [joint.shortname().removeprefix("JointModel") for joint in model.joints]
+    sliding = {k for k, kind in enumerate(kinds) if kind.startswith(("P", "T"))}
+    turning = [k for k in range(1, model.njoints) if not sliding.intersection(model.supports[k])]
+    bodies = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
+    used = {frame.parentFrame for frame in model.frames}
+    last = [k for k in bodies if k not in used and model.frames[k].parentJoint in turning]
+    joints = [model.getFrameId(model.names[k], pin.FrameType.JOINT) for k in turning if model.nvs[k] == 1]
+    ids = [*bodies[:1], *joints, *last]
+    rng, data, moved = np.random.default_rng(0), model.createData(), []
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -1.0)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, 1.0)
+    for _ in range(6):
+        q = pin.randomConfiguration(model, lower, upper) if robot.free_flyer else rng.uniform(lower, upper)
+        pin.framesForwardKinematics(model, data, q)
+        moved.append([data.oMf[k].translation.copy() for k in ids])
+    places, ends = np.array(moved), [0, *range(1 + len(joints), len(ids))]
     # Joints first; a base or an end counts where it is away from them all, and points that coincide are one.
     kept: list[int] = []
-    order = sorted(range(len(names)), key=lambda k: names[k] in ends)
-    for k in order:
-        apart = MIN_POINT_DISTANCE_METRES if names[k] in ends else 1e-9
+    for k in [*range(1, 1 + len(joints)), *ends]:
+        apart = MIN_POINT_DISTANCE_METRES if k in ends else 1e-9
         gaps = np.linalg.norm(places[:, kept] - places[:, [k]], axis=2)
         if (gaps.max(axis=0, initial=0.0) > apart).all():
             kept.append(k)
-    kept.sort(key=lambda k: (k != 0, k))
-    points = places[:, kept]
+    kept.sort()
+    points, names = places[:, kept], [model.frames[ids[k]].name for k in kept]
     segments: dict[tuple[str, str], float] = {}
-    for a, b in combinations(range(len(kept)), 2):
+    for a, b in combinations(range(len(names)), 2):
         length = np.linalg.norm(points[:, a] - points[:, b], axis=1)
         if np.ptp(length) < 1e-9:
-            segments[names[kept[a]], names[kept[b]]] = float(length.mean())
+            segments[names[a], names[b]] = float(length.mean())
     return Linkage.from_names(
         name=robot.name,
-        points=[names[k] for k in kept],
+        points=names,
         segments=segments,
         unit=1.0,
         urdf=robot.source or robot.name,
@@ -333,51 +349,38 @@ def linkage_of_robot(robot: Any) -> Linkage:
     )
 
 
-def _robot_frames(robot: Any) -> tuple[list[str], Array]:
-    """Return names and places (C, K, 3) of base link, turning joints and last links in random configurations."""
-    import pinocchio as pin
+def read_nearer(
+    linkage: Linkage, nearer: Mapping[str, str] | Sequence[Mapping[str, str]] | None, count: int
+) -> NDArray[np.int8]:
+    """Return the flips (F, S) that are given by hand for F = `count` frames: 1, -1, or 0 for a segment without one.
 
-    model = robot.model
-    rng = np.random.default_rng(0)
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -1.0)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, 1.0)
-    # Beyond a sliding joint no distance to the rest is fixed.
-    turning = {0}
-    for k in range(1, model.njoints):
-        name = model.joints[k].shortname().removeprefix("JointModel")
-        if model.parents[k] in turning and not name.startswith(("P", "T")):
-            turning.add(k)
-    joints = [k for k in sorted(turning) if k and model.nvs[k] == 1]
-    used = {frame.parentFrame for frame in model.frames}
-    bodies = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
-    last = [k for k in bodies if k not in used and model.frames[k].parentJoint in turning - {0}]
-    ids = bodies[:1] + [model.getFrameId(model.names[k], pin.FrameType.JOINT) for k in joints] + last
-    data, places = model.createData(), []
-    for _ in range(6):
-        q = pin.randomConfiguration(model, lower, upper) if robot.free_flyer else rng.uniform(lower, upper)
-        pin.framesForwardKinematics(model, data, q)
-        places.append([data.oMf[k].translation.copy() for k in ids])
-    return [model.frames[k].name for k in ids], np.array(places)
-
-
-def read_nearer(linkage: Linkage, choices: Mapping[str, str]) -> NDArray[np.int8]:
-    """Turn flips given by hand, a segment's name to its nearer end, into flips (S,); 0 where none is given.
+    Parameters
+    ----------
+    linkage : Linkage
+    nearer : mapping or sequence of mappings, optional
+        Segment to the name of its nearer end: one mapping for all frames, or one a frame.
+    count : int
+        Number of frames.
 
     Raises
     ------
     InputError
-        If a segment or its end is not known.
+        If a segment or its end is not known, or there are more or fewer mappings than frames.
     """
-    flips = np.zeros(len(linkage.segments), dtype=np.int8)
-    for name, end in choices.items():
-        number = linkage.segment(name)
-        a, b = (linkage.nodes[node] for node in linkage.segments[number])
-        if end not in (a, b):
-            raise refusal(
-                f"linkage {linkage.name}", f"nearer.{name}", shown(end), f"{a} or {b}", "correct it"
-            )
-        flips[number] = 1 if end == a else -1
-    return flips
+    hands = [nearer] if isinstance(nearer, Mapping) else list(nearer or [{}])
+    if len(hands) not in (1, count):
+        expected = f"{count}, or one for all"
+        raise refusal("", "nearer", f"{len(hands)} frames", expected, "give one a frame")
+    flips = np.zeros((len(hands), len(linkage.segments)), dtype=np.int8)
+    for own, choices in zip(flips, hands, strict=True):
+        for name, end in choices.items():
+            number = linkage.segment(name)
+            ends = [linkage.nodes[node] for node in linkage.segments[number]]
+            if end not in ends:
+                where, expected = f"linkage {linkage.name}", " or ".join(ends)
+                raise refusal(where, f"nearer.{name}", shown(end), expected, "correct it")
+            own[number] = 1 - 2 * ends.index(end)
+    return np.broadcast_to(flips, (count, flips.shape[1]))
 
 
 def name_nearer(linkage: Linkage, flips: Array | NDArray[np.int8]) -> dict[str, str]:

@@ -42,22 +42,21 @@ def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
     ('constraints', 0.0, {'closure': 1.0, 'coplanar': 0.5})
     """
     text = str(text).strip()
-    expected = f"min, likely, a positive number, stature:PX, or some of {', '.join(CONSTRAINT_KINDS)}"
     if text in ("min", "likely"):
         return text, 0.0, {}
     parts = [part.strip().partition(":") for part in text.split(",")]
-    names = [name for name, _, _ in parts]
-    constraints = set(names) <= set(CONSTRAINT_KINDS)
+    constraints = all(name in CONSTRAINT_KINDS for name, _, _ in parts)
     try:
-        given = [value or "1" for _, _, value in parts] if constraints else [text.removeprefix("stature:")]
-        numbers = [float(one) for one in given]
+        weights = {name: float(value or 1) for name, _, value in parts} if constraints else {}
+        number = 1.0 if constraints else float(text.removeprefix("stature:"))
     except ValueError:
-        numbers = [math.nan]
-    if not all(math.isfinite(value) and value > 0 for value in numbers):
+        number = math.nan
+    if not all(math.isfinite(value) and value > 0 for value in (number, *weights.values())):
+        expected = f"min, likely, a positive number, stature:PX, or some of {', '.join(CONSTRAINT_KINDS)}"
         raise refusal("", "scale", shown(text), expected, "correct it")
     if constraints:
-        return "constraints", 0.0, dict(zip(names, numbers, strict=True))
-    return ("stature" if text.startswith("stature:") else "value"), numbers[0], {}
+        return "constraints", 0.0, weights
+    return "stature" if text.startswith("stature:") else "value", number, {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -183,12 +182,7 @@ def recover_object(
            [ 0.,  4.,  4.]])
     """
     images = np.asarray(image, dtype=np.float64)
-    hands = [nearer] * len(images) if isinstance(nearer, Mapping) else list(nearer or [{}] * len(images))
-    if len(hands) != len(images):
-        expected = f"{len(images)} or one mapping"
-        raise refusal("", "nearer", f"{len(hands)} frames", expected, "give one a frame")
-    for hand in hands:
-        read_nearer(linkage, hand)
+    hands = read_nearer(linkage, nearer, len(images))
     times = np.arange(len(images)) if time is None else np.asarray(time, dtype=np.float64)
     longest = float(linkage.lengths.max())
     given = None if tolerance is None else Tolerance(*tolerance, tolerance[1] / 2)
@@ -207,37 +201,31 @@ def recover_object(
         frames.append(about)
     if frames and all(about["reason"] for about in frames):
         raise InputError(f"frames[0]: {frames[0]['reason']}")
-    points, scales = (np.concatenate([one[k] for one in tables]) for k in (0, 2))
-    flips: NDArray[np.int8] = np.concatenate([one[1] for one in tables]).astype(np.int8)
     frame = np.repeat(np.arange(len(tables)), [len(part[0]) for part in tables])
-    found: dict[str, Any] = {}
+    points, flips, scales = (np.concatenate([one[k] for one in tables]) for k in range(3))
+    table = {"frame": frame, "points": points, "flips": flips.astype(np.int8), "scale": scales}
     if robot is not None:
-        allowed = [
-            2 * EXACT.rigid if frames[k]["judged"] == "exact" else MEASURED.tangent for k in frame.tolist()
-        ]
-        within = np.array(allowed) * longest * (linkage.unit or 1.0)
-        found = configurations_of(robot, linkage, points, frame, within)
-        order = np.lexsort((~found["certified"], frame))
-        frame, points, flips, scales = frame[order], points[order], flips[order], scales[order]
-        found = {name: values[order] for name, values in found.items()}
-        found["configuration_names"] = tuple(robot.configuration_names)
-    settings = {"scale": None if scale is None else str(scale), "nearer": [dict(hand) for hand in hands]}
+        exact = np.array([about["judged"] == "exact" for about in frames])[frame]
+        within = np.where(exact, 2 * EXACT.rigid, MEASURED.tangent) * longest * (linkage.unit or 1.0)
+        table |= configurations_of(robot, linkage, points, frame, within)
+        order = np.lexsort((~table["certified"], frame))
+        table = {name: values[order] for name, values in table.items()}
     return ObjectRecovery(
         linkage=linkage,
-        frame=frame,
-        points=points,
-        flips=flips,
-        scale=scales,
         frames=frames,
-        settings=settings,
-        **found,
+        configuration_names=() if robot is None else tuple(robot.configuration_names),
+        settings={
+            "scale": None if scale is None else str(scale),
+            "nearer": [name_nearer(linkage, hand) for hand in hands],
+        },
+        **table,
     )
 
 
 def _scales(
     family: LinkageFamily,
     scale: str | float | None,
-    nearer: Mapping[str, str],
+    hand: NDArray[np.int8],
     given: Tolerance | None,
 ) -> tuple[dict[str, Any], Array]:
     """Find the scales (K,) of one frame, and describe them for the result."""
@@ -249,7 +237,7 @@ def _scales(
     about: dict[str, Any] = {"how": how, "bound": bound / factor, "segment": family.bounding_segment}
     chosen = np.array([bound])
     if how == "constraints":
-        found = search(family, weights, nearer=nearer)
+        found = search(family, weights, hand)
         about["how"] = "+".join(weights)
         pairs = zip((found.s / factor).tolist(), found.residual.tolist(), strict=True)
         about["minima"] = [{"s": s, "residual": residual} for s, residual in pairs]

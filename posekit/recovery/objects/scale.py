@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from posekit.errors import nearest, refusal
 from posekit.geometry import Array, Record
 from posekit.recovery.objects.family import AT_BOUND, ZERO_COEFFICIENT, LinkageFamily, off_flat, with_depth
-from posekit.recovery.objects.linkage import read_nearer
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
 
@@ -101,13 +100,11 @@ class Constraints:
     family : LinkageFamily
     weights : mapping
         ``closure``, ``coplanar``, ``perpendicular``, ``collinear`` to a weight.
-    nearer : mapping
-        Flips given by hand: segment to its nearer end.
+    given : int array (S,)
+        Flips given by hand; 0 for a segment without one.
 
     Attributes
     ----------
-    given : int array (S,)
-        Flips given by hand; 0 where none is.
     bounding : bool array (S,)
         Segments that set the bound of the scale.
     matter : list of int
@@ -116,12 +113,9 @@ class Constraints:
         Assignments of flips, mirror images once.
     """
 
-    def __init__(
-        self, family: LinkageFamily, weights: Mapping[str, float], nearer: Mapping[str, str]
-    ) -> None:
+    def __init__(self, family: LinkageFamily, weights: Mapping[str, float], given: NDArray[np.int8]) -> None:
         linkage = family.linkage
-        self.family = family
-        self.given = read_nearer(linkage, nearer)
+        self.family, self.given = family, given
         unit = float(linkage.lengths.mean())
         self.minimum = family.minimum_scale * unit
         self.at_scale = np.nan_to_num(family.extent / self.minimum)
@@ -198,7 +192,7 @@ class Constraints:
 
 
 def search(
-    family: LinkageFamily, weights: Mapping[str, float], *, nearer: Mapping[str, str] | None = None
+    family: LinkageFamily, weights: Mapping[str, float], given: NDArray[np.int8] | None = None
 ) -> Minima:
     """Find all local minima of the constraints' residual, over the scale and the flips that matter.
 
@@ -208,8 +202,8 @@ def search(
         The linkage in its image.
     weights : mapping
         ``closure``, ``coplanar``, ``perpendicular``, ``collinear`` to a positive weight.
-    nearer : mapping, optional
-        Flips given by hand: name of a segment to its nearer end.
+    given : int array (S,), optional
+        Flips given by hand: 1 if the first end of a segment is nearer, -1 if its second is, 0 if none is given.
 
     Raises
     ------
@@ -229,7 +223,8 @@ def search(
     if family.minimum_scale == 0:
         got = "all segments seen end on"
         raise refusal("", "scale", got, "an image that fixes a scale", "give the scale")
-    constraints = Constraints(family, weights, nearer or {})
+    none = np.zeros(len(family.linkage.segments), dtype=np.int8)
+    constraints = Constraints(family, weights, none if given is None else given)
     signs, psi, envelope = _minima(constraints)
     residual, _ = constraints.evaluate(signs, psi)
     at_bound = psi <= VANISHED_ANGLE
