@@ -104,6 +104,8 @@ def log_terms(
     but chi2 is counted from its average over true postures, so that an unknown one is neither for nor against.
     """
     prior = prior or load_prior()
+    # NumPy's loops then run along the postures, not along x, y, z.
+    joints = np.asfortranarray(joints)
     direction = None if up is None else up.direction
     sine = 0.0 if up is None else math.sin(math.radians(up.deviation))
     posture, gravity = prior.judge(directions(joints, direction), sine)

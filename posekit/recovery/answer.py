@@ -23,7 +23,7 @@ N_SAMPLES: Final = 64
 MAX_COMPARED: Final = 600
 
 #: Pairs of postures that are compared at once, and modes that are sampled at once: they stay in the processor's cache.
-COMPARED_AT_ONCE, SAMPLED_AT_ONCE = 50_000, 64
+COMPARED_AT_ONCE, SAMPLED_AT_ONCE = 20_000, 64
 
 #: Probabilities that differ by less are equal.
 ROUNDED_PROBABILITY: Final = 1e-9
@@ -217,9 +217,9 @@ def representatives(
             lacking = lacking - most
             rest = rest * (1.0 - near[np.arange(len(some)), best])
         order = np.argsort(-np.array(gains), axis=0, kind="stable")
-        for column, k in enumerate(some.tolist()):
-            own = order[: np.count_nonzero(np.array(gains)[:, column]), column]
-            rows[k], held[k] = np.array(chosen)[own, column], np.array(gains)[own, column]
+        pairs = (np.take_along_axis(np.array(one), order, axis=0).T for one in (chosen, gains))
+        for k, row, gained in zip(some.tolist(), *pairs, strict=True):
+            rows[k], held[k] = row[gained > 0], gained[gained > 0]
     return rows, held
 
 
