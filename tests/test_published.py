@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import posekit
+from posekit.body.inertias import inertias
+from posekit.body.lengths import stature_from_lengths
 from posekit.following.tracking import COMPARED, FALLOFF
 from posekit.formats import body_checks
 from posekit.ranking import standing
@@ -19,12 +22,13 @@ COCO = {
 """cocodataset.org/#keypoints-eval."""
 
 DE_LEVA = {
-    "upper arm": ((2.55, 2.71), (57.54, 57.72)),
-    "forearm": ((1.38, 1.62), (45.59, 45.74)),
-    "thigh": ((14.78, 14.16), (36.12, 40.95)),
-    "shank": ((4.81, 4.33), (43.52, 43.95)),
+    ("upper_arm", "shoulder", "elbow"): ((2.55, 57.54, 27.8, 26.0, 14.8), (2.71, 57.72, 28.5, 26.9, 15.8)),
+    ("forearm", "elbow", "wrist"): ((1.38, 45.59, 26.1, 25.7, 9.4), (1.62, 45.74, 27.6, 26.5, 12.1)),
+    ("thigh", "hip", "knee"): ((14.78, 36.12, 36.9, 36.4, 16.2), (14.16, 40.95, 32.9, 32.9, 14.9)),
+    ("shank", "knee", "ankle"): ((4.81, 43.52, 26.7, 26.3, 9.2), (4.33, 43.95, 25.1, 24.6, 10.2)),
 }
-"""de Leva 1996, table 4, women and men: mass and centre of mass, percent; the shank to the joint of the ankle."""
+"""de Leva 1996, table 4, women and men: mass, centre of mass, radii of gyration (sagittal, transverse, longitudinal) in
+percent; the shank to the joint of the ankle."""
 
 
 def test_key_points_spread_as_coco_says() -> None:
@@ -42,12 +46,33 @@ def test_shares_of_the_stature_are_those_of_winter() -> None:
     assert list(body_checks.LIMB_SHARES.values()) == pytest.approx([0.245, 0.246, 0.186, 0.146])
 
 
-def test_a_body_weighs_what_its_parts_weigh() -> None:
-    limbs = {(start, end, share): centre for start, end, share, centre in standing.LIMB_MASSES}
-    assert standing.TRUNK_MASS + 2 * sum(share for *_, share in limbs) == pytest.approx(1, abs=1e-3)
-    first = {"upper arm": "shoulder", "forearm": "elbow", "thigh": "hip", "shank": "knee"}
-    for name, (mass, centre) in DE_LEVA.items():
-        share, place = next(
-            (share, place) for (start, _, share), place in limbs.items() if start == first[name]
-        )
-        assert (share, place) == pytest.approx((np.mean(mass) / 100, np.mean(centre) / 100), abs=2e-4)
+def test_parts_of_the_body_weigh_what_de_leva_says() -> None:
+    lengths = dict(posekit.load_figure().lengths)
+    parts = inertias(lengths)
+    mass = sum(one[0] for one in parts.values())
+    assert mass == pytest.approx(22.33 * stature_from_lengths(lengths) ** 2, rel=1e-3)
+    ranked = {(start, share): centre for start, _, share, centre in standing.LIMB_MASSES}
+    assert standing.TRUNK_MASS + 2 * sum(share for _, share in ranked) == pytest.approx(1, abs=1e-3)
+    for (link, start, end), tables in DE_LEVA.items():
+        share, centre, *radii = np.mean(tables, axis=0) / 100
+        length = lengths[f"left_{start}-left_{end}"]
+        own, middle, moments = parts[f"left_{link}"]
+        assert own / mass == pytest.approx(share, rel=2e-3)
+        assert middle[2] == pytest.approx(-centre * length, rel=1e-3)
+        assert moments == pytest.approx(own * (np.array(radii) * length) ** 2, rel=5e-3)
+        near = [(one, place) for (joint, one), place in ranked.items() if joint == start]
+        assert min(abs(one - share) + abs(place - centre) for one, place in near) < 3e-4
+
+
+def test_trunks_turn_as_stiffly_as_uniform_cylinders() -> None:
+    """Radii of gyration of a uniform cylinder as long and wide as the part, within a half."""
+    lengths = dict(posekit.load_figure().lengths)
+    parts = inertias(lengths)
+    for link, long, wide, deep in (
+        ("torso", 0.36, 0.30, 0.21),
+        ("hips", 0.20, 0.33, 0.22),
+        ("head", 0.24, 0.16, 0.18),
+    ):
+        mass, _, moments = parts[link]
+        x, y, z = long**2 / 12, wide**2 / 16, deep**2 / 16
+        assert moments / mass == pytest.approx([x + y, x + z, y + z], rel=0.5)

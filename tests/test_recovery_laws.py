@@ -209,3 +209,25 @@ def test_a_written_object_projects_onto_its_image_and_has_its_configurations(
         assert one["fk_distance"] == pytest.approx(np.linalg.norm(off, axis=1).max(), abs=1e-6)
         assert one["certified"] is (one["fk_distance"] < 1e-3)
     assert f"{sum(one['certified'] for one in frame['postures'])} have a configuration" in out
+
+
+@pytest.mark.parametrize("given", [1, 3])
+def test_flips_of_an_object_that_are_given_by_hand_are_kept(given: int, run: Any, tmp_path: Path) -> None:
+    view, target, settings = (tmp_path / name for name in ("panda.json", "found.json", "hand.toml"))
+    run("synth", "object", "panda", "-o", str(view), "--seed", "4")
+    words = ("recover", str(view), "-o", str(target), "--linkage", "panda", "--scale", "500")
+
+    def postures(*more: str) -> list[dict[str, Any]]:
+        code, _, err = run(*words, *more)
+        assert code == 0, err
+        (frame,) = json.loads(target.read_text(encoding="utf-8"))["frames"]
+        found: list[dict[str, Any]] = frame["postures"]
+        return found
+
+    every = postures()
+    hand = dict(list(every[-1]["flips"].items())[:given])
+    lines = [f'"{segment}" = "{nearer}"' for segment, nearer in hand.items()]
+    settings.write_text("\n".join(["[nearer]", *lines]), encoding="utf-8")
+    kept = [one["points"] for one in every if hand.items() <= one["flips"].items()]
+    assert 0 < len(kept) < len(every)
+    assert [one["points"] for one in postures("--settings", str(settings))] == kept

@@ -333,6 +333,21 @@ def test_bodies_stand_side_by_side_in_order(motion: posekit.Motion, frames: int)
 
 
 @drawn
+def test_the_camera_of_one_posture_is_drawn_and_makes_room(
+    folder: Path, view: posekit.View, recovery: posekit.Recovery
+) -> None:
+    sizes = []
+    for seen in (None, view):
+        posekit.render(
+            recovery, folder / "one.png", view=seen, frame=1, which="answer", size=(320, 240), azimuth=60
+        )
+        picture = np.asarray(Image.open(folder / "one.png"))
+        rows = np.nonzero(sum(side_pixels(picture))[:, 110:])[0]  # beside the image of the view
+        sizes.append(np.ptp(rows))
+    assert sizes[1] < 0.7 * sizes[0]  # the camera stands farther away than the body is high
+
+
+@drawn
 def test_pictures_turn_with_their_eye(folder: Path, motion: posekit.Motion) -> None:
     """From the person's left the left side hides the right one, and from above a body is flat."""
     posekit.render(motion, folder / "left.png", frame=0, size=(200, 240), azimuth=90)
