@@ -87,7 +87,7 @@ class JointRange:
     part: str = ""
     upper_only: bool = False
 
-    @property
+    @cached_property
     def points(self) -> tuple[str, ...]:
         """Names of the points that are read."""
         if self.part == "neck":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -107,6 +108,7 @@ def scales_of(
     return chosen, {"scale": chosen, "how": "+".join(weights) or how, "bound": bound, "segment": segment}
 
 
+@lru_cache(maxsize=8)
 def figure_linkage(person: Figure) -> Linkage:
     """Return the figure as a linkage of 14 points and 17 segments: torso and hips are closed loops."""
     lengths = np.array([person.lengths[name] for name in SEGMENT_NAMES])
