@@ -337,26 +337,18 @@ def test_radius_holds_95_percent():
         assert inside.mean() == pytest.approx(0.95, abs=0.012)
 
 
+@pytest.mark.parametrize("count", [1, 7, 60])
 @pytest.mark.parametrize("spread", [0.006, 0.012, 0.06])
-def test_representatives_cover_what_they_must(spread):
+def test_representatives_cover_what_they_must(spread, count):
     rng = np.random.default_rng(1)
-    counts = [60, 1, 25, 60, 7]
-    frame = np.repeat(np.arange(len(counts)), counts)
-    shape = spread * rng.normal(size=(len(frame), 14, 3))
-    weights = [np.sort(rng.exponential(size=count))[::-1] for count in counts]
-    weight = np.concatenate([one / one.sum() for one in weights])
-    found = representatives(shape, frame, weight, np.full(len(counts), 0.9))
-    for k, (rows, held) in enumerate(zip(*found, strict=True)):
-        own, share = shape[frame == k], weight[frame == k]
-        assert (
-            held.sum() >= 0.9 - 1e-9 and (np.diff(held) <= 0).all() and len(set(rows.tolist())) == len(rows)
-        )
-        apart = np.linalg.norm(own[rows][:, None] - own[None], axis=3).max(axis=2)
-        assert share[apart.min(axis=0) <= 0.05].sum() == pytest.approx(held.sum())
-        assert held[0] == pytest.approx(max(share[near <= 0.05].sum() for near in apart))
-        alone = representatives(own, np.zeros(len(own), dtype=int), share, np.full(1, 0.9))
-        np.testing.assert_array_equal(alone[0][0], rows)
-        np.testing.assert_allclose(alone[1][0], held, atol=1e-12)
+    shape = spread * rng.normal(size=(count, 14, 3))
+    weight = np.sort(rng.exponential(size=count))[::-1]
+    weight = weight / weight.sum()
+    rows, held = representatives(shape, weight, 0.9)
+    assert held.sum() >= 0.9 - 1e-9 and (np.diff(held) <= 0).all() and len(set(rows.tolist())) == len(rows)
+    apart = np.linalg.norm(shape[rows][:, None] - shape, axis=3).max(axis=2)
+    assert weight[apart.min(axis=0) <= 0.05].sum() == pytest.approx(held.sum())
+    assert held[0] == pytest.approx(max(weight[near <= 0.05].sum() for near in apart))
 
 
 def test_configurations_and_margins_are_found_when_they_are_read(exact):

@@ -22,8 +22,8 @@ N_SAMPLES: Final = 64
 #: Postures of a frame that are compared each with each; of more, the likeliest stand for the rest.
 MAX_COMPARED: Final = 600
 
-#: Pairs of postures that are compared at once, and modes that are sampled at once: they stay in the processor's cache.
-COMPARED_AT_ONCE, SAMPLED_AT_ONCE = 20_000, 64
+#: Modes that are sampled at once: they stay in the processor's cache.
+SAMPLED_AT_ONCE: Final = 64
 
 #: Probabilities that differ by less are equal.
 ROUNDED_PROBABILITY: Final = 1e-9
@@ -101,7 +101,10 @@ def answers_of(
     base = np.where(relative[frame, None, None], joints[:, :1], 0.0)
     shape, listed = joints - base, 1.0 - unlisted
     hold = np.minimum(REPRESENTED / np.maximum(listed, REPRESENTED), 1.0)
-    rows, held = representatives(shape, frame, weight, hold)
+    parts = zip(
+        np.split(np.nan_to_num(shape), starts[1:]), np.split(weight, starts[1:]), hold.tolist(), strict=True
+    )
+    rows, held = zip(*(representatives(*part) for part in parts), strict=True)
     if covariance is None:
         # Between exact postures there is none: the answer is the one that stands for the most probability.
         survivor = np.array([one[0] for one in rows])
@@ -131,7 +134,7 @@ def answers_of(
         "sure": np.add.reduceat(weight * inside, starts) * listed,
         "sure_of": np.where(relative, "relative to the neck", "position").tolist(),
         "survivor": survivor,
-        "representatives": rows,
+        "representatives": list(rows),
         "represented": [one * share for one, share in zip(held, listed, strict=True)],
         "nearer": np.where(known, np.array([0, 1, -1])[each.argmax(axis=0)], 0),
         "nearer_sure": np.where(known, each.max(axis=0) * listed[:, None], np.nan),
@@ -170,71 +173,48 @@ def lay(joints: Array, lengths: Array) -> Array:
     return np.where(known[..., None], x, np.nan)
 
 
-def representatives(
-    shape: Array, frame: Ints, weight: Array, hold: Array
-) -> tuple[list[NDArray[np.intp]], list[Array]]:
-    """Choose few postures of each of K frames: what is within 5 cm of them in every joint has a given probability.
+def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Array]:
+    """Choose few postures of a frame: those within 5 cm of them in every joint have a given probability.
 
     Parameters
     ----------
     shape : array (N, 14, 3)
-        Postures by frame, the likeliest first, metres.
-    frame : int array (N,)
-        Frame of each, 0 to K - 1.
+        Postures, the likeliest first, metres.
     weight : array (N,)
-        Their probabilities; they sum to one over a frame.
-    hold : array (K,)
+        Their probabilities; they sum to one.
+    hold : float
         Probability that is to be held.
 
     Returns
     -------
-    rows : list of K int arrays
-        Representatives, counted from the first posture of the frame. The one that stands for the most probability
-        comes first.
-    held : list of K arrays
-        Probability of each and of what it newly stands for.
+    rows : int array (R,)
+        Representatives. The one that stands for the most probability comes first.
+    held : array (R,)
+        Probability of each and of the postures for which it newly stands.
     """
-    count = np.bincount(frame)
-    starts, left = np.cumsum(count) - count, np.argsort(-count, kind="stable")
-    rows: list[Any] = [None] * len(count)
-    held: list[Any] = [None] * len(count)
-    while len(left):
-        width = min(count[left[0]], MAX_COMPARED)
-        some, left = np.split(left, [1 + COMPARED_AT_ONCE // width**2])
-        place = np.arange(width)
-        at = starts[some, None] + np.minimum(place, count[some, None] - 1)
-        near = _near(shape[at]).astype(np.float64)
-        rest = np.where(place < count[some, None], weight[at], 0.0)
-        lacking, chosen, gains = hold[some] - ROUNDED_PROBABILITY, [], []
-        while True:
-            gain = (near @ rest[..., None])[..., 0]
-            most = np.where(lacking > 0, gain.max(axis=1), 0.0)
-            if not most.any():
-                break
-            best = (gain > most[:, None] - ROUNDED_PROBABILITY).argmax(axis=1)  # of equal ones the likeliest
-            chosen.append(best)
-            gains.append(most)
-            lacking = lacking - most
-            rest = rest * (1.0 - near[np.arange(len(some)), best])
-        order = np.argsort(-np.array(gains), axis=0, kind="stable")
-        pairs = (np.take_along_axis(np.array(one), order, axis=0).T for one in (chosen, gains))
-        for k, row, gained in zip(some.tolist(), *pairs, strict=True):
-            rows[k], held[k] = row[gained > 0], gained[gained > 0]
-    return rows, held
+    near, rest = _near(shape[:MAX_COMPARED]).astype(np.float64), weight[:MAX_COMPARED]
+    found: list[tuple[float, int]] = []
+    while hold > ROUNDED_PROBABILITY:
+        gain = near @ rest
+        most = gain.max()
+        if most <= 0:
+            break
+        best = int((gain > most - ROUNDED_PROBABILITY).argmax())  # of equal ones the likeliest
+        found.append((float(most), best))
+        rest, hold = rest * (1.0 - near[best]), hold - most
+    held, rows = zip(*sorted(found, key=lambda one: -one[0]), strict=True)
+    return np.array(rows), np.array(held)
 
 
 def _near(places: Array) -> Flags:
-    r"""Tell which postures (K, n, 14, 3) of a frame are within 5 cm of each other in every joint (K, n, n).
+    r"""Return which postures (N, 14, 3) are within 5 cm of each other in every joint (N, N).
 
-    :math:`a \cdot b - a^2 / 2 - b^2 / 2 = -|a - b|^2 / 2`, counted from the likeliest. An unknown joint is near.
+    :math:`a \cdot b - a^2 / 2 - b^2 / 2 = -|a - b|^2 / 2`, relative to the likeliest.
     """
-    place = np.nan_to_num(places - places[:, :1]).transpose(2, 0, 1, 3)
-    half, one = dot(place, place)[..., None] / 2, np.ones((*place.shape[:3], 1))
-    left, right = np.concatenate([place, -half, one], axis=3), np.concatenate([place, one, -half], axis=3)
-    near = np.ones((*places.shape[:2], places.shape[1]), dtype=np.bool_)
-    for a, b in zip(left, right, strict=True):
-        near &= a @ b.swapaxes(1, 2) >= -(WITHIN_METRES**2) / 2
-    return near
+    place = (places - places[:1]).transpose(1, 0, 2)
+    half, one = dot(place, place)[..., None] / 2, np.ones((*place.shape[:2], 1))
+    left, right = np.concatenate([place, -half, one], axis=2), np.concatenate([place, one, -half], axis=2)
+    return np.asarray((left @ right.swapaxes(1, 2) >= -(WITHIN_METRES**2) / 2).all(axis=0))
 
 
 def joint_radius(covariance: Array) -> Array:
