@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.body import load_figure
+from posekit.body import lay, load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import pa_mpjpe
 from posekit.recovery import Answer, Frames, Recovery, Survivors
-from posekit.recovery.answer import answers_of, joint_radius, lay, representatives
+from posekit.recovery.answer import answers_of, joint_radius, representatives
 from posekit.recovery.scales import likely_scale
 from posekit.samples import samples
 from posekit.settings import EXACT

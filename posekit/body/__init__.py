@@ -6,6 +6,7 @@ from posekit.body.figure import Configurations as Configurations
 from posekit.body.figure import Figure as Figure
 from posekit.body.figure import load_figure as load_figure
 from posekit.body.figure import with_head as with_head
+from posekit.body.lengths import lay as lay
 from posekit.body.lengths import segment_lengths as segment_lengths
 from posekit.body.lengths import shoulders_are_behind as shoulders_are_behind
 from posekit.body.lengths import stature_from_lengths as stature_from_lengths

@@ -20,8 +20,8 @@ import numpy as np
 
 from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
 from posekit.errors import FigureError, nearest, refusal, shown
-from posekit.geometry import Array, cross, known_median
-from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES, segment_name
+from posekit.geometry import Array, cross, known_median, unit
+from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
 
 #: Metres by segment name.
 Lengths = Mapping[str, float]
@@ -239,6 +239,42 @@ def closed_lengths(
             out |= new
             moved |= {name: new[name] - lengths[name] for name in names}
     return out, moved
+
+
+#: Half the difference of squared lengths at which laying a posture onto them ends, and that at which it has failed.
+LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
+
+
+def lay(joints: Array, lengths: Array) -> Array:
+    r"""Move postures (F, 14, 3) to the nearest ones with given segment lengths (F, 17).
+
+    Newton's steps for :math:`\min |x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. Postures in which a segment has
+    no direction are laid joint by joint, outward from the neck. Segments with an unknown end are left out.
+    """
+    a, b = np.array(SEGMENTS).T
+    x, known = np.nan_to_num(joints), np.isfinite(joints[:, :, 0])
+    use = known[:, a] & known[:, b]
+    J = np.zeros((len(x), len(SEGMENTS), *x.shape[1:]))
+    rows = np.arange(len(SEGMENTS))
+    for _ in range(30):
+        apart = np.where(use[..., None], x[:, b] - x[:, a], 0.0)
+        gap = np.where(use, 0.5 * ((apart**2).sum(axis=2) - lengths**2), 0.0)
+        left = np.abs(gap).max(axis=1) >= LAID_SQUARE_METRES
+        if not left.any():
+            break
+        J[:, rows, b], J[:, rows, a] = apart, -apart
+        flat = J.reshape(len(x), len(SEGMENTS), -1)
+        # A small damping keeps triangles that lie in a plane solvable.
+        normal = flat @ flat.transpose(0, 2, 1) + 1e-9 * np.eye(len(SEGMENTS))
+        step = np.einsum("fsk,fs->fk", flat, np.linalg.solve(normal, gap[..., None])[..., 0]).reshape(x.shape)
+        share = left * np.minimum(1.0, 0.1 / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-12))
+        x = x - step * share[:, None, None]
+    for k in np.flatnonzero(np.abs(gap).max(axis=1) > UNLAID_SQUARE_METRES).tolist():
+        x[k] = np.nan_to_num(joints[k])
+        for index, (start, end) in enumerate(TREE_SEGMENTS):
+            direction = unit(np.nan_to_num(joints[k, end] - joints[k, start]) + 1e-12)
+            x[k, end] = x[k, start] + lengths[k, index] * direction
+    return np.where(known[..., None], x, np.nan)
 
 
 def stature_from_lengths(lengths: Lengths) -> float:

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma, logsumexp
 
+from posekit.body import lay
 from posekit.errors import refusal
 from posekit.following.kalman import DENSITY, Moving, smooth
 from posekit.geometry import Array, unit
 from posekit.progress import watched
-from posekit.recovery.answer import lay
 from posekit.recovery.recovery import Paths, Recovery
 from posekit.skeleton import SEGMENT_NAMES
 

@@ -96,7 +96,7 @@ class Constrained:
         found = search(family, {self.constraint: 1.0}, flips)
         if not len(found):
             return None
-        return family.points(found.s[0], flips * ~family.vanished(found.s[0]))
+        return family.points(found.s[0], flips)
 
 
 def constrained_objects() -> list[Constrained]:

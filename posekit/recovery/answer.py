@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posekit.geometry import Array, Flags, Ints, dot, unit
-from posekit.skeleton import PARENTS, SEGMENTS, TREE_SEGMENTS
+from posekit.body import lay
+from posekit.geometry import Array, Flags, Ints, dot
+from posekit.skeleton import PARENTS, TREE_SEGMENTS
 
 #: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
 WITHIN_METRES: Final = 0.05
@@ -53,9 +53,6 @@ ROUNDING: Final = 1e-8
 
 #: 95 % quantile of the standard normal distribution.
 NORMAL_95: Final = 1.6449
-
-#: Half the difference of squared lengths at which laying a posture onto them ends, and that at which it has failed.
-LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 
 
 def answers_of(
@@ -139,38 +136,6 @@ def answers_of(
         "nearer": np.where(known, np.array([0, 1, -1])[each.argmax(axis=0)], 0),
         "nearer_sure": np.where(known, each.max(axis=0) * listed[:, None], np.nan),
     }
-
-
-def lay(joints: Array, lengths: Array) -> Array:
-    r"""Move postures (F, 14, 3) to the nearest ones with given segment lengths (F, 17).
-
-    Newton's steps for :math:`\min |x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. Postures in which a segment has
-    no direction are laid joint by joint, outward from the neck. Segments with an unknown end are left out.
-    """
-    a, b = np.array(SEGMENTS).T
-    x, known = np.nan_to_num(joints), np.isfinite(joints[:, :, 0])
-    use = known[:, a] & known[:, b]
-    J = np.zeros((len(x), len(SEGMENTS), *x.shape[1:]))
-    rows = np.arange(len(SEGMENTS))
-    for _ in range(30):
-        apart = np.where(use[..., None], x[:, b] - x[:, a], 0.0)
-        gap = np.where(use, 0.5 * ((apart**2).sum(axis=2) - lengths**2), 0.0)
-        left = np.abs(gap).max(axis=1) >= LAID_SQUARE_METRES
-        if not left.any():
-            break
-        J[:, rows, b], J[:, rows, a] = apart, -apart
-        flat = J.reshape(len(x), len(SEGMENTS), -1)
-        # A small damping keeps triangles that lie in a plane solvable.
-        normal = flat @ flat.transpose(0, 2, 1) + 1e-9 * np.eye(len(SEGMENTS))
-        step = np.einsum("fsk,fs->fk", flat, np.linalg.solve(normal, gap[..., None])[..., 0]).reshape(x.shape)
-        share = left * np.minimum(1.0, 0.1 / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-12))
-        x = x - step * share[:, None, None]
-    for k in np.flatnonzero(np.abs(gap).max(axis=1) > UNLAID_SQUARE_METRES).tolist():
-        x[k] = np.nan_to_num(joints[k])
-        for index, (start, end) in enumerate(TREE_SEGMENTS):
-            direction = unit(np.nan_to_num(joints[k, end] - joints[k, start]) + 1e-12)
-            x[k, end] = x[k, start] + lengths[k, index] * direction
-    return np.where(known[..., None], x, np.nan)
 
 
 def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Array]:

@@ -108,11 +108,6 @@ class LinkageFamily(Record):
         # As (l - e) (l + e): near the bound the difference of squares would lose half the digits.
         return np.sqrt(np.maximum((lengths - apart) * (lengths + apart), 0.0))
 
-    def vanished(self, s: ArrayLike) -> NDArray[np.bool_]:
-        """Return which segments (..., S) are foreshortened to nothing: both of their flips are one."""
-        scale = np.asarray(s, dtype=np.float64)
-        return np.asarray(self.bounds >= scale[..., None] * (1 - AT_BOUND))
-
     def points(self, s: ArrayLike, flips: ArrayLike) -> Array:
         """Place the points (..., P, 3), units of length: x, y from the image, depth relative to the first point's.
 

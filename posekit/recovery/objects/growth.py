@@ -24,7 +24,7 @@ class Tolerance(NamedTuple):
 
 
 #: Tolerances in longest segments: rounding, and points picked by hand.
-EXACT: Final = Tolerance(1e-6, 1e-9, 1e-6)
+EXACT: Final = Tolerance(1e-6, 1e-9, 0.0)
 MEASURED: Final = Tolerance(0.01, 0.02, 0.01)
 
 #: Depth of a segment, in longest segments, below which both of its flips are one.
@@ -77,13 +77,13 @@ def grow_best(
         got = f"{' and '.join(names)} in parts that nothing seen joins"
         raise refusal(f"linkage {linkage.name}", "image", got, "one connected part", "add image points")
     longest = float(linkage.lengths.max())
-    exact, measured = (Tolerance(*(part * longest for part in row)) for row in (EXACT, MEASURED))
-    ways = [("given", given)] if given else [("exact", exact._replace(beside=0.0)), ("measured", measured)]
+    usual = {"exact": EXACT, "measured": MEASURED}
+    ways = {name: Tolerance(*(part * longest for part in row)) for name, row in usual.items()}
     fitted = about["family"]["how"].split("+")
     evidence = len(incidence.loops) - (fitted == ["closure"] and len(incidence.loops) == 1)
     evidence += len(linkage.coplanar) * ("coplanar" not in fitted) + len(linkage.collinear)
     closed = any(one["residual"] <= CLOSED_RESIDUAL for one in about["family"].get("minima", ()))
-    for judged, allowed in ways:
+    for judged, allowed in ({"given": given} if given else ways).items():
         rejected: Counter[str] = Counter()
         parts = [grow(family, s, hand, allowed, rejected) for s in scales.tolist()]
         about["judged"] = "closed" if judged == "exact" and evidence <= 0 else judged

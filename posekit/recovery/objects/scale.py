@@ -135,8 +135,22 @@ class Constraints:
         self.matter: list[int] = []
         self.signs = np.where(self.given == 0, 1.0, self.given)[None]
         for block in sorted(_blocks([segments for _, segments, _ in every], len(lengths)), key=len):
-            if not self._add(block):
+            free = [k for k in block if self.given[k] == 0]
+            # Turning all signs of a block round mirrors the posture in depth and changes no residual: one sign is held,
+            # of a segment that does not set the bound.
+            if len(free) == len(block):
+                free.remove(next((k for k in free if not self.bounding[k]), free[0]))
+            if self.matter and len(self.signs) << len(free) > MAX_FLIPS:
                 break
+            if 1 << len(free) > MAX_BLOCK_FLIPS:
+                got = f"2^{len(free)} flips of segments that share constraints"
+                names = ", ".join(linkage.segment_names[k] for k in free[:4])
+                remedy = f"say which end is nearer for some of {names}, …"
+                raise refusal("", "scale", got, f"at most {MAX_BLOCK_FLIPS}", remedy)
+            for k in reversed(free):
+                self.signs = np.repeat(self.signs, 2, axis=0)
+                self.signs[1::2, k] = -1.0
+            self.matter += block
         self.terms = [(weight, term) for weight, segments, term in every if segments[0] in self.matter]
 
     def _terms(self, kind: str, unit: float) -> list[tuple[NDArray[np.intp], Residual]]:
@@ -158,28 +172,6 @@ class Constraints:
                 segments = np.flatnonzero(np.abs(depth).max(axis=0) > ZERO_COEFFICIENT)
                 found.append((segments, partial(_flatness, rank, place[nodes], depth)))
         return found
-
-    def _add(self, block: list[int]) -> bool:
-        """Add the flips of a block of segments that share constraints; tell whether they are not too many.
-
-        Without flips given by hand all signs of the block can be turned round, which mirrors the posture in depth and
-        changes no residual: one sign is held, of a segment that does not set the bound.
-        """
-        free = [k for k in block if self.given[k] == 0]
-        if len(free) == len(block):
-            free.remove(next((k for k in free if not self.bounding[k]), free[0]))
-        if len(self.signs) << len(free) > (MAX_FLIPS if self.matter else MAX_BLOCK_FLIPS):
-            if self.matter:
-                return False
-            names = [self.family.linkage.segment_names[k] for k in free[:4]]
-            got = f"2^{len(free)} flips of segments that share constraints"
-            remedy = f"say which end is nearer for some of {', '.join(names)}, …"
-            raise refusal("", "scale", got, f"at most {MAX_BLOCK_FLIPS}", remedy)
-        for k in reversed(free):
-            self.signs = np.repeat(self.signs, 2, axis=0)
-            self.signs[1::2, k] = -1.0
-        self.matter += block
-        return True
 
     def evaluate(self, signs: Array, psi: Array) -> tuple[Array, Array]:
         """Return residual and derivative of flips (..., S) at angles that broadcast to (...)."""
