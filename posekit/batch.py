@@ -20,8 +20,8 @@ from typing import Any, Final
 
 from posekit.errors import PosekitError, one_line, refusal, shown
 from posekit.geometry import Record
+from posekit.inputs import are_paths, files_of, names_below
 from posekit.motion import Motion
-from posekit.motion.validation import are_paths, files_of, names_below
 from posekit.settings import RecoverSettings, Settings, ValidateSettings
 from posekit.validators.report import plural
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posekit.errors import refusal, shown
+from posekit.inputs import kind_of
 from posekit.settings import RecoverSettings, number, picture_size
 
 if TYPE_CHECKING:
@@ -182,14 +183,6 @@ def view_of(
         fov=fov,
         min_confidence=min_confidence,
     )
-
-
-def kind_of(held: Any) -> str:
-    """Say in words what an opened file holds."""
-    words = {"dict": "cameras", "Recovery": "a result", "Detections": "key points", "Motion": "motion"}
-    words |= {name: f"a {name.lower()}" for name in ("View", "Report", "Robot", "Figure")}
-    name = type(held).__name__
-    return words.get(name, shown(name))
 
 
 def detected_view(

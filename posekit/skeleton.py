@@ -28,6 +28,9 @@ HEAD_POINTS: Final = ("nose", "right_eye", "left_eye", "right_ear", "left_ear")
 POINTS: Final = JOINTS + HEAD_POINTS
 #: Points of the feet that files may have; the figure has no such joints.
 FEET_POINTS: Final = ("right_toe", "left_toe", "right_heel", "left_heel")
+
+#: Names that a point of a motion can have: joints, head points, toes and heels.
+NAMES: Final = (*POINTS, *FEET_POINTS)
 SIDES: Final = ("right", "left")
 
 JOINT: Final = {name: index for index, name in enumerate(JOINTS)}

@@ -14,8 +14,7 @@ import numpy as np
 from posekit.errors import nearest, refusal, shown
 from posekit.files import DATA, parse_toml, read_bytes
 from posekit.geometry import Array, cross, dot, unit
-from posekit.motion.motion import NAMES
-from posekit.skeleton import FEET_POINTS, POINTS, SIDES, other_side
+from posekit.skeleton import FEET_POINTS, NAMES, POINTS, SIDES, other_side
 
 FOLDER: Final = DATA / "layouts"
 #: Landmarks that are not joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
@@ -125,7 +124,7 @@ class Layout:
         Returns
         -------
         names : tuple of str (K,)
-            Of `posekit.motion.motion.NAMES`, in that order.
+            Of `posekit.skeleton.NAMES`, in that order.
         points : array (T, K, 3)
         derived : tuple of str
             The joints that no point of the file is.
@@ -154,7 +153,7 @@ def _middles(found: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _in_order(found: Mapping[str, Array], points: Array) -> tuple[tuple[str, ...], Array]:
-    """Stack landmarks in the order of `posekit.motion.motion.NAMES`, as the file's points are."""
+    """Stack landmarks in the order of `posekit.skeleton.NAMES`, as the file's points are."""
     placed = tuple(name for name in NAMES if name in found)
     return placed, np.stack([found[name] for name in placed], axis=-2) if placed else points[..., :0, :]
 

@@ -5,6 +5,8 @@ NaN marks an unknown value and propagates. A result never depends on the size of
 """
 
 from posekit.geometry.hulls import beyond_hull as beyond_hull
+from posekit.geometry.least_squares import into_bounds as into_bounds
+from posekit.geometry.least_squares import smoothed as smoothed
 from posekit.geometry.quaternions import quaternion_from_rotation as quaternion_from_rotation
 from posekit.geometry.quaternions import quaternion_log as quaternion_log
 from posekit.geometry.quaternions import quaternion_rotate as quaternion_rotate

@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal
 from posekit.geometry import UP_AXES, Array, Record, rotation_between, up_vector
-from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, POINTS
-
-NAMES: Final = (*POINTS, *FEET_POINTS)
-"""Names that a point of a motion can have: joints, head points, toes and heels."""
+from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, NAMES
 
 PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
 """Fields with one row a frame."""
@@ -103,9 +100,7 @@ class Motion(Record):
         for name in ("joint_names", "q_names", "clips", "notes", "warnings"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.joints is None and self.q is None:
-            raise refusal(
-                self._source, "joints", "neither joints nor q", "one of them", "give positions or q"
-            )
+            raise self._refused("joints", "neither joints nor q", "one of them", "give positions or q")
         rows = len(self.joints) if self.joints is not None else len(self.q)  # type: ignore[arg-type]
         self._store("joints", self.joints, (rows, len(self.joint_names), 3))
         self._store("q", self.q, (rows, len(self.q_names) or None))
@@ -117,17 +112,12 @@ class Motion(Record):
         unknown = [name for name in self.joint_names if name not in NAMES]
         if unknown or len(set(self.joint_names)) != len(self.joint_names):
             got = unknown[0] if unknown else "a name twice"
-            raise refusal(
-                self._source, "joint_names", got, f"each once of {', '.join(NAMES)}", "name the points so"
-            )
+            raise self._refused("joint_names", got, f"each once of {', '.join(NAMES)}", "name the points so")
         if self.up and self.up not in UP_AXES:
-            raise refusal(
-                self._source, "up", repr(self.up), f"one of {', '.join(UP_AXES)}", "give it with --up"
-            )
+            raise self._refused("up", repr(self.up), f"one of {', '.join(UP_AXES)}", "give it with --up")
 
-    @property
-    def _source(self) -> str:
-        return self.source or "motion"
+    def _refused(self, field_name: str, got: str, expected: str, remedy: str = "correct it") -> InputError:
+        return refusal(self.source or "motion", field_name, got, expected, remedy)
 
     def _store(self, name: str, given: Any, shape: tuple[int | None, ...], dtype: Any = np.float64) -> None:
         """Store a read-only copy of an array after checking its shape; None stays None."""
@@ -136,19 +126,17 @@ class Motion(Record):
         try:
             values = np.array(given, dtype=dtype)
         except (TypeError, ValueError) as error:
-            raise refusal(self._source, name, str(error), "numbers", "give one row a frame") from None
+            raise self._refused(name, str(error), "numbers", "give one row a frame") from None
         fits = values.ndim == len(shape) and all(
             want in (None, have) for want, have in zip(shape, values.shape, strict=False)
         )
         if not fits:
             wanted = " x ".join("any" if extent is None else str(extent) for extent in shape)
             got = " x ".join(map(str, values.shape))
-            raise refusal(self._source, name, f"shape {got}", f"shape {wanted}", "give one row a frame")
+            raise self._refused(name, f"shape {got}", f"shape {wanted}", "give one row a frame")
         if np.isinf(values).any():
             where = tuple(int(index) for index in np.argwhere(np.isinf(values))[0])
-            raise refusal(
-                self._source, f"{name}{list(where)}", "an infinite number", "a finite number or NaN"
-            )
+            raise self._refused(f"{name}{list(where)}", "an infinite number", "a finite number or NaN")
         self._set(name, values)
 
     def _counted(self) -> NDArray[np.intp]:
@@ -225,8 +213,7 @@ class Motion(Record):
         for index in np.unique(np.asarray(self.clip)):
             name = self.clips[index] if index < len(self.clips) else ""
             rows = self.clip == index
-            whole = bool(np.all(rows))
-            yield name, self if whole else replace(self.take(rows), clip=None, clips=(name,))
+            yield name, self if np.all(rows) else replace(self.take(rows), clip=None, clips=(name,))
 
     def rotated(self, up: str) -> Motion:
         """Return the motion in a world whose `up` axis points up; configurations are left out.
@@ -239,8 +226,6 @@ class Motion(Record):
         if up == self.up or self.joints is None:
             return self
         if not self.up or up not in UP_AXES:
-            raise InputError(
-                f"{self._source}: up: got {self.up!r} to {up!r}; expected known axes; give it with --up"
-            )
+            raise self._refused("up", f"{self.up!r} to {up!r}", "known axes", "give it with --up")
         R = rotation_between(up_vector(self.up), up_vector(up))
         return replace(self, joints=self.joints @ R.T, up=up, q=None, q_names=(), robot="", document=None)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -12,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, LengthUncertainty, load_figure
+from posekit.body import LengthUncertainty, load_figure
 from posekit.errors import InputError, refusal
 from posekit.formats.options import facts_of
+from posekit.inputs import are_paths, files_of, kind_of, names_below, new_folder
 from posekit.motion.motion import Motion
 from posekit.progress import watched
 from posekit.settings import EXACT, Tolerance, ValidateSettings, number, stated
@@ -23,9 +23,6 @@ from posekit.validators.report import GROUND_NOTE, ClipDecision, Report, clip_ro
 
 if TYPE_CHECKING:
     from posekit.recovery import Recovery
-
-#: Endings of files in folders that hold no motion.
-SKIPPED: Final = ".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .lock".split()
 
 #: Name of the table of clips in a folder of kept clips.
 CLIP_TABLE: Final = "clips.csv"
@@ -103,59 +100,6 @@ def validate(
     return report
 
 
-def are_paths(given: Any) -> bool:
-    """Tell whether a path or several are given."""
-    several = given if isinstance(given, list | tuple) and given else [given]
-    return all(isinstance(one, str | os.PathLike) for one in several)
-
-
-def files_of(given: Any) -> Iterator[Path]:
-    """Yield the files that paths, folders and patterns stand for.
-
-    Raises
-    ------
-    InputError
-        If a path does not exist or a folder or pattern has no file.
-    """
-    for one in [given] if isinstance(given, str | os.PathLike) else given:
-        path = Path(one)
-        if path.is_file():
-            yield path
-            continue
-        if path.is_dir():
-            found = list(_below(path))
-        else:
-            found = (
-                sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
-                if "*" in str(path)
-                else []
-            )
-        if not found:
-            what = "a folder without files of motion" if path.is_dir() else "no file"
-            raise refusal(one, "", what, "a file, a folder of files, or a pattern", "check the path")
-        yield from found
-
-
-def _below(folder: Path) -> Iterator[Path]:
-    """Yield the files below a folder; a detector's folder, with one file a picture, is one input."""
-    from posekit.formats.keypoints import looks_like
-
-    inside = [one for one in sorted(folder.iterdir()) if not _is_hidden(one, folder)]
-    if inside and all(one.is_file() and one.suffix == ".json" for one in inside) and looks_like(folder):
-        yield folder
-        return
-    for one in inside:
-        if one.is_dir():
-            yield from _below(one)
-        elif one.is_file():
-            yield one
-
-
-def _is_hidden(file: Path, folder: Path) -> bool:
-    parts = file.relative_to(folder).parts
-    return any(part.startswith((".", "__")) for part in parts) or file.suffix.lower() in SKIPPED
-
-
 class Judge:
     """The body and the settings that judge, loaded once for all files.
 
@@ -225,14 +169,18 @@ class Judge:
         figure = load_figure()
         if recovery.lengths:
             figure = figure.scaled(recovery.lengths, behind={"behind": True, "front": False}.get(side))
-        exact, loose, margin = _allowed(recovery.tolerances, settings.contact_margin)
-        motion, noisy = recovery.motion("all"), np.asarray(recovery.survivors.chi2) > 0
+        exact = recovery.tolerances.get("tolerated", recovery.tolerances.get("exact"))
+        noisy, sided, margin = recovery.tolerances.get("noisy", {}), figure, settings.contact_margin
+        if "by_segment" in noisy:
+            sided = figure.with_side_within(LengthUncertainty(common=noisy["size"], own=noisy["by_segment"]))
+        loose = noisy.get("certified", exact), noisy.get("contact_margin", margin), sided
+        motion, solved = recovery.motion("all"), np.asarray(recovery.survivors.chi2) > 0
         reports = []
-        for rows, tolerance, contact in ((~noisy, exact, settings.contact_margin), (noisy, loose, margin)):
+        for rows, (allowed, contact, body) in ((~solved, (exact, margin, figure)), (solved, loose)):
             if rows.any():
                 asked = settings.changed(**{"contact_margin": contact, **self.changes})
                 part = replace(motion.take(rows), q=None, q_names=(), robot="")
-                body = figure if tolerance is exact else _sided(figure, recovery.tolerances)
+                tolerance = Tolerance(**allowed) if allowed else EXACT
                 reports.append(validate_motion(part, asked, figure=body, tolerance=tolerance))
         if not reports:
             raise refusal(recovery.source or "result", "", "no posture", "at least one", "recover again")
@@ -240,22 +188,6 @@ class Judge:
 
 
 SHARED: Final = ("checks", "ranges", "rules", "walkers", "contact_margin")
-
-
-def _allowed(tolerances: Mapping[str, Any], margin: float) -> tuple[Tolerance, Tolerance, float]:
-    """Return the tolerance of exact frames, and tolerance and contact margin of noisy ones, as a result has them."""
-    exact, noisy = tolerances.get("tolerated", tolerances.get("exact")), tolerances.get("noisy", {})
-    loose = noisy.get("certified", exact)
-    made = [Tolerance(**one) if one else EXACT for one in (exact, loose)]
-    return made[0], made[1], float(noisy.get("contact_margin", margin))
-
-
-def _sided(figure: Figure, tolerances: Mapping[str, Any]) -> Figure:
-    """Return the figure as far as uncertain lengths determine the side of its shoulders."""
-    noisy = tolerances.get("noisy", {})
-    if "by_segment" not in noisy:
-        return figure
-    return figure.with_side_within(LengthUncertainty(common=noisy["size"], own=noisy["by_segment"]))
 
 
 def in_order(motion: Motion, validator: Validator) -> Motion:
@@ -277,8 +209,7 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
     import posekit
 
     reports: list[Report] = []
-    refused: list[str] = []
-    skipped: list[str] = []
+    refused, skipped = list[str](), list[str]()
     for path in watched(paths, "judging"):
         try:
             held: Any = posekit.open(path, **facts, urdf=judge.name)
@@ -287,9 +218,8 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
                 report = judge.report(held)
                 reports.append(replace(report, files=(str(path),) * len(report.files)))
             elif len(paths) == 1:
-                got = OTHERS.get(type(held).__name__, "no motion")
                 remedy = f"recover postures first: posekit recover {path} -o RESULT"
-                raise refusal(path, "", got, "postures or motion", remedy)
+                raise refusal(path, "", kind_of(held), "postures or motion", remedy)
             else:
                 skipped.append(path.name)
         except InputError as error:
@@ -315,16 +245,6 @@ def _of_file(report: Report) -> tuple[str, ...]:
     return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
 
 
-#: Other objects than motion that a file can hold, in words.
-OTHERS: Final = {
-    "Detections": "key points",
-    "View": "a view",
-    "dict": "cameras",
-    "Report": "a report",
-    "Robot": "a robot",
-}
-
-
 def _is_view(path: Path) -> bool:
     """Tell whether a file is a view of another object than a person, which holds no motion."""
     return path.suffix.lower() == ".json" and b"posekit.view/1" in path.read_bytes()[:200]
@@ -336,14 +256,6 @@ def refuse_without_joints(held: Any, path: Path) -> None:
         got = "no joint of a body among its points"
         remedy = "say which point is which joint with --layout FILE.toml"
         raise refusal(path, "", got, "named joints or markers", remedy)
-
-
-def new_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return the path of a new or empty folder; refuse one that holds something."""
-    path = Path(folder)
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise refusal(path, "", "something that exists", "a new or empty folder", "name another")
-    return path
 
 
 def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None) -> str:
@@ -443,10 +355,3 @@ def _cut(source: str, target: Path, rows: NDArray[np.intp]) -> None:
     kept = motion.take(rows)
     time = np.asarray(kept.time)
     posekit.save(replace(kept, time=time - time[0], frame=None), target)
-
-
-def names_below(files: Iterable[str]) -> dict[str, Path]:
-    """Return the name of each file below the folder that all of them are in."""
-    absolute = {file: Path(os.path.normpath(Path(file).absolute())) for file in files}
-    common = os.path.commonpath([path.parent for path in absolute.values()]) if absolute else ""
-    return {file: path.relative_to(common) for file, path in absolute.items()}

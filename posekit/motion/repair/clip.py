@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
@@ -11,12 +11,8 @@ from typing import Any, Final, Self
 
 import numpy as np
 import pinocchio as pin
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
-from posekit.geometry import Array, Flags, Ints, align, unit
-from posekit.motion.motion import NAMES, Motion
-from posekit.motion.repair.pieces import (
+from posekit.body.pieces import (
     FEET,
     HEAD_PIECE,
     HINGES,
@@ -27,39 +23,31 @@ from posekit.motion.repair.pieces import (
     PIECE_PARENTS,
     TORSO_PIECE,
     TRUNK,
-    between,
     carried,
     moved,
-    near_good,
     placed,
     turned,
     vectors_of,
 )
-from posekit.skeleton import JOINTS, POINTS
+from posekit.geometry import Array, Flags, Ints, align, into_bounds, smoothed, unit
+from posekit.motion.motion import Motion
+from posekit.skeleton import JOINTS, NAMES, POINTS
 from posekit.validators.body import MADE_UP_METRES, Body
 from posekit.validators.check import Check, NotAskedError, judged
 from posekit.validators.judge import Validator, chosen_checks
 from posekit.validators.report import Report
 from posekit.validators.robot import sole_points
 
-#: Motion whose acceleration changes evenly is not changed by smoothing.
-THIRD_DIFFERENCE: Final = (-1.0, 3.0, -3.0, 1.0)
-#: Weight of a frame that stays, beside that of one that is smoothed.
-STAYS: Final = 1e9
 #: Times that the way from a posture that passes to one that does not is halved.
 HALVINGS: Final = 7
+#: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
+MOST_CONTINUED: Final = 3
 #: Metres that a degree counts as: about the way of a limb's end.
 METRES_A_DEGREE: Final = 0.3 * np.pi / 180
 #: Distance inside its bounds to which a posture is pushed, metres or radians: rounding in a file does not reject it.
 INSIDE_METRES: Final = 5e-6
 #: Distance by which bodies of robots are moved apart beyond their margin, metres: depths of meshes are known to 1e-5.
 DEPTH_METRES: Final = 5e-5
-#: Steps of a push, bounds that one considers, and the largest change in one, radians or metres.
-PUSHES, MOST_BOUNDS, MOST_STEP = 12, 12, 0.2
-#: Step by which margins are differentiated, radians or metres.
-DIFFERENCE: Final = 1e-3
-#: Added to the diagonal of the normal matrix of a step, m²/rad²: bounds that nothing moves demand nothing.
-SOFTNESS: Final = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +61,7 @@ class Clip:
     validator : Validator
         The judge.
     state : array (T, …)
-        Points (T, P, 3) in the order of `posekit.motion.motion.NAMES`, or a robot's configurations (T, nq).
+        Points (T, P, 3) in the order of `posekit.skeleton.NAMES`, or a robot's configurations (T, nq).
     time : array (T,)
         Seconds.
     rows : int array (T,)
@@ -247,13 +235,13 @@ class Clip:
         body = Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
         every, limbs = range(3 * N_PIECES), range(3 * HEAD_PIECE, 3 * N_PIECES)
         state, joints = placed(vectors)[rows], range(3 * len(JOINTS))
-        state = pushed(state, moved, len(joints), joints, partial(self.margins, body, rigid=True))
+        state = into_bounds(state, moved, len(joints), joints, partial(self.margins, body, rigid=True))
         for free in (limbs, every):
-            state = pushed(state, turned, 3 * N_PIECES, free, partial(self.margins, body, rigid=False))
+            state = into_bounds(state, turned, 3 * N_PIECES, free, partial(self.margins, body, rigid=False))
         return state
 
     def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
-        """Return margins (n, K) of lengths, or of all else, as metres; infinite where undecided."""
+        """Return margins (n, K) inside the bounds of lengths, or of all else, as metres; infinite where undecided."""
         joints, head, feet = np.split(points, [len(JOINTS), len(POINTS)], axis=1)
         these = replace(body, joints=joints, head=head, feet=feet, motion=False)
         vars(these)["person"] = body.person  # that of the whole clip, not of these postures
@@ -262,7 +250,7 @@ class Clip:
             if (check.name == "rigid-parts") == rigid:
                 scale = METRES_A_DEGREE if check.unit == "deg" else 1.0
                 with suppress(NotAskedError):
-                    found.append(scale * judged(check, these).margin)
+                    found.append(scale * judged(check, these).margin - INSIDE_METRES)
         every = np.concatenate(found, axis=1)
         return np.where(np.isnan(every), np.inf, every)
 
@@ -299,8 +287,7 @@ class Clip:
 
     def invalid(self, rows: Ints) -> Flags:
         """Return which of some frames (n,) checks of postures reject; a person is measured in all frames."""
-        report = self.report(over_time=False)
-        return report.invalid[rows]
+        return self.report(over_time=False).invalid[rows]
 
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
         """Return good states for some frames: between those that pass, and the nearest; else the body at rest."""
@@ -336,65 +323,29 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
     return out if places else out[:, 0]
 
 
-def pushed(
-    state: Array,
-    moved: Callable[[Array, Array], Array],
-    size: int,
-    free: Sequence[int],
-    margins: Callable[[Array], Array],
-) -> Array:
-    """Push states (n, …) inside bounds by the shortest steps: Newton's method on the margins that are negative.
+def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
+    """Return bad frames, the good ones before and after each, and the share (n,) of the way between them.
 
-    Parameters
-    ----------
-    state : array (n, …)
-    moved : callable
-        From states and steps (n, size) to states.
-    size : int
-        Number of entries of a step.
-    free : sequence of int
-        Entries that may change.
-    margins : callable
-        From states to margins (n, K), metres, negative where violated. Their slopes are differences.
+    At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
+    frames the result is empty.
     """
-    for _ in range(PUSHES):
-        margin = margins(state) - INSIDE_METRES
-        worst = np.argsort(margin, axis=1)[:, :MOST_BOUNDS]
-        value = np.minimum(np.take_along_axis(margin, worst, axis=1), 0.0)
-        rows = np.flatnonzero(value.any(axis=1))
-        if not rows.size:
-            break
-        value, worst, near = value[rows], worst[rows], state[rows]
-        slope = np.zeros((*value.shape, size))
-        for k in free:
-            there = (
-                margins(moved(near, np.tile(DIFFERENCE * np.eye(size)[k], (len(rows), 1)))) - INSIDE_METRES
-            )
-            change = np.minimum(np.take_along_axis(there, worst, axis=1), 0.0) - value
-            slope[..., k] = np.where(value < 0, change / DIFFERENCE, 0.0)
-        transposed = slope.swapaxes(1, 2)
-        normal = slope @ transposed + SOFTNESS * np.eye(value.shape[1])
-        step = -(transposed @ np.linalg.solve(normal, value[..., None]))[..., 0]
-        state = state.copy()
-        state[rows] = moved(near, np.clip(step, -MOST_STEP, MOST_STEP))
-    return state
+    good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
+    if len(good) < 2:
+        return rows[:0], rows[:0], rows[:0], np.empty(0)
+    place = np.clip(np.searchsorted(good, rows), 1, len(good) - 1)
+    before, after = good[place - 1], good[place]
+    return rows, before, after, (rows - before) / (after - before)
 
 
-def smoothed(values: Array, loose: Flags, strength: float) -> Array:
-    r"""Smooth the columns of values (T, K, …) in the frames in which they are loose (T, K).
-
-    Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the loose frames (Whittaker 1923; Eilers 2003, *A perfect
-    smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
-    """
-    count, out = len(values), values.copy()
-    if count < len(THIRD_DIFFERENCE):
-        return out
-    difference = sparse.diags_array(THIRD_DIFFERENCE, offsets=range(4), shape=(count - 3, count))
-    for k in np.flatnonzero(loose.any(axis=0)).tolist():
-        weight = sparse.diags_array(np.where(loose[:, k], 1.0, STAYS))
-        found = spsolve((weight + strength * difference.T @ difference).tocsc(), weight @ values[:, k])
-        out[loose[:, k], k] = found[loose[:, k]]
-    return out
+def near_good(bad: Flags) -> Flags:
+    """Return the bad frames (T,) that their neighbours can replace: at an end of the clip only a few."""
+    good = np.flatnonzero(~bad)
+    found = bad.copy()
+    if len(good) and good[0] > MOST_CONTINUED:
+        found[: good[0]] = False
+    if len(good) and len(bad) - 1 - good[-1] > MOST_CONTINUED:
+        found[good[-1] :] = False
+    return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -496,7 +447,7 @@ class RobotClip(Clip):
         def margins(state: Array) -> Array:
             out = np.full((len(state), max(len(robot.collision_pairs), 1)), np.inf)
             found = robot.collisions(state, margin=max(margin, 0.0))
-            out[found.frame, found.pair] = found.distance - margin - DEPTH_METRES
+            out[found.frame, found.pair] = found.distance - margin - DEPTH_METRES - INSIDE_METRES
             return out
 
         moving = np.ptp(self.state[self.placed()], axis=0) > 0 if self.motion.in_time else np.ones(model.nq)
@@ -507,4 +458,4 @@ class RobotClip(Clip):
         ]
         free = [model.idx_vs[joint] + k for joint in used for k in range(model.nvs[joint])]
         state = moved(self.state[rows], np.zeros((len(rows), model.nv)))
-        return pushed(state, moved, model.nv, free, margins)
+        return into_bounds(state, moved, model.nv, free, margins)

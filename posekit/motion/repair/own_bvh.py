@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from posekit.body.pieces import HEAD_PIECE, HIPS_PIECE, TORSO_PIECE, TRUNK, turns_between
 from posekit.formats.bvh import UNITS, Bvh, parse, positions_are_absolute, read, with_values, world_points
 from posekit.formats.options import Options
 from posekit.geometry import Array, Flags, Ints, turned_near
-from posekit.motion.motion import NAMES, Motion
-from posekit.motion.repair.clip import Clip
-from posekit.motion.repair.pieces import HEAD_PIECE, HIPS_PIECE, TORSO_PIECE, TRUNK, between, turns_between
-from posekit.skeleton import JOINTS, LIMB_JOINTS, SIDES
+from posekit.motion.motion import Motion
+from posekit.motion.repair.clip import Clip, between
+from posekit.skeleton import JOINTS, LIMB_JOINTS, NAMES, SIDES
 
 #: Distance below which a node of a hierarchy is a joint of ours.
 SAME_METRES: Final = 1e-6

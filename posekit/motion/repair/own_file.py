@@ -151,20 +151,17 @@ def _columns_of(
 
 def _apart(values: Array, wanted: Array) -> Array:
     """Return the largest difference over the frames where something is known; infinite where nothing is."""
-    known = np.broadcast_to(
-        np.isfinite(wanted), values.shape[:1] + np.broadcast_shapes(values.shape[1:], wanted.shape[1:])
-    )
-    off = np.where(known, np.nan_to_num(np.abs(values - wanted), nan=np.inf), 0.0).max(axis=0, initial=0.0)
+    off = np.abs(values - wanted)
+    known = np.isfinite(wanted) | np.zeros(off.shape, dtype=np.bool_)
+    off = np.where(known, np.nan_to_num(off, nan=np.inf), 0.0).max(axis=0, initial=0.0)
     return np.where(known.any(axis=0), off, np.inf)
 
 
 def _euler(motion: Motion) -> dict[str, Any]:
     """Return the fields by which a robot's table writes the root's rotation as angles; empty if it has none."""
-    turn = (
-        load_layout(motion.layout).fields.get("rotation", {})
-        if motion.q is not None and motion.layout
-        else {}
-    )
+    if motion.q is None or not motion.layout:
+        return {}
+    turn: dict[str, Any] = load_layout(motion.layout).fields.get("rotation", {})
     return turn if "euler" in turn else {}
 
 

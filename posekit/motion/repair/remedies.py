@@ -9,11 +9,10 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from posekit.body.pieces import placed, vectors_of
 from posekit.geometry import Array, Ints, runs
-from posekit.motion.motion import NAMES
 from posekit.motion.repair.clip import Clip, RobotClip, rejected
-from posekit.motion.repair.pieces import placed, vectors_of
-from posekit.skeleton import JOINTS, LIMB_SEGMENTS, SIDES, other_side, segment_name
+from posekit.skeleton import JOINTS, LIMB_SEGMENTS, NAMES, SIDES, other_side, segment_name
 from posekit.validators.motion.sides import SIDE_PAIRS
 from posekit.validators.report import Report, rank_of
 

@@ -17,20 +17,13 @@ from posekit.files import write_bytes
 from posekit.formats.bvh import Bvh
 from posekit.formats.options import Options, facts_of
 from posekit.geometry import Record
+from posekit.inputs import are_paths, files_of, kind_of, names_below, new_folder
 from posekit.motion.motion import PER_FRAME, Motion
 from posekit.motion.repair.clip import Clip, RobotClip
 from posekit.motion.repair.own_bvh import in_bvh
 from posekit.motion.repair.own_file import in_own_file
 from posekit.motion.repair.remedies import mended
-from posekit.motion.validation import (
-    Judge,
-    are_paths,
-    files_of,
-    in_order,
-    names_below,
-    new_folder,
-    refuse_without_joints,
-)
+from posekit.motion.validation import Judge, in_order, refuse_without_joints
 from posekit.progress import watched
 from posekit.settings import ValidateSettings, stated
 from posekit.skeleton import JOINTS
@@ -180,7 +173,7 @@ def _opened(path: Path, facts: dict[str, Any]) -> Motion:
 
     held = posekit.open(path, **facts)
     if not isinstance(held, Motion):
-        raise refusal(path, "", f"a {type(held).__name__}", "postures or motion", "give a file of motion")
+        raise refusal(path, "", kind_of(held), "postures or motion", "give a file of motion")
     refuse_without_joints(held, path)
     return held
 

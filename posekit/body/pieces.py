@@ -12,15 +12,12 @@ import numpy as np
 
 from posekit.geometry import (
     Array,
-    Flags,
-    Ints,
     best_rotation,
     rotation_between,
     rotation_from_vector,
     unit,
     vector_from_rotation,
 )
-from posekit.motion.motion import NAMES
 from posekit.skeleton import (
     HEAD,
     HIPS,
@@ -28,6 +25,7 @@ from posekit.skeleton import (
     JOINTS,
     LIMB_JOINTS,
     N_TRUNK_JOINTS,
+    NAMES,
     PARENTS,
     POINTS,
 )
@@ -47,8 +45,6 @@ PIECE_PARENTS: Final = (
 )
 #: Middle and end joint of the hinges, by the names of their angles.
 HINGES: Final = {f"{JOINTS[middle]}.flexion": (middle, end) for _, middle, end in LIMB_JOINTS}
-#: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
-MOST_CONTINUED: Final = 3
 
 
 def _piece_of_points() -> list[int]:
@@ -120,28 +116,3 @@ def carried(start: Array, end: Array, share: Array) -> Array:
     turn = vector_from_rotation(turns_between(start, end)).reshape(len(start), 3 * N_PIECES)
     shift = end[:, :1] - start[:, :1]
     return turned(start, share[:, None] * turn) + share[:, None, None] * shift
-
-
-def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
-    """Return bad frames, the good ones before and after each, and the share (n,) of the way between them.
-
-    At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
-    frames the result is empty.
-    """
-    good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
-    if len(good) < 2:
-        return rows[:0], rows[:0], rows[:0], np.empty(0)
-    place = np.clip(np.searchsorted(good, rows), 1, len(good) - 1)
-    before, after = good[place - 1], good[place]
-    return rows, before, after, (rows - before) / (after - before)
-
-
-def near_good(bad: Flags) -> Flags:
-    """Return the bad frames (T,) that their neighbours can replace: at an end of the clip only a few."""
-    good = np.flatnonzero(~bad)
-    found = bad.copy()
-    if len(good) and good[0] > MOST_CONTINUED:
-        found[: good[0]] = False
-    if len(good) and len(bad) - 1 - good[-1] > MOST_CONTINUED:
-        found[good[-1] :] = False
-    return found

@@ -1,0 +1,89 @@
+"""Files that a user names by paths, folders and patterns; what they hold; names for files made from them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from posekit.errors import refusal, shown
+
+#: Suffixes of files in folders that hold neither motion nor key points.
+SKIPPED: Final = ".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .lock".split()
+
+
+def are_paths(given: Any) -> bool:
+    """Tell whether a path or several are given."""
+    several = given if isinstance(given, list | tuple) and given else [given]
+    return all(isinstance(one, str | os.PathLike) for one in several)
+
+
+def files_of(given: Any) -> Iterator[Path]:
+    """Yield the files that paths, folders and patterns stand for.
+
+    Raises
+    ------
+    InputError
+        If a path does not exist or a folder or pattern has no file.
+    """
+    for one in [given] if isinstance(given, str | os.PathLike) else given:
+        path = Path(one)
+        if path.is_file():
+            yield path
+            continue
+        if path.is_dir():
+            found = list(_below(path))
+        else:
+            found = (
+                sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
+                if "*" in str(path)
+                else []
+            )
+        if not found:
+            what = "a folder without files of motion" if path.is_dir() else "no file"
+            raise refusal(one, "", what, "a file, a folder of files, or a pattern", "check the path")
+        yield from found
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Yield the files below a folder; a detector's folder, with one file a picture, is one input."""
+    from posekit.formats.keypoints import looks_like
+
+    inside = [one for one in sorted(folder.iterdir()) if not _is_hidden(one, folder)]
+    if inside and all(one.is_file() and one.suffix == ".json" for one in inside) and looks_like(folder):
+        yield folder
+        return
+    for one in inside:
+        if one.is_dir():
+            yield from _below(one)
+        elif one.is_file():
+            yield one
+
+
+def _is_hidden(file: Path, folder: Path) -> bool:
+    parts = file.relative_to(folder).parts
+    return any(part.startswith((".", "__")) for part in parts) or file.suffix.lower() in SKIPPED
+
+
+def names_below(files: Iterable[str]) -> dict[str, Path]:
+    """Return the name of each file below the folder that all of them are in."""
+    absolute = {file: Path(os.path.normpath(Path(file).absolute())) for file in files}
+    common = os.path.commonpath([path.parent for path in absolute.values()]) if absolute else ""
+    return {file: path.relative_to(common) for file, path in absolute.items()}
+
+
+def new_folder(folder: str | os.PathLike[str]) -> Path:
+    """Return the path of a new or empty folder; refuse one that holds something."""
+    path = Path(folder)
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise refusal(path, "", "something that exists", "a new or empty folder", "name another")
+    return path
+
+
+def kind_of(held: Any) -> str:
+    """Return what an opened file holds, in words."""
+    words = {"dict": "cameras", "Recovery": "a result", "Detections": "key points", "Motion": "motion"}
+    words |= {name: f"a {name.lower()}" for name in ("View", "Report", "Robot", "Figure")}
+    name = type(held).__name__
+    return words.get(name, shown(name))
