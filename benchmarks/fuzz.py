@@ -155,7 +155,7 @@ def write_seeds(folder: Path, data: list[Path]) -> list[Path]:
     for ending in RESULT_ENDINGS:
         posekit.save(result, folder / f"result.{ending}")
     posekit.save(posekit.validate(folder / "jump.bvh"), folder / "report.json")
-    shutil.copy(find("figure").urdf, folder / "figure.urdf")
+    shutil.copy(find("figure")[1], folder / "figure.urdf")
     for number, file in enumerate(files_below(data)):
         if file.stat().st_size < LARGEST_SEED:
             shutil.copy(file, folder / f"{number}.{file.name}")

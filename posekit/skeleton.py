@@ -84,6 +84,22 @@ LIMB_JOINTS: Final = tuple(
 #: Upper arms, forearms, thighs and shanks, limb by limb, by their two joints.
 LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
 
+#: Parts of the body with a limb or a trunk segment inside, named as the figure's links, and the joints at their ends.
+PARTS: Final = {
+    "torso": ("neck", "pelvis"),
+    "hips": ("right_hip", "left_hip"),
+    **{
+        f"{side}_{part}": (f"{side}_{start}", f"{side}_{end}")
+        for side in SIDES
+        for part, start, end in (
+            ("upper_arm", "shoulder", "elbow"),
+            ("forearm", "elbow", "wrist"),
+            ("thigh", "hip", "knee"),
+            ("shank", "knee", "ankle"),
+        )
+    },
+}
+
 #: Number of joints of torso and hips: the first of the tree, from which limbs start.
 N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 

@@ -434,8 +434,13 @@ def test_pairs_of_an_srdf() -> None:
     srdf = '<robot name="r"><disable_collisions link1="a" link2="b"/><disable_collisions link1="c" link2="b"/></robot>'
     robot = Robot(urdf=urdf, srdf=srdf)
     assert robot.collision_pairs == (("a_0", "c_0"),)
+    # Variants of a robot share an SRDF: links of others are passed over, an SRDF of another robot is refused.
+    assert Robot(urdf=urdf, srdf=srdf.replace('"c"', '"z"')).collision_pairs == (
+        ("a_0", "c_0"),
+        ("b_0", "c_0"),
+    )
     with pytest.raises(InputError, match="link"):
-        Robot(urdf=urdf, srdf=srdf.replace('"c"', '"z"'))
+        Robot(urdf=urdf, srdf='<robot name="r"><disable_collisions link1="x" link2="y"/></robot>')
     # Without an SRDF neighbours are left out, and bodies that touch at neutral.
     assert Robot(urdf=urdf).collision_pairs == (("a_0", "c_0"),)
     assert Robot(urdf=urdf.replace('"0.1"/>', '"0.5"/>')).collision_pairs == ()

@@ -10,8 +10,7 @@ import numpy as np
 
 from posekit.errors import FigureError, refusal, shown
 from posekit.geometry import Array, cross, unit
-from posekit.robots.capsules import PARTS
-from posekit.skeleton import HEAD, JOINT
+from posekit.skeleton import HEAD, JOINT, PARTS
 
 if TYPE_CHECKING:
     import pinocchio as pin

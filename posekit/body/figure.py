@@ -32,7 +32,6 @@ from posekit.errors import FigureError, refusal, shown
 from posekit.files import DATA
 from posekit.geometry import Array, Ints, coordinate_rotation, frame_along, read_only, unit
 from posekit.geometry.quaternions import quaternion_from_rotation, rotation_from_quaternion
-from posekit.robots.capsules import PARTS
 from posekit.robots.robot import Robot, read_text
 from posekit.skeleton import (
     DOFS,
@@ -42,6 +41,7 @@ from posekit.skeleton import (
     JOINT,
     JOINTS,
     LIMB_SEGMENTS,
+    PARTS,
     POINTS,
     TORSO,
     segment_name,
@@ -475,7 +475,7 @@ def load_figure(path: str | Path | None = None) -> Figure:
     beside = Path(path).with_suffix(".srdf")
     if beside.exists():
         return Figure(urdf=read_text(path), srdf=read_text(beside), source=str(path))
-    return Figure(urdf=read_text(path), srdf=_built_in().srdf, source=str(path), shared_srdf=True)
+    return Figure(urdf=read_text(path), srdf=_built_in().srdf, source=str(path))
 
 
 def _figure(settings: dict[str, Any]) -> Figure:

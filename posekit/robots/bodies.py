@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
@@ -15,17 +14,12 @@ import numpy as np
 import pinocchio as pin
 
 from posekit.errors import cut, refusal, shown
-from posekit.robots.urdf import Element, need, parse_xml, text_with
+from posekit.robots.urdf import MAX_NUMBER, Element, need, parse_xml, text_with
 
 Kind = Literal["collision", "visual"]
-KINDS: Final = {"collision": pin.GeometryType.COLLISION, "visual": pin.GeometryType.VISUAL}
 
 #: Bytes of all meshes of a robot: about two million triangles of STL.
 MAX_MESHES_BYTES: Final = 100_000_000
-#: Largest coordinate of a mesh; coal accepts NaN silently.
-MAX_COORDINATE: Final = 1e6
-#: Bytes of a line of an OBJ file; the time to triangulate a face grows with the square of its corners.
-MAX_LINE: Final = 65_536
 STL_HEADER, STL_TRIANGLE = 84, 50
 
 
@@ -61,8 +55,9 @@ def build_bodies(
             mesh.set("filename", str(path))
     total, most = sum(sizes.values()) / 1e6, MAX_MESHES_BYTES / 1e6
     need(source, total <= most, "", f"meshes of {total:,.0f} MB", f"at most {most:,.0f} MB", "simplify them")
+    form = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
     try:
-        geometry = pin.buildGeomFromUrdfString(model, text_with(resolved, kind), KINDS[kind])
+        geometry = pin.buildGeomFromUrdfString(model, text_with(resolved, kind), form)
     except (ValueError, RuntimeError) as error:
         message = str(error).rpartition("message: ")[2].strip().splitlines()[0]
         got = f"a {kind} body that cannot be loaded ({cut(message.rpartition('/')[2])})"
@@ -70,9 +65,11 @@ def build_bodies(
     for body in geometry.geometryObjects:
         mesh, place = body.geometry, f"link {link_of(model, body)!r}"
         if isinstance(mesh, coal.BVHModelBase):
-            ok = mesh.num_tris > 0 and (np.abs(mesh.vertices()) <= MAX_COORDINATE).all()
-            expected = f"coordinates up to {MAX_COORDINATE:,.0f}"
-            need(source, ok, place, "a mesh with other vertices", expected, "export it again")
+            # coal accepts NaN silently.
+            ok = mesh.num_tris > 0 and (np.abs(mesh.vertices()) <= MAX_NUMBER).all()
+            need(
+                source, ok, place, "a mesh with other vertices", f"up to {MAX_NUMBER:g} m", "export it again"
+            )
     return geometry
 
 
@@ -117,31 +114,28 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
 
 
 def _check_mesh_file(path: Path) -> int:
-    """Return the size of a mesh file; refuse files that would exhaust a native reader or lead it elsewhere."""
+    """Return the size of a mesh file; refuse files that would exhaust a native reader."""
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
     ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
     expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"
     check(ok, "", f"{size:,} bytes of {suffix or 'no kind'}", expected, "convert or simplify it")
     data = path.read_bytes()
-    if suffix == ".stl":
+    if suffix == ".stl" and not data.lstrip().startswith(b"solid"):
         declared = int.from_bytes(data[80:STL_HEADER], "little")
         ok = STL_HEADER + declared * STL_TRIANGLE <= size and declared > 0
         got = f"{declared:,} triangles in {size:,} bytes"
-        check(ok or data.lstrip().startswith(b"solid"), "", got, "an STL file", "export the mesh again")
-    elif suffix == ".dae":
-        tags = [part.tag for part in parse_xml(data.decode("utf-8", "replace"), path).iter()]
-        nested = any(tag.endswith("instance_node") for tag in tags)
-        check(not nested, "", "nodes that place other nodes", "a mesh", "export it with its nodes resolved")
-    else:
-        longest = max(map(len, re.split(rb"[\r\n]+", data)))
-        check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
-    # The native reader goes by the content: any file may name a material library, which it would open.
-    for library in re.findall(rb"^[ \t]*mtllib[ \t]*(.*?)\s*$", data, re.MULTILINE):
-        plain = re.fullmatch(rb"(\./)?\w[\w. -]*", library)
-        check(plain, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")
+        check(ok, "", got, "an STL file", "export the mesh again")
+    if suffix == ".dae":
+        parse_xml(data.decode("utf-8", "replace"), path)
     return size
 
 
 def link_of(model: pin.Model, body: pin.GeometryObject) -> str:
     """Return the link that carries a body."""
     return str(model.frames[body.parentFrame].name)
+
+
+def first_link(model: pin.Model, joint: int) -> int:
+    """Return the frame of the first link on a joint."""
+    frames = enumerate(model.frames)
+    return next(k for k, one in frames if one.parentJoint == joint and one.type == pin.FrameType.BODY)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -13,32 +12,14 @@ import pinocchio as pin
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.robots.bodies import build_bodies, link_of
-from posekit.skeleton import SIDES
+from posekit.robots.bodies import build_bodies, first_link, link_of
+from posekit.skeleton import PARTS
 
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
 
 #: Metres: a shorter part gets no capsule.
 SHORTEST: Final = 1e-3
-
-BODY: Final = pin.FrameType.BODY
-
-#: Parts of a humanoid, named as the stick figure's links, and the joints at their ends.
-PARTS: Final[Mapping[str, tuple[str, str]]] = {
-    "torso": ("neck", "pelvis"),
-    "hips": ("right_hip", "left_hip"),
-    **{
-        f"{side}_{part}": (f"{side}_{start}", f"{side}_{end}")
-        for side in SIDES
-        for part, start, end in (
-            ("upper_arm", "shoulder", "elbow"),
-            ("forearm", "elbow", "wrist"),
-            ("thigh", "hip", "knee"),
-            ("shank", "knee", "ankle"),
-        )
-    },
-}
 
 
 def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
@@ -59,16 +40,14 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
         for body in link.findall("collision"):
             if body.find("geometry/mesh") is not None:
                 link.remove(body)
-                frame = model.getFrameId(link.get("name", ""), BODY)
-                meshed.add(int(model.frames[frame].parentJoint))
+                frame = model.getFrameId(link.get("name", ""), pin.FrameType.BODY)
+                meshed.add(model.frames[frame].parentJoint)
     geometry = build_bodies(model, plain, (), robot.source, "collision")
     try:
-        place = _neutral_points(robot)
+        data, place = _neutral(robot)
     except InputError:  # no humanoid: nothing is known of its shape
         return geometry
     only = meshed if meshed or geometry.ngeoms else range(model.njoints)
-    data = model.createData()
-    pin.forwardKinematics(model, data, pin.neutral(model))
     shapes = _proportions(figure)
     for part, joints in PARTS.items():
         if not place.keys() >= {*joints}:
@@ -83,45 +62,36 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
         places = [data.oMi[max(pair)].translation for pair in pairwise(carriers)]
         edges = [float((place - start) @ (end - start)) / length**2 for place in places]
         cuts = pairwise(np.clip([0.0, *edges, 1.0], first, last))
-        pieces = [
-            (joint, cut) for joint, cut in zip(carriers, cuts, strict=True) if np.ptp(cut) * length > SHORTEST
-        ]
+        least = SHORTEST / length
+        pieces = [(joint, cut) for joint, cut in zip(carriers, cuts, strict=True) if np.ptp(cut) > least]
         for number, (joint, cut) in enumerate(pieces, 1):
             if joint in only:
                 name = part if len(pieces) == 1 else f"{part}_{number}"
                 a, b = (data.oMi[joint].actInv(start + share * (end - start)) for share in cut)
-                geometry.addGeometryObject(_capsule(model, name, joint, a, b, radius * length))
+                turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), b - a)
+                place_in_joint = pin.SE3(turn.toRotationMatrix(), (a + b) / 2)
+                shape = coal.Capsule(radius * length, float(np.linalg.norm(b - a)))
+                body = pin.GeometryObject(name, joint, first_link(model, joint), place_in_joint, shape)
+                geometry.addGeometryObject(body)
     return geometry
 
 
 def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
     """Return the figure's capsules: start and end of the axis, and radius, in shares of their part's length."""
-    model, geometry, place, found = figure.model, figure.geometry, _neutral_points(figure), {}
-    data, geometry_data = model.createData(), pin.GeometryData(geometry)
-    pin.updateGeometryPlacements(model, data, geometry, geometry_data, pin.neutral(model))
-    for body, M in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):
-        part = link_of(model, body)
+    found, (data, place) = {}, _neutral(figure)
+    for body in figure.geometry.geometryObjects:
+        part = link_of(figure.model, body)
         if part in PARTS:
             start, end = (place[name] for name in PARTS[part])
             length = float(np.linalg.norm(end - start))
-            centre = float((M.translation - start) @ (end - start)) / length**2
-            half = body.geometry.halfLength / length
+            middle = (data.oMi[body.parentJoint] * body.placement).translation - start
+            centre, half = float(middle @ (end - start)) / length**2, body.geometry.halfLength / length
             found[part] = centre - half, centre + half, body.geometry.radius / length
     return found
 
 
-def _neutral_points(robot: Robot) -> dict[str, Array]:
-    """Return the mapped points at Pinocchio's neutral configuration, metres."""
-    points = robot.kinematics.positions(pin.neutral(robot.model)[None])[0]
-    return dict(zip(robot.joint_map, points, strict=True))
-
-
-def _capsule(
-    model: pin.Model, name: str, joint: int, a: Array, b: Array, radius: float
-) -> pin.GeometryObject:
-    """Return a capsule between two places in a joint's frame, on the link of the joint."""
-    length = float(np.linalg.norm(b - a))
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b - a) / length)
-    carried = (k for k, one in enumerate(model.frames) if one.parentJoint == joint and one.type == BODY)
-    placement = pin.SE3(turn.toRotationMatrix(), (a + b) / 2)
-    return pin.GeometryObject(name, joint, next(carried), placement, coal.Capsule(radius, length))
+def _neutral(robot: Robot) -> tuple[pin.Data, dict[str, Array]]:
+    """Return Pinocchio's data and the mapped points (3,), metres, at its neutral configuration."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
+    return data, {name: data.oMi[site.joint].act(site.offset) for name, site in robot.joint_map.items()}

@@ -1,15 +1,20 @@
-"""Self-collision for batches of configurations: bounding capsules, then convex hulls, then the bodies themselves."""
+"""Self-collision: the pairs of bodies that are checked, and queries for batches of configurations."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from typing import Final, NamedTuple
 
 import coal
 import numpy as np
 import pinocchio as pin
 
+from posekit.errors import cut
 from posekit.geometry import Array, Flags, Ints, segment_distance
 from posekit.robots.kinematics import Kinematics, Site
+from posekit.robots.urdf import need, parse_xml
+from posekit.skeleton import PARTS
 
 #: Number of pairs of bodies that are measured at once and stay in the processor's cache, and least number of
 #: configurations, which spreads NumPy's overhead.
@@ -18,8 +23,65 @@ PAIRS_AT_ONCE, LEAST_AT_ONCE = 20_000, 128
 ROOM: Final = 1e-6
 #: Metres within which the depth of a penetration is computed.
 DEPTH: Final = 1e-5
+#: Shapes whose distances have a closed form.
+ROUND: Final = coal.Sphere | coal.Capsule
 #: Least extent of a mesh over its size below which it is flat.
 FLAT: Final = 1e-6
+
+
+def set_pairs(
+    model: pin.Model, geometry: pin.GeometryModel, neutral: Array, parts: Collection[tuple[str, str]]
+) -> None:
+    """Set the pairs of bodies to check if no SRDF names pairs.
+
+    All pairs are checked except neighbours and pairs that touch in the neutral configuration. For capsules that stand
+    for a humanoid's parts, only the pairs in `parts` are checked: those of the stick figure's bodies.
+    """
+    checked_parts = {frozenset(map(_part, pair)) for pair in parts}
+    pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects
+    joints, names = [body.parentJoint for body in bodies], [_part(body.name) for body in bodies]
+    # The neighbour above is the nearest joint with a body: the thigh's is the pelvis if a hip has three hinges.
+    above = {joint: set(list(model.supports[joint])[:-1]).intersection(joints) for joint in joints}
+    near = [{joint, max(carriers, default=0)} for joint, carriers in above.items()]
+    data, geometry_data = model.createData(), geometry.createData()
+    pin.computeCollisions(model, data, geometry, geometry_data, neutral, False)
+    geometry.removeAllCollisionPairs()
+    for (a, b), result in zip(pairs, geometry_data.collisionResults, strict=True):
+        ends, joined = frozenset((names[a], names[b])), {joints[a], joints[b]}
+        wanted = ends in checked_parts if parts and ends <= PARTS.keys() else joined not in near
+        if wanted and not result.isCollision():
+            geometry.addCollisionPair(pin.CollisionPair(a, b))
+
+
+def _part(body: str) -> str:
+    """Return the part that a body stands for: its name without the number at the end."""
+    return re.sub(r"_\d+$", "", body)
+
+
+def disable_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: str, source: str) -> bool:
+    """Remove the pairs of links that an SRDF disables; return whether it disables some.
+
+    Links that the robot lacks are passed over: published robots share an SRDF among variants.
+
+    Raises
+    ------
+    InputError
+        If the text is no SRDF, or none of its links is the robot's.
+    """
+    root = parse_xml(srdf, source)
+    need(source, root.tag == "robot", "", f"the root element <{cut(root.tag)}>", "<robot>", "name an SRDF")
+    links = [one.get(end, "") for one in root.findall("disable_collisions") for end in ("link1", "link2")]
+    known = not links or any(map(model.existBodyName, links))
+    need(
+        source,
+        known,
+        "<disable_collisions>",
+        f"{cut(', '.join(links))}",
+        "links of the robot",
+        "name its SRDF",
+    )
+    pin.removeCollisionPairsFromXML(model, geometry, srdf)
+    return bool(links)
 
 
 class Contacts(NamedTuple):
@@ -60,14 +122,11 @@ class SelfCollision:
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
         self.model, self._meshes, self._hulls = model, geometry, geometry.copy()
         bodies = list(self._hulls.geometryObjects)
-        hulls: dict[int, coal.CollisionGeometry] = {}
         for body in bodies:
             if isinstance(body.geometry, coal.BVHModelBase):
-                key = body.geometry.id()
-                hulls[key] = hulls[key] if key in hulls else _hull(body.geometry)
-                body.geometry = hulls[key]
+                body.geometry = _hull(body.geometry)
         shapes, places = [body.geometry for body in bodies], [body.placement for body in bodies]
-        rounded = np.array([isinstance(one, coal.Sphere | coal.Capsule) for one in shapes], dtype=np.bool_)
+        rounded = np.array([isinstance(one, ROUND) for one in shapes], dtype=np.bool_)
         self._half = rounded * np.array([getattr(one, "halfLength", 0.0) for one in shapes])
         boxes = [_box(one) for one in shapes]
         self._axes = np.array([M.rotation for M in places]).reshape(-1, 3, 3)
@@ -97,19 +156,15 @@ class SelfCollision:
         margin : float
             Metres, at least 0; only touching pairs by default.
         """
-        rows, pairs, distances = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
         step = max(PAIRS_AT_ONCE // max(len(self._reach), 1), LEAST_AT_ONCE)
-        for start in range(0, len(q), step):
-            row, pair, distance = self._near(q[start : start + step], margin)
-            self._measure(q[start : start + step], row, pair, distance, margin)
-            kept = distance <= margin
-            rows.append(row[kept] + start)
-            pairs.append(pair[kept])
-            distances.append(distance[kept])
-        frame, found = np.concatenate(rows), np.concatenate(distances)
-        hit = np.zeros(len(q), dtype=np.bool_)
-        hit[frame[found <= 0]] = True
-        return Contacts(hit, frame, np.concatenate(pairs), found)
+        starts = range(0, max(len(q), 1), step)
+        blocks = [self._near(q[start : start + step], margin) for start in starts]
+        row, pair, distance = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        row += np.repeat(starts, [len(rows) for rows, _, _ in blocks])
+        self._measure(q, row, pair, distance, margin)
+        kept, hit = distance <= margin, np.zeros(len(q), dtype=np.bool_)
+        hit[row[distance <= 0]] = True
+        return Contacts(hit, row[kept], pair[kept], distance[kept])
 
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
         """Return the pairs that can be nearer than the margin: rows, pairs, and distances of capsules, else NaN."""
@@ -177,7 +232,7 @@ def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, float]:
     shape.computeLocalAABB()
     low, high = np.ravel(shape.aabb_local.min_), np.ravel(shape.aabb_local.max_)
     centre, half = (low + high) / 2, (high - low) / 2
-    if isinstance(shape, coal.Sphere | coal.Capsule):
+    if isinstance(shape, ROUND):
         return centre, half, float(half.max())
     if isinstance(shape, coal.ConvexBase):
         points = np.array([shape.point(k) for k in range(shape.num_points)])

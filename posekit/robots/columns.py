@@ -1,4 +1,4 @@
-"""Values of joints in q: mimicking joints, and tables whose columns are named."""
+"""Mimicking joints, and q from tables whose columns are named."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.errors import cut, nearest, shown
@@ -41,13 +40,6 @@ def mimics_of(robot: Element) -> tuple[Mimic, ...]:
         return 1 + depth(found[mimic.target]) if mimic.target in found else 0
 
     return tuple(sorted(found.values(), key=depth))
-
-
-def joint_values(model: pin.Model, q: Array, joint: str) -> Array:
-    """Return the values (N,) of a joint of one degree of freedom, rad or m; a continuous one within -pi and pi."""
-    index = model.getJointId(joint)
-    at = model.idx_qs[index]
-    return np.arctan2(q[:, at + 1], q[:, at]) if model.nqs[index] == 2 else q[:, at]
 
 
 def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.errors import refusal
-from posekit.geometry import Array, Ints, align, quaternion_from_rotation, rotation_from_quaternion
+from posekit.geometry import Array, Ints, align, mean_known
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, POINTS
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ BLOCK: Final = 256
 DAMPING: Final = (1e-3, 1e-12, 1e6, 0.1, 8.0)
 #: m^2/rad^2 added to the diagonal that scales the damping, for entries that move no point.
 FLOOR: Final = 1e-6
-#: Times that entries beyond a limit are set on it and the others are solved again in one step.
-CLAMPINGS: Final = 3
 #: Other starts that are tried: the middles of the limits, and random configurations.
 SEEDS: Final = 4
 
@@ -39,16 +37,23 @@ SEEDS: Final = 4
 class _Problem:
     """Least squares of one robot: targets (N, P, 3) of its points, limits, and the entries of v that move."""
 
-    def __init__(self, robot: Robot, targets: Array, columns: list[int]) -> None:
+    def __init__(self, robot: Robot, joints: Array) -> None:
         model = robot.model
-        self.robot, self.model, self.kinematics, self.targets = robot, model, robot.kinematics, targets
-        self.known = np.asarray(np.isfinite(targets).all(axis=2))
-        trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
-        self.trunk = trunk if len(trunk) > 2 else list(range(len(columns)))
+        columns = [POINTS.index(name) for name in robot.joint_map]
+        padded = np.pad(joints, ((0, 0), (0, len(POINTS) - len(JOINTS)), (0, 0)), constant_values=np.nan)
+        self.robot, self.model, self.kinematics, self.targets = (
+            robot,
+            model,
+            robot.kinematics,
+            padded[:, columns],
+        )
+        self.known = np.asarray(np.isfinite(self.targets).all(axis=2))
+        self.trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
         # Entries of q and v of the joints that have limits: hinges and slides.
         single = [j for j in range(1, model.njoints) if model.nqs[j] == 1]
-        self.at_q = np.array([model.idx_qs[j] for j in single], dtype=np.intp)
-        self.at_v = np.array([model.idx_vs[j] for j in single], dtype=np.intp)
+        self.at_q, self.at_v = (
+            np.array(first, dtype=np.intp)[single] for first in (model.idx_qs, model.idx_vs)
+        )
         # A mimicking joint moves with its target: v = S u, u the entries of the other joints.
         follow = np.eye(model.nv)
         for mimic in robot.mimics:
@@ -56,14 +61,6 @@ class _Problem:
             follow[one] = mimic.multiplier * follow[other]
         self.free = np.flatnonzero(follow.any(axis=0))
         self.follow = follow[:, self.free]
-        # Limits of a mimicking joint bound its target.
-        self.lower, self.upper = np.array(robot.lower), np.array(robot.upper)
-        for mimic in reversed(robot.mimics):
-            one, other = (model.getJointId(name) for name in (mimic.joint, mimic.target))
-            if mimic.multiplier and model.nqs[other] == 1:
-                at, to = model.idx_qs[one], model.idx_qs[other]
-                ends = sorted((end[at] - mimic.offset) / mimic.multiplier for end in (self.lower, self.upper))
-                self.lower[to], self.upper[to] = max(self.lower[to], ends[0]), min(self.upper[to], ends[1])
 
     def gaps(self, positions: Array, rows: Ints) -> Array:
         """Return the offsets (n, P, 3) of points from their targets, zero where unknown."""
@@ -81,7 +78,7 @@ class _Problem:
         return np.asarray((gap**2).sum(axis=(1, 2)) + PULL * (self.away(q, start) ** 2).sum(axis=1)) / 2
 
     def step(self, q: Array, start: Array, rows: Ints, damping: Array) -> Array:
-        """Return damped Gauss-Newton steps (n, nv) inside the limits."""
+        """Return damped Gauss-Newton steps (n, nv); entries at a limit and pushed against it stay (Bertsekas 1982)."""
         positions, jacobian = self.kinematics.jacobians(q)
         gap = self.gaps(positions, rows).reshape(len(q), -1)
         J = (jacobian * self.known[rows, :, None, None]).reshape(len(q), gap.shape[1], -1)
@@ -89,18 +86,24 @@ class _Problem:
         gradient = ((gap[:, None] @ J)[:, 0] + PULL * away) @ S
         J = J @ S
         H = J.transpose(0, 2, 1) @ J + PULL * S.T @ S
-        lowest, highest = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
-        lowest[:, self.at_v] = self.lower[self.at_q] - q[:, self.at_q]
-        highest[:, self.at_v] = self.upper[self.at_q] - q[:, self.at_q]
+        lowest, highest = np.zeros((2, len(q), self.model.nv), dtype=np.bool_)
+        lowest[:, self.at_v] = q[:, self.at_q] <= self.robot.lower[self.at_q]
+        highest[:, self.at_v] = q[:, self.at_q] >= self.robot.upper[self.at_q]
+        held = (lowest[:, self.free] & (gradient > 0)) | (highest[:, self.free] & (gradient < 0))
+        moving = ~held
+        H = H * moving[:, :, None] * moving[:, None]
         diagonal = np.arange(len(self.free))
-        H[:, diagonal, diagonal] += damping[:, None] * (H[:, diagonal, diagonal] + FLOOR)
-        return limited_step(H, gradient, lowest[:, self.free], highest[:, self.free]) @ S.T
+        H[:, diagonal, diagonal] += damping[:, None] * (H[:, diagonal, diagonal] + FLOOR) + held
+        return -np.linalg.solve(H, (moving * gradient)[..., None])[..., 0] @ S.T
 
     def moved(self, q: Array, step: Array) -> Array:
-        """Take steps (n, nv); rounding does not pass a limit."""
+        """Take steps (n, nv) up to the limits."""
         out = np.array([pin.integrate(self.model, a, b) for a, b in zip(q, step, strict=True)])
-        out = out.reshape(len(q), self.model.nq)
-        return self.robot.with_mimics(np.clip(out, self.lower, self.upper))
+        return self.inside(out.reshape(len(q), self.model.nq))
+
+    def inside(self, q: Array) -> Array:
+        """Return configurations (n, nq) within the limits, with mimicking joints in place."""
+        return self.robot.with_mimics(np.clip(q, self.robot.lower, self.robot.upper))
 
     def worst(self, q: Array) -> Array:
         """Return the largest distance of a known point from its target (N,), metres."""
@@ -114,16 +117,12 @@ class _Problem:
             return out
         points, targets = self.kinematics.positions(q[None])[:, self.trunk], self.targets[:, self.trunk]
         found = align(points, targets, scale=False)
-        lost = np.asarray(np.isnan(found.rotation).any(axis=(1, 2)))  # too few points are known to turn it
-        gap = np.nan_to_num(targets - points).sum(axis=1)
-        off = gap / np.maximum(self.known[:, self.trunk].sum(axis=1), 1)[:, None]
-        R = np.where(lost[:, None, None], np.eye(3), found.rotation)
-        t = np.where(lost[:, None], off, found.translation)
-        fixed = self.model.jointPlacements[1]
-        world = fixed.act(q[:3])
-        out[:, :3] = (R @ world + t - fixed.translation) @ fixed.rotation
-        turn = fixed.rotation.T @ R @ fixed.rotation @ rotation_from_quaternion(q[3:7])
-        out[:, 3:7] = quaternion_from_rotation(turn)
+        gap = np.nan_to_num(mean_known((targets - points).transpose(0, 2, 1)))
+        root, fixed = pin.XYZQUATToSE3(np.array(q[:7])), self.model.jointPlacements[1]
+        for row, (R, t) in enumerate(zip(found.rotation, found.translation, strict=True)):
+            # Too few known points cannot turn the trunk.
+            T = pin.SE3(R, t) if np.isfinite(R).all() else pin.SE3(np.eye(3), gap[row])
+            out[row, :7] = pin.SE3ToXYZQUAT(fixed.actInv(T * fixed * root))
         return out
 
 
@@ -136,8 +135,8 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     Parameters
     ----------
     robot : Robot
-    joints : array (N, 14, 3) or (N, 19, 3)
-        Metres, world; joints, and head points after them. NaN is unknown.
+    joints : array (14, 3) or (N, 14, 3)
+        Metres, world; NaN is unknown.
     start : array (N, nq), optional
         Configurations near the solution. What the points do not determine stays near them, by default near the
         neutral configuration.
@@ -156,17 +155,10 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     """
     given = np.asarray(joints, dtype=np.float64)
     given = given[None] if given.ndim == 2 else given
-    if given.ndim != 3 or given.shape[1] not in (len(JOINTS), len(POINTS)) or given.shape[2] != 3:
-        expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
-        raise refusal("", "joints", f"shape {given.shape}", expected, "give them in the order of JOINTS")
-    padded = np.full((len(given), len(POINTS), 3), np.nan)
-    padded[:, : given.shape[1]] = given
-    columns = [POINTS.index(name) for name in robot.joint_map]
-    problem = _Problem(robot, padded[:, columns], columns)
-    if start is None:
-        first = problem.laid(robot.neutral)
-    else:
-        first = robot.with_mimics(np.clip(robot.checked(start, "start"), problem.lower, problem.upper))
+    if given.ndim != 3 or given.shape[1:] != (len(JOINTS), 3):
+        raise refusal("", "joints", f"shape {given.shape}", f"(N, {len(JOINTS)}, 3)", "order them as JOINTS")
+    problem = _Problem(robot, given)
+    first = problem.laid(robot.neutral) if start is None else problem.inside(robot.checked(start, "start"))
     q, cost = _descend(problem, first, first, np.arange(len(given)))
     worst = problem.worst(q)
     for seed in range(SEEDS):
@@ -178,39 +170,6 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
         q[unmet[better]], cost[unmet[better]] = found[better], new[better]
         worst = problem.worst(q)
     return q, np.where(problem.known.any(axis=1), worst, np.nan)
-
-
-def limited_step(H: Array, gradient: Array, lowest: Array, highest: Array) -> Array:
-    r"""Minimise :math:`g^T d + d^T H d / 2` over steps d between limits, by projected Newton (Bertsekas 1982).
-
-    Parameters
-    ----------
-    H : array (N, m, m)
-        Positive definite.
-    gradient : array (N, m)
-    lowest, highest : array (N, m)
-        Limits of the step, lowest <= 0 <= highest.
-
-    Returns
-    -------
-    array (N, m)
-        Entries at a limit and pushed against it stay; those beyond a limit are set on it.
-    """
-    held = ((lowest >= 0) & (gradient > 0)) | ((highest <= 0) & (gradient < 0))
-    value = np.zeros_like(gradient)
-    diagonal = np.arange(H.shape[1])
-    for _ in range(CLAMPINGS):
-        free = (~held).astype(np.float64)
-        matrix = H * free[:, :, None] * free[:, None]
-        matrix[:, diagonal, diagonal] += 1.0 - free
-        right = free * (gradient + (H @ value[..., None])[..., 0])
-        step = np.where(held, value, -np.linalg.solve(matrix, right[..., None])[..., 0])
-        beyond = ~held & ((step < lowest) | (step > highest))
-        if not beyond.any():
-            break
-        held |= beyond
-        value = np.where(held, np.clip(step, lowest, highest), 0.0)
-    return np.clip(step, lowest, highest)
 
 
 def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Array, Array]:

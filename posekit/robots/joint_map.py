@@ -33,7 +33,10 @@ def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
     InputError
         If there is no such map, it is not as ``posekit.joint_map/1`` requires, or the model lacks one of its frames.
     """
-    frames, found = _frames(model), dict[str, Site]()
+    found = dict[str, Site]()
+    # A link goes before a joint of the same name.
+    links_last = sorted(enumerate(model.frames), key=lambda one: one[1].type == pin.FrameType.BODY)
+    frames = {frame.name: frame for _, frame in links_last}
     for point, (frame, offset) in _places(str(name)).items():
         remedy = nearest(str(frame), list(frames)[:1000])
         need(name, frame in frames, f"points.{point}", shown(frame), "a frame of the model", remedy)
@@ -50,9 +53,8 @@ def find_joint_map(model: pin.Model, source: str = "") -> JointMap:
     InputError
         If neither is possible.
     """
-    frames = _frames(model)
     for name in BUILT_IN:
-        if all(frame in frames for frame, _ in _places(name).values()):
+        if all(model.existFrame(frame) for frame, _ in _places(name).values()):
             return load_joint_map(name, model)
     if (derived := _derived(model)) is not None:
         return derived
@@ -91,12 +93,6 @@ def _derived(model: pin.Model) -> JointMap | None:
         middle = sum(data.oMi[points[f"{side}_{part}"].joint].translation for side in SIDES) / 2
         points[name] = Site(carrier, data.oMi[carrier].actInv(middle) if name == "neck" else np.zeros(3))
     return {point: points[point] for point in POINTS if point in points}
-
-
-def _frames(model: pin.Model) -> dict[str, pin.Frame]:
-    """Return the frames by name; a link goes before a joint of the same name."""
-    links_last = sorted(enumerate(model.frames), key=lambda one: one[1].type == pin.FrameType.BODY)
-    return {frame.name: frame for _, frame in links_last}
 
 
 @lru_cache(maxsize=16)

@@ -14,12 +14,11 @@ from posekit.geometry import Array, cross, rotation_from_quaternion
 #: Configurations worked on at once, so that their rotations stay in the processor's cache.
 BLOCK: Final = 256
 
-#: Entries of q of each type of joint that has more than one.
+#: Entries of q of a joint, by their number, if it has more than one: a floating, a planar, a continuous joint.
 SUFFIXES: Final = {
-    "JointModelFreeFlyer": ("x", "y", "z", "qx", "qy", "qz", "qw"),
-    "JointModelPlanar": ("x", "y", "cos", "sin"),
-    **dict.fromkeys((f"JointModelRUB{axis}" for axis in "XYZ"), ("cos", "sin")),
-    "JointModelRevoluteUnboundedUnaligned": ("cos", "sin"),
+    7: ("x", "y", "z", "qx", "qy", "qz", "qw"),
+    4: ("x", "y", "cos", "sin"),
+    2: ("cos", "sin"),
 }
 
 
@@ -178,10 +177,9 @@ def entries_of(model: pin.Model) -> list[Entry]:
     entries = []
     for joint in range(1, model.njoints):
         kind, name = model.joints[joint].shortname(), str(model.names[joint])
-        suffixes = SUFFIXES.get(kind, ("",))
-        root = joint == 1 and len(suffixes) == 7
+        suffixes = SUFFIXES.get(model.nqs[joint], ("",))
+        prefix = "" if joint == 1 and len(suffixes) == 7 else name
         units = {"": "m" if kind.startswith("JointModelP") else "rad", **dict.fromkeys("xyz", "m")}
         for end in suffixes:
-            entry = end if root else f"{name}.{end}" if end else name
-            entries.append(Entry(entry, joint, end, units.get(end, "")))
+            entries.append(Entry(".".join(filter(None, (prefix, end))), joint, end, units.get(end, "")))
     return entries

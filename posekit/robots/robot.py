@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,16 +17,15 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import cut, one_line, refusal, shown
 from posekit.files import read_bytes, text
-from posekit.geometry import Array, Flags, Record, read_only
+from posekit.geometry import Array, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
 from posekit.robots.capsules import capsule_bodies
-from posekit.robots.collision import Contacts, SelfCollision
-from posekit.robots.columns import Mimic, from_columns, joint_values, mimics_of
+from posekit.robots.collision import Contacts, SelfCollision, disable_pairs, set_pairs
+from posekit.robots.columns import Mimic, from_columns, mimics_of
 from posekit.robots.find import FIGURE, find
 from posekit.robots.inverse import solve
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics, entries_of
-from posekit.robots.pairs import Pairs, disabled_pairs, set_pairs
 from posekit.robots.scaling import scaled
 from posekit.robots.urdf import check_urdf, need, text_with
 from posekit.skeleton import JOINTS, POINTS
@@ -60,8 +59,6 @@ class Robot(Record):
         no bodies; or none.
     joint_map_file : str
         Name or TOML file of the joint map; see `joint_map`.
-    shared_srdf : bool
-        Pass over links in the SRDF that the robot lacks; published robots share one among variants.
 
     Raises
     ------
@@ -84,7 +81,6 @@ class Robot(Record):
     fixed_base: bool = False
     bodies: Bodies = "meshes"
     joint_map_file: str = field(default="", repr=False)
-    shared_srdf: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         _ = self.model, self.geometry
@@ -101,13 +97,12 @@ class Robot(Record):
     @cached_property
     def model(self) -> pin.Model:
         """Pinocchio's model. Mimicking joints have entries of q of their own: see `mimics`."""
-        urdf = text_with(self.tree)
+        joints = {joint.get("name"): joint.get("type") for joint in self.tree.findall("joint")}
+        root: tuple[Any, ...] = ()
+        if not self.fixed_base and "floating" not in joints.values():
+            root = pin.JointModelFreeFlyer(), next(name for name in ROOT_NAMES if name not in joints)
         try:
-            model = pin.buildModelFromXML(urdf)
-            if self.fixed_base or _floats(model):
-                return model
-            root = next(name for name in ROOT_NAMES if not model.existFrame(name))
-            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), root)
+            return pin.buildModelFromXML(text_with(self.tree), *root)
         except (ValueError, RuntimeError) as error:
             got = f"a URDF that Pinocchio cannot read ({cut(one_line(str(error).splitlines()[0]))})"
             raise refusal(self.source, "", got, "a URDF", "correct it") from None
@@ -115,26 +110,22 @@ class Robot(Record):
     @cached_property
     def free_flyer(self) -> bool:
         """Whether the root moves freely."""
-        return _floats(self.model)
+        return len(self.model.joints) > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer"
 
     @cached_property
     def geometry(self) -> pin.GeometryModel:
         """Pinocchio's collision bodies and the pairs to check."""
         if self.bodies == "none":
             return pin.GeometryModel()
-        parts = set[frozenset[str]]()
+        parts: tuple[tuple[str, str], ...] = ()
         if self.bodies == "meshes":
             geometry = build_bodies(self.model, self.tree, self.package_dirs, self.source, "collision")
         else:
             figure = load_robot(FIGURE[0])
-            geometry = capsule_bodies(self, figure)
-            links = dict(zip(figure.body_names, figure.body_links, strict=True))
-            parts = {frozenset(links[name] for name in pair) for pair in figure.collision_pairs}
-        disabled: Pairs = ()
-        if self.srdf is not None:
-            names = [link.get("name", "") for link in self.tree.findall("link")]
-            disabled = disabled_pairs(self.srdf, f"{self.source}, SRDF", names, strict=not self.shared_srdf)
-        set_pairs(self.model, geometry, np.array(self.neutral), disabled, parts)
+            geometry, parts = capsule_bodies(self, figure), figure.collision_pairs
+        geometry.addAllCollisionPairs()
+        if self.srdf is None or not disable_pairs(self.model, geometry, self.srdf, f"{self.source}, SRDF"):
+            set_pairs(self.model, geometry, np.array(self.neutral), parts)
         return geometry
 
     @cached_property
@@ -145,12 +136,12 @@ class Robot(Record):
     @cached_property
     def lower(self) -> Array:
         """Lower limits of q (nq,), rad and m; -inf if there are none."""
-        return read_only(np.where(self._single, self.model.lowerPositionLimit, -np.inf))
+        return self._limits(self.model.lowerPositionLimit, -np.inf)
 
     @cached_property
     def upper(self) -> Array:
         """Upper limits of q (nq,), rad and m; inf if there are none."""
-        return read_only(np.where(self._single, self.model.upperPositionLimit, np.inf))
+        return self._limits(self.model.upperPositionLimit, np.inf)
 
     @cached_property
     def neutral(self) -> Array:
@@ -241,25 +232,24 @@ class Robot(Record):
                 turn = q[:, at + count - (4 if count == 7 else 2) : at + count]
                 length = np.linalg.norm(turn, axis=1)
                 for row in np.flatnonzero(np.abs(length - 1) > ROUNDED)[:1]:
-                    got = (
-                        f"{'a quaternion' if count == 7 else 'a cosine and sine'} of length {length[row]:.4g}"
-                    )
-                    place, remedy = (
+                    kind = "quaternion" if count == 7 else "cosine and sine"
+                    got, place = (
+                        f"a {kind} of length {length[row]:.4g}",
                         f"row {row}: {self.model.names[joint]}",
-                        "check the order of q, and normalise it",
                     )
-                    check(False, place, got, "length 1", remedy)
+                    check(False, place, got, "length 1", "check the order of q, and normalise it")
                 turn /= length[:, None]
         return q
 
     def with_mimics(self, q: Array) -> Array:
         """Return configurations (N, nq) whose mimicking joints have the values of their targets."""
-        q = q.copy()
+        q, model = q.copy(), self.model
         for mimic in self.mimics:
-            index = self.model.getJointId(mimic.joint)
-            at = self.model.idx_qs[index]
-            value = mimic.multiplier * joint_values(self.model, q, mimic.target) + mimic.offset
-            if self.model.nqs[index] == 2:
+            joint, target = model.getJointId(mimic.joint), model.getJointId(mimic.target)
+            at, of = model.idx_qs[joint], model.idx_qs[target]
+            value = np.arctan2(q[:, of + 1], q[:, of]) if model.nqs[target] == 2 else q[:, of]
+            value = mimic.multiplier * value + mimic.offset
+            if model.nqs[joint] == 2:
                 q[:, at], q[:, at + 1] = np.cos(value), np.sin(value)
             else:
                 q[:, at] = value
@@ -267,12 +257,9 @@ class Robot(Record):
 
     def mimic_errors(self, q: Array) -> Array:
         """Return the deviations (N, M) of mimicking joints from their targets' values, rad or m; see `mimics`."""
-        out, followed = np.zeros((len(q), len(self.mimics))), self.with_mimics(q)
-        for k, mimic in enumerate(self.mimics):
-            out[:, k] = np.subtract(*(joint_values(self.model, one, mimic.joint) for one in (q, followed)))
-            if self.units[self.model.idx_qs[self.model.getJointId(mimic.joint)]] != "m":
-                out[:, k] = (out[:, k] + np.pi) % (2 * np.pi) - np.pi
-        return out
+        steps = [pin.difference(self.model, a, b) for a, b in zip(self.with_mimics(q), q, strict=True)]
+        at = [self.model.idx_vs[self.model.getJointId(mimic.joint)] for mimic in self.mimics]
+        return np.reshape(steps, (-1, self.model.nv))[:, at]
 
     def q_from_columns(self, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
         """Order the columns of a table as q.
@@ -368,10 +355,9 @@ class Robot(Record):
     def _collision(self) -> SelfCollision:
         return SelfCollision(self.model, self.geometry)
 
-    @cached_property
-    def _single(self) -> Flags:
-        """Whether each entry of q is a joint of its own, with limits."""
-        return np.array([not entry.suffix for entry in entries_of(self.model)], dtype=np.bool_)
+    def _limits(self, given: Array, none: float) -> Array:
+        """Return limits of q (nq,), only of joints with one entry: Pinocchio gives quaternions limits, too."""
+        return read_only(np.where(np.repeat(self.model.nqs, self.model.nqs) == 1, given, none))
 
 
 def load_robot(
@@ -411,26 +397,20 @@ def load_robot(
     >>> robot.points(robot.neutral).shape
     (1, 14, 3)
     """
-    files = find(name_or_path)
-    own_srdf = files.srdf if srdf is None else Path(srdf)
+    name, urdf, beside, folders = find(name_or_path)
+    own_srdf = beside if srdf is None else Path(srdf)
     return Robot(
-        urdf=read_text(files.urdf),
+        urdf=read_text(urdf),
         srdf=None if own_srdf is None else read_text(own_srdf),
-        name=files.name,
-        source=str(files.urdf),
-        package_dirs=(*(Path(folder).resolve() for folder in package_dirs), *files.package_dirs),
+        name=name,
+        source=str(urdf),
+        package_dirs=(*(Path(folder).resolve() for folder in package_dirs), *folders),
         fixed_base=fixed_base,
         bodies=bodies,
         joint_map_file=str(joint_map),
-        shared_srdf=files.published and srdf is None,
     )
 
 
 def read_text(path: str | Path) -> str:
     """Read a URDF or SRDF file."""
     return text(read_bytes(path), str(path))
-
-
-def _floats(model: pin.Model) -> bool:
-    """Return whether the root moves freely."""
-    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")

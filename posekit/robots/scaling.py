@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import refusal
 from posekit.geometry import Array, align, known_median, rotation_between
+from posekit.robots.bodies import first_link
 from posekit.robots.urdf import SIZES, Element, numbers
 from posekit.skeleton import HIPS, JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS, TORSO
 
@@ -55,11 +56,7 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     joint_of = {end.get("link", ""): one for one in tree.findall("joint") for end in one.findall("child")}
     above = {link: end.get("link", "") for link, one in joint_of.items() for end in one.findall("parent")}
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    place, carrier = dict[str, pin.SE3](), dict[int, str]()
-    for frame, M in zip(model.frames, data.oMf, strict=True):
-        if frame.type == pin.FrameType.BODY:
-            place[frame.name] = M
-            carrier.setdefault(frame.parentJoint, frame.name)
+    place = {link: data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in links}
     # New origins (m) at neutral of the root and of the links in scaled chains. Rotations at neutral stay.
     origin = {link: place[link].translation for link in links.keys() - joint_of.keys()}
     grown = set[str]()
@@ -67,12 +64,15 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
         if name not in robot.joint_map or not np.isfinite(wanted[JOINT[name]]).all():
             continue
         site = robot.joint_map[name]
-        last = base = carrier[site.joint]
+        last = base = model.frames[first_link(model, site.joint)].name
         end, path = wanted[JOINT[name]] - place[last].rotation @ np.array(site.offset), list[str]()
         while base not in origin:
             path.append(base)
             base = above[base]
-        stretch = _stretch(place[last].translation - place[base].translation, end - origin[base])
+        old, new = place[last].translation - place[base].translation, end - origin[base]
+        size, length, stretch = float(np.linalg.norm(old)), float(np.linalg.norm(new)), np.eye(3)
+        if min(size, length) > SAME:
+            stretch = length / size * rotation_between(old / size, new / length)
         for link in path:
             # Other links that start at the same place stay with the chain, as the second of two clavicles.
             for other in (one for one in above if above[one] == above[link]):
@@ -88,14 +88,6 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
         offset = place[above[link]].rotation.T @ (origin[link] - origin[above[link]])
         _set(joint_of[link].findall("origin")[0], "xyz", offset)
     return replace(robot, urdf=ElementTree.tostring(tree, encoding="unicode"))
-
-
-def _stretch(old: Array, new: Array) -> Array:
-    """Return the matrix (3, 3) that turns and scales a vector into another; the identity if one of them is zero."""
-    size, length = float(np.linalg.norm(old)), float(np.linalg.norm(new))
-    if min(size, length) <= SAME:
-        return np.eye(3)
-    return np.asarray(length / size * rotation_between(old / size, new / length))
 
 
 def _grow(link: Element, ratio: float) -> None:

@@ -33,7 +33,7 @@ MAX_CHAIN: Final = 250
 #: Largest numbers of parts. The largest published robots have about 150 links and 112 bodies; Pinocchio's data grow
 #: with the cube of the degrees of freedom and have 0.3 GB at 200.
 MOST: Final = {"links": 1000, "bodies": 500, "degrees of freedom": 200}
-#: Metres or radians; products of larger numbers overflow.
+#: Largest coordinate, metres or radians; products of larger numbers overflow.
 MAX_NUMBER: Final = 1e6
 #: Range of the largest limit of a revolute joint (rad) that is read as degrees if two joints have it.
 #:
@@ -42,8 +42,6 @@ DEGREES: Final = (15.0, 720.0)
 
 #: Degrees of freedom of each joint type.
 FREEDOM: Final = {"fixed": 0, "revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
-#: Types whose axis has no meaning.
-UNTURNED: Final = ("fixed", "floating")
 #: Shapes, and the attributes of each that must be positive.
 SIZES: Final[dict[str, tuple[str, ...]]] = {
     **{"box": ("size",), "sphere": ("radius",), "mesh": ()},
@@ -235,7 +233,8 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
                 large[name] = max(-lower, upper)
         for axis in joint.findall("axis"):
             length = math.hypot(*numbers(axis, "xyz", "1 0 0"))
-            good = abs(length - 1) < 1e-3 if kind == "prismatic" else length > 1e-6 or kind in UNTURNED
+            without_axis = kind in ("fixed", "floating")
+            good = abs(length - 1) < 1e-3 if kind == "prismatic" else length > 1e-6 or without_axis
             check(good, place, f"an axis of length {length:g}", "length 1", "correct it")
         target, followed = name, set[str]()
         while (mimic := joints[target].find("mimic")) is not None:
