@@ -1,4 +1,4 @@
-"""`Body`: one recording of one body, as checks see it; what several checks need is found once."""
+"""`Body`: the data of one body in one recording, as checks read it; values that several checks need are cached."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found")
 
-#: Standard deviations of measuring noise that are allowed for: one point in 370 is beyond.
+#: Tolerance for measuring noise, in standard deviations: one normal number in 370 exceeds it.
 ALLOWED_DEVIATIONS: Final = 3.0
 
-#: Overlap that is allowed between capsules scaled to a person, metres: their radii are the built-in figure's, and flesh
-#: gives.
+#: Allowed overlap between capsules that are scaled to a person, metres: their radii are the built-in figure's, not
+#: measured ones, and flesh is soft.
 MADE_UP_METRES: Final = 0.01
 
-#: Bending of the spine to the side (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
+#: Largest side bending of the spine, degrees (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
 SIDE_BENDING_DEGREES: Final = 38.2
 
 #: Length of a clavicle, as a share of the distance from the neck's middle line to the shoulder.
 CLAVICLE_SHARE: Final = 0.8
 
-#: Rotation of a clavicle about its inner end, forward or upward with the shoulder (Inman, Saunders & Abbott 1944, J
-#: Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
+#: Largest rotation of a clavicle about its inner end, forward or upward with the shoulder, degrees (Inman, Saunders &
+#: Abbott 1944, J Bone Joint Surg 26:1; Kapandji, The Physiology of the Joints, vol. 1).
 CLAVICLE_DEGREES: Final = 30.0
 
-#: Segments of the limbs among `posekit.skeleton.SEGMENTS`.
+#: Indices of the limb segments in `posekit.skeleton.SEGMENTS`.
 LIMB_ROWS: Final = [SEGMENTS.index(one) for one in LIMB_SEGMENTS]
 
-#: Length by which the direction of the head is measured, neck to nose, metres.
+#: Distance from neck to nose, metres: errors of the nose turn the head over this lever.
 NECK_TO_HEAD_METRES = 0.2
 
 
@@ -73,20 +73,20 @@ class Body(Record):
     q : array (T, nq), optional
         Configurations that are judged, in the robot's order.
     robot : Robot, optional
-        The robot of `q`; None where positions are judged.
+        The robot of `q`; None if positions are judged.
     base : Figure, optional
         The figure that positions are compared with.
     up : array (3,), optional
         Unit vector against gravity.
     settings : ValidateSettings
-        What decides the verdicts.
+        Checks, ranges and tolerances.
     tolerance : Tolerance, optional
-        Tolerance of postures of the figure `base` itself. None for people that were measured: `base` then takes their
-        lengths, and tolerances their noise.
+        Allowed differences from `base`, for postures of that figure. None for measured people: `figure` then has their
+        segment lengths, and tolerances include their measuring noise.
     motion : bool
         Whether the frames follow each other in time.
     residual : array (T, 14), optional
-        Distance of the given joints from those of `q`, where that was fitted to positions, metres.
+        Distance between the given joints and the joints of `q`, metres, if `q` was fitted to positions.
     """
 
     joints: Array
@@ -125,9 +125,9 @@ class Body(Record):
         residual: Array | None = None,
         placed: bool = True,
     ) -> Body:
-        """Return one recording as checks see it.
+        """Return the body of one recording.
 
-        Its points are those of `robot` where it has configurations only, and unless they are not wanted (`placed`).
+        If the motion has configurations only, its joints are the points of `robot`; unknown if `placed` is False.
         """
         joints = motion.figure_joints
         if robot is not None and motion.joints is None and motion.q is not None:
@@ -143,7 +143,7 @@ class Body(Record):
             q=motion.q if robot is not None else None,
             robot=robot,
             base=base,
-            # Where each frame has its own origin there is no ground, and nothing goes anywhere.
+            # If every frame has its own origin, there is no common ground and no travel.
             up=motion.up_vector if motion.in_world else None,
             settings=settings,
             tolerance=tolerance,
@@ -156,7 +156,7 @@ class Body(Record):
         return len(self.joints)
 
     def knows(self, name: str) -> bool:
-        """Return whether something that a check may read is known: one of `posekit.validators.check.READABLE`."""
+        """Return whether one of the data in `posekit.validators.check.READABLE` is known, by its name."""
         if name == "time":
             return self.motion and self.dt > 0
         if name == "ground":
@@ -206,7 +206,7 @@ class Body(Record):
 
     @property
     def measured(self) -> bool:
-        """Whether the frames show people that were measured, not the figure itself."""
+        """Whether the frames show measured people, and not postures of the figure."""
         return self.tolerance is None and not self.settings.strict
 
     @cached_property
@@ -239,7 +239,7 @@ class Body(Record):
         return np.concatenate([self.joints, self.head], axis=1)
 
     def noise_allowed(self, segment: str = "") -> float:
-        """Return by how much noise may change the distance between the ends of a segment, or of any two, metres."""
+        """Return the tolerance for noise of a distance, metres: between the ends of a segment, or any two joints."""
         noise = self.settings.noise
         if noise is None:
             noise = self.person.noise_of(segment) if self.measured else 0.0
@@ -252,7 +252,7 @@ class Body(Record):
         return self.settings.contact_margin - made_up - self.noise_allowed()
 
     def rigid_tolerance(self, segment: tuple[int, int]) -> float:
-        """Return by how much the length of a segment may differ from the figure's, metres."""
+        """Return the tolerance of a segment's length against the figure's, metres."""
         given = self.settings.rigid_tolerance
         if self.tolerance is not None:
             hips = segment == (JOINT["right_hip"], JOINT["left_hip"]) and given is None
@@ -269,7 +269,7 @@ class Body(Record):
         return math.hypot(bone, across) if "shoulder" in name and "elbow" not in name else bone
 
     def angle_tolerance(self, *segments: tuple[int, int]) -> float:
-        """Return the tolerance of directions, degrees: the largest of those of the segments."""
+        """Return the tolerance of the directions of segments, degrees: the largest of them."""
         given = self.settings.angle_tolerance
         if self.tolerance is not None:
             return self.tolerance.angle
@@ -303,7 +303,7 @@ class Body(Record):
 
 
 def spine_gives(lengths: Mapping[str, float]) -> float:
-    r"""Return by how much bending to the side brings a shoulder nearer to the pelvis, metres.
+    r"""Return the largest decrease of the distance from shoulder to pelvis by bending to the side, metres.
 
     A spine of length h bent evenly by an angle :math:`\varphi` has a chord :math:`c = h \sin(\varphi/2) / (\varphi/2)`
     that leans by half the angle; a shoulder at w beside the neck is then at
@@ -321,7 +321,7 @@ def hips_share(lengths: Mapping[str, float]) -> float:
 
 
 def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
-    r"""Return how much the shoulder girdle changes two distances, metres: shoulder to shoulder, and shoulder to pelvis.
+    r"""Return the largest changes of two distances by the shoulder girdle, metres: between shoulders, to the pelvis.
 
     A clavicle of length c turns by up to :math:`\varphi` about its inner end, forward or upward. The shoulders then
     come nearer to each other by :math:`2 c (1 - \cos\varphi)`, and one rises by :math:`c \sin\varphi`.
@@ -332,7 +332,7 @@ def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
 
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:
-    """Let several checks share what is found in a body: it is computed once and kept as long as the body is."""
+    """Cache the result of a function of a body in that body, so that several checks share it."""
 
     @wraps(find)
     def found(body: Body) -> Found:

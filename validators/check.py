@@ -1,4 +1,4 @@
-"""`Check`: one kind of judgement about a body, and `Judgement`, what it found.
+"""`Check`: one kind of judgement about a body; and `Judgement`: its result.
 
 A check is any object with the four members of `Check`: postures, configurations and motion over time are judged alike.
 
@@ -13,10 +13,10 @@ A check is any object with the four members of `Check`: postures, configurations
             height = body.joints[:, [12, 13]] @ body.up - body.ground
             return Judgement(("right_ankle", "left_ankle"), height, lower=0.0, tolerance=0.01)
 
-Its docstring is the message of its findings. It may also have `points`, the names of the few points that it reads:
-the interpretation tree asks it as soon as these are placed. It may have `residuals(joints)`: for postures
-(N, 14, 3) it returns the excess over its bounds (N, K) in standard deviations, 0 inside them. The solver then draws
-noisy postures toward the bounds.
+The docstring is the message of the findings. A check may also have `points`, the names of the few points that it reads:
+the interpretation tree then applies the check as soon as it has placed these points. It may have `residuals(joints)`:
+for postures (N, 14, 3) this method returns the excess over the bounds (N, K) in standard deviations, 0 inside the
+bounds. The solver then draws noisy postures toward the bounds.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 #: Entry-point group in which other packages register their checks.
 ENTRY_POINTS: Final = "posekit.checks"
 
-#: Parts of a body that a check may declare to read, and why it is not asked about a body that lacks one.
+#: Data of a body that a check may read, and the reason that reports give for bodies without these data.
 READABLE: Final[Mapping[str, str]] = {
     "joints": "no joint positions are known",
     "head": "no head points are known",
@@ -60,7 +60,7 @@ CHECK_NAME: Final = re.compile(r"[a-z][a-z0-9-]*")
 
 
 class NotAskedError(PosekitError):
-    """A check does not apply to a body; the message is the reason. `Check.judge` may raise it."""
+    """A check does not apply to a body. `Check.judge` may raise this error; its message is the reason."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,16 +70,16 @@ class Judgement(Record):
     Parameters
     ----------
     places : sequence of K str
-        Judged things: an angle, a segment, a pair of bodies.
+        Names of the judged angles, segments or pairs of bodies.
     value : array (T, K)
-        The judged quantity in the check's unit; NaN where it is undecided.
+        Judged quantity in the check's unit; NaN if it is undecided.
     lower, upper : array broadcastable to (T, K)
         Bounds.
     tolerance : array broadcastable to (T, K)
-        Distance beyond a bound that is not yet a violation.
+        Distance beyond a bound up to which there is no violation.
     scale : array broadcastable to (T, K), optional
-        Size of one whole share of margin, in the check's unit. By default half the range or, where it has one end, the
-        size of that bound.
+        Margin that counts as 1 in `share`, in the check's unit. By default half the range or, if the range has one end
+        only, the size of that bound.
 
     Examples
     --------
@@ -126,12 +126,12 @@ class Judgement(Record):
 
     @property
     def violated(self) -> NDArray[np.bool_]:
-        """Whether the value is outside its bounds (T, K); False where it is undecided."""
+        """Whether the value is outside its bounds (T, K); False if it is undecided."""
         return np.asarray(self.margin < 0)
 
     @property
     def share(self) -> Array:
-        """Margins as shares of the range (T, K), comparable between checks: 1 in its middle, negative outside."""
+        """Margins as shares of the range (T, K), comparable between checks: 1 in the middle, negative outside."""
         if self.scale is not None:
             return np.asarray(self.margin / self.scale)
         lower, upper = np.asarray(self.lower), np.asarray(self.upper)
@@ -173,7 +173,7 @@ class Check(Protocol):
         """Data of a body that the check needs: names from `READABLE`."""
 
     def judge(self, body: Body) -> Judgement:
-        """Judge all frames of one body; raise `NotAskedError` where the check does not apply."""
+        """Judge all frames of one body; raise `NotAskedError` if the check does not apply to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +187,9 @@ class FunctionCheck:
     function : callable
         Judges a body; its keyword-only parameters are thresholds with defaults.
     over_time : bool
-        Whether it judges motion: frames without a value are then not undecided.
+        Whether the check judges motion. Frames without a value are then not undecided.
     thresholds : mapping
-        Thresholds other than the defaults.
+        Thresholds that differ from the defaults.
     """
 
     name: str
@@ -233,9 +233,9 @@ def check(
     name, unit, reads
         As `Check` has them.
     points : sequence of str
-        Names of the few points that it reads.
+        Names of the few points that the check reads.
     over_time : bool
-        Whether it judges motion.
+        Whether the check judges motion.
 
     Examples
     --------
@@ -257,14 +257,14 @@ def message_of(one: Check) -> str:
 
 
 def judged(one: Check, body: Body) -> Judgement:
-    """Ask a check about a body, and refuse an answer that is none.
+    """Return the judgement of a check about a body; refuse other answers.
 
     Raises
     ------
     NotAskedError
         If the check does not apply.
     InputError
-        If it does not return a `Judgement` with a row a frame, or rejects what it does not know.
+        If the check raises another error, or returns no `Judgement` with one row a frame.
     """
     for name in one.reads:
         if not body.knows(name):
@@ -286,20 +286,20 @@ def judged(one: Check, body: Body) -> Judgement:
 
 
 def find_check(given: Any, known: Mapping[str, Any]) -> Any:
-    """Return a check, or the class or function that makes one, by its name.
+    """Return a check by its name, and refuse objects that are no check.
 
     Parameters
     ----------
     given : str or Check
-        A name among `known`, the name of an entry point, ``module:Name`` (the current folder is searched too), or a
-        check itself.
+        A check, a name in `known`, the name of an entry point, or ``module:Name``. The module may be in the current
+        folder.
     known : mapping
-        Checks that come with posekit.
+        Checks of posekit by name.
 
     Raises
     ------
     InputError
-        If there is no such check or it lacks a member.
+        If there is no such check, or a member of `Check` is missing or wrong.
     """
     found = _named(given, known) if isinstance(given, str) else given
     found = found() if isinstance(found, type) else found
@@ -321,7 +321,7 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _named(given: str, known: Mapping[str, Any]) -> Any:
-    """Return what a name stands for; a module is looked for in the current folder first."""
+    """Return the check, or its class, that has a name; modules in the current folder come first."""
     name = given if ":" in given else given.replace("_", "-")
     if name in known:
         return known[name]

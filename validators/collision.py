@@ -1,7 +1,7 @@
 """Collision: arms, legs, torso and head do not penetrate each other (Lee & Chen 1985, §3.2.C).
 
-The figure's bodies are capsules along the posture's own segments. Their distance is that of their axes less both radii,
-in closed form.
+The bodies of the figure are capsules along the segments of the posture. The distance of two capsules is the distance of
+their axes minus both radii, in closed form.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from posekit.tree.steps import CAPSULES, Step, step
 from posekit.validators.body import Body, hips_share
 from posekit.validators.check import Judgement
 
-#: Penetration below which the verdict would be rounding, metres.
+#: Tolerance for rounding, metres.
 CONTACT_METRES: Final = 1e-9
 
-#: Postures measured at once: enough to spread the overhead of NumPy, few enough to stay in the processor's cache.
+#: Number of postures in one batch: large against the overhead of NumPy, small enough for the processor's cache.
 ROWS_AT_ONCE: Final = 512
 
-#: Distances below are exact; farther pairs have the distance of their bounding spheres, which is a lower bound.
+#: Smaller distances are exact, metres. For larger ones the distance of bounding spheres is returned, a lower bound.
 NEAR_METRES: Final = 0.1
 
 
@@ -37,7 +37,7 @@ class Collision:
     Parameters
     ----------
     pairs : tuple of (str, str), optional
-        Links whose capsules are judged; by default all that the figure's SRDF leaves to be checked.
+        Pairs of links; by default all pairs that the SRDF of the figure does not disable.
     """
 
     name = "collision"
@@ -55,7 +55,7 @@ class Collision:
 
     @cached_property
     def parts(self) -> list[Collision]:
-        """Return a check for the pairs of links that end at the same joint; the head's pairs have their own."""
+        """Return checks of pairs of links, grouped by the last joint in tree order; pairs of the head are apart."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
         for pair in _pairs(load_figure()):
             read = [point for link in pair for ends in CAPSULE_AXES[link] for point in ends]
@@ -64,7 +64,7 @@ class Collision:
         return [Collision(pairs=tuple(pairs)) for pairs in groups.values()]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check of the figure's own postures as steps of the compiled tree; the head has none."""
+        """Return the check as steps of the compiled tree; None for the head and for measured bodies."""
         if body.tolerance is None or any("head" in pair for pair in self.pairs):
             return None
         capsules = {capsule.link: capsule for capsule in body.figure.capsules}
@@ -116,12 +116,12 @@ class Collision:
 
 @lru_cache(maxsize=8)
 def _pairs(figure: Figure) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of links that a figure's SRDF leaves to be checked."""
+    """Return the pairs of links that the SRDF of a figure does not disable."""
     return tuple((figure.capsules[a].link, figure.capsules[b].link) for a, b in figure.capsule_pairs)
 
 
 def _slimness(body: Body, link: str) -> float:
-    """Return the factor of a capsule's radius: legs of people whose hips are nearer together are as much slimmer."""
+    """Return the factor of a capsule's radius: narrow hips of a person make the capsules of the legs slimmer."""
     if not body.measured or not link.endswith(("thigh", "shank")):
         return 1.0
     return min(hips_share(body.lengths) / hips_share(body.base_figure.lengths), 1.0)

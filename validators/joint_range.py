@@ -1,7 +1,8 @@
-"""Joint ranges: the angles of neck, pelvis and limbs, in any of the ways in which they can be written.
+"""Joint ranges: the angles of neck, pelvis and limbs are within their ranges.
 
-Limbs and pelvis are read by `posekit.solver.Limits`, the same numbers that the solver keeps to. A limb's
-orientation has several sets of Euler angles. It is legal if all angles of one set are within ranges and couplings.
+`posekit.solver.Limits` computes the angles and ranges of limbs and pelvis for this check and for the solver. The
+orientation of a limb has several sets of Euler angles; it is legal if all angles of one set are within ranges and
+couplings.
 """
 
 from __future__ import annotations
@@ -39,26 +40,26 @@ from posekit.validators.check import Judgement
 from posekit.validators.ranges import limits_of, load_ranges, of_person
 from posekit.validators.table1 import table1_angles
 
-#: Tolerance from which an axial rotation is not determined, degrees.
+#: An axial rotation with a larger tolerance is not determined, degrees.
 UNSEEN_DEGREES: Final = 45.0
 
-#: Bend of an elbow or knee below which measured bodies do not determine the rotation of shoulder or hip, degrees: 4
-#: degrees of valgus turn it by 15 there.
+#: Least bend of an elbow or knee that determines the rotation of shoulder or hip of measured bodies, degrees. At a bend
+#: of 15 degrees, 4 degrees of valgus change that rotation by 15.
 STRAIGHT_DEGREES: Final = 15.0
 
-#: Tolerance of angles that are exact, degrees: 5 µm at a wrist.
+#: Tolerance for rounding of exact angles, degrees: 5 µm at a wrist.
 ROUNDING_DEGREES: Final = 1e-3
 
-#: Bend from which a frame shows the axis of its hinge, degrees: carrying angles turn it by 35 at most.
+#: Least bend of a frame that determines the axis of its hinge, degrees: carrying angles turn that axis by 35 at most.
 BENT_DEGREES: Final = 20.0
 
-#: Bend from which a hinge is read by the axis of its neighbours, degrees.
+#: Least bend at which the axes of neighbouring frames decide the direction of a hinge, degrees.
 LEAST_DEGREES: Final = 8.0
 
-#: Cosine between the axis of a frame and that of its neighbours below which the hinge bends backward.
+#: A hinge bends backward if the cosine between its axis and the axis of neighbouring frames is smaller.
 OPPOSITE_COSINE: Final = -0.8
 
-#: Time to the neighbours that show the axis, seconds: within it people seldom turn a straight arm by half a turn.
+#: Longest time to a neighbouring frame, seconds: in less time people seldom turn a straight arm by half a turn.
 NEAR_SECONDS: Final = 1.0
 
 
@@ -69,13 +70,13 @@ PARTS: Final = ("neck", "pelvis", *LIMBS)
 class JointRange:
     """An angle of a joint is outside its range.
 
-    The rotation of an almost straight limb is hardly determined. Its tolerance is that of directions divided by the
-    sine of the bend; below `STRAIGHT_DEGREES` it is undecided for measured bodies.
+    An almost straight limb hardly determines its rotation. The tolerance of the rotation is the tolerance of directions
+    divided by the sine of the bend; for measured bodies the rotation is undecided at bends below `STRAIGHT_DEGREES`.
 
     Parameters
     ----------
     part : str
-        ``neck``, ``pelvis``, ``right_shoulder`` and so on; all of them by default.
+        ``neck``, ``pelvis``, ``right_shoulder`` or another limb; all parts by default.
     upper_only : bool
         Judge the upper segment of the limb alone.
     """
@@ -89,7 +90,7 @@ class JointRange:
 
     @cached_property
     def points(self) -> tuple[str, ...]:
-        """Names of the points that are read."""
+        """Names of the points that the check reads."""
         if self.part == "neck":
             return (*TORSO, *HEAD_POINTS)
         if self.part == "pelvis":
@@ -103,13 +104,13 @@ class JointRange:
 
     @cached_property
     def parts(self) -> list[JointRange]:
-        """Return a check for neck, pelvis, and each limb without and with its lower segment."""
+        """Return checks of the neck, the pelvis, and each limb without and with its lower segment."""
         early = [JointRange(part=limb, upper_only=True) for limb in LIMBS]
         whole = [JointRange(part=part) for part in PARTS]
         return [*whole[:2], *early, *whole[2:]]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check of the figure's own postures as steps of the compiled tree; the neck has none."""
+        """Return the check as steps of the compiled tree; None for the neck and for measured bodies."""
         if body.tolerance is None or self.part == "neck" or _of_table1(body):
             return None
         limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
@@ -146,15 +147,16 @@ class JointRange:
 
 
 def _of_table1(body: Body) -> Mapping[str, Any] | None:
-    """Return the table of ranges that is asked for if its angles are those of Lee & Chen."""
+    """Return the table of ranges of the settings if it has angles of Lee & Chen; otherwise None."""
     table = load_ranges(body.settings.ranges)
     return table if table is not None and table["kind"] in ("rotation", "projected") else None
 
 
 def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
-    """Judge one limb: in the usual way of writing, else in the one that is least outside.
+    """Judge the angles of one limb.
 
-    Over time, neighbouring frames of measured people tell which way a hinge bends.
+    If the usual set of Euler angles is outside its ranges, the set that is least outside counts. In motion of measured
+    people, neighbouring frames decide whether a hinge bends forward or backward.
     """
     joints, (places, keep) = body.joints, _places(limits, limb)
     tolerance = body.angle_tolerance((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
@@ -169,9 +171,9 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
 
     def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array, Array]:
-        """Return value, lower, upper and tolerance (4, n, W, 4), degrees.
+        """Return value, lower, upper and tolerance of each set's angles (4, n, W, 4), and two excesses (n, W), degrees.
 
-        And how far the worst is outside (n, W), without and with a rotation that is not determined.
+        An excess is of the worst angle of a set: without rotations that are not determined, and with them.
         """
         *angles, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
         value, lower, upper = np.degrees(np.stack(angles))
@@ -194,15 +196,15 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
         worst = np.where(backward[rows][:, None] & (numbers[0, ..., 3] >= 0), np.inf, worst)
         best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)
         found[:, rows] = numbers[:, np.arange(len(rows)), best]
-    found[0, backward, 2] = np.nan  # the hinge is named, not the ball joint above it
+    found[0, backward, 2] = np.nan  # report the hinge only, not the ball joint above it
     return Judgement(places, *found[..., keep])
 
 
 def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
-    """Return in which frames an elbow or a knee bends backward, as neighbouring frames show.
+    """Return whether an elbow or a knee bends backward in each frame (T,), by comparison with neighbouring frames.
 
-    Two directions alone do not separate a limb that bends backward from one that is turned by half a turn about its
-    upper segment. Motion does: an arm turns about itself by a few degrees a frame, not by half a turn.
+    In one frame, a limb that bends backward looks like a limb that is turned by half a turn about its upper segment.
+    Motion separates the two: an arm turns about itself by a few degrees in a frame, not by half a turn.
 
     Parameters
     ----------
@@ -228,7 +230,7 @@ def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: floa
         inside = (neighbour >= 0) & (neighbour < len(shows))
         other = shows[np.clip(neighbour, 0, len(shows) - 1)]
         near = inside & (np.abs(other - asked) * dt <= NEAR_SECONDS)
-        # The shortest rotation from one upper segment to the other carries the axis along.
+        # Apply the shortest rotation from one upper segment to the other to the axis.
         a, b = upper[other], upper[asked]
         carried = axis[other] - (dot(axis[other], b) / np.maximum(1.0 + dot(a, b), 0.1))[:, None] * (a + b)
         turned = dot(carried, axis[asked]) < OPPOSITE_COSINE
@@ -239,7 +241,7 @@ def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: floa
 
 
 def _places(limits: Limits, limb: int) -> tuple[list[str], list[int]]:
-    """Return the names of a limb's judged angles, and which of the four they are."""
+    """Return the names of the judged angles of a limb, and their indices among its four angles."""
     side = LIMBS[limb].split("_")[0]
     places = [f"{side}_{angle}" for angle in KINDS[limb // 2]]
     if limb < 2 and limits.numbers["by_elevation"]:
@@ -257,7 +259,7 @@ def _pelvis(limits: Limits, body: Body) -> Judgement:
 
 
 def _neck(ik: ClosedForm, body: Body) -> Judgement:
-    """Judge flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
+    """Judge flexion, bending and rotation of the head on the torso; undecided without head points."""
     R_torso = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
     value = np.degrees(ik.neck(R_torso, body.joints[:, 0], body.head))
     lower, upper = (np.degrees(one[:3]) for one in (ik.limits.lower, ik.limits.upper))
@@ -266,9 +268,9 @@ def _neck(ik: ClosedForm, body: Body) -> Judgement:
 
 @lru_cache(maxsize=32)
 def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedForm]:
-    """Return the ranges of a figure as numbers, and its closed form with the same limits of the neck.
+    """Return the limits of pelvis and limbs, and the closed form with the limits of the neck, by a table of ranges.
 
-    The hips of a measured person lie `forward` degrees before the trunk's line.
+    In the median frame the hips of a measured person lie `forward` degrees before the line of the trunk.
     """
     table = load_ranges(name)
     if table is None or table["kind"] != "anatomical":
@@ -284,5 +286,5 @@ def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedFo
 
 
 def _hips_outward(figure: Figure) -> float:
-    """Return by how many degrees straight thighs lean inward because hips are wider apart than usual."""
+    """Return the inward lean of straight thighs, degrees, because the hips are wider apart than usual."""
     return math.degrees(math.atan((hips_share(figure.lengths) - hips_share(load_figure().lengths)) / 2))

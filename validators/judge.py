@@ -1,4 +1,4 @@
-"""`validate_motion`, `Validator` and `assert_valid`: checks chosen, asked about a body, and gathered into a report."""
+"""`validate_motion`, `Validator` and `assert_valid`: apply the chosen checks to a body and return a report."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ ROBOT_CHECKS: Final[dict[str, Check]] = {
 USUAL_POSTURE_CHECKS: Final = ("rigid-parts", "joint-range", "collision")
 USUAL_ROBOT_CHECKS: Final = ("reach", "joint-range", "joint-travel", "mimic", "collision")
 
-#: Usual checks that apply to some robots only: it is not reported that they were not asked, unless they are named.
+#: Usual checks that apply to some robots only. Reports do not list them as "not asked" unless the user named them.
 OF_SOME_ROBOTS: Final = ("reach", "joint-travel", "mimic", "joint-velocity", "swap")
 
 #: All checks that come with posekit.
@@ -61,25 +61,25 @@ KNOWN: Final[dict[str, Check]] = {**POSTURE_CHECKS, **ROBOT_CHECKS, **MOTION_CHE
 
 
 class InvalidError(PosekitError, AssertionError):
-    """A posture that was asserted to be valid is not; the message has the first reasons."""
+    """`assert_valid` found postures that are not valid; the message has the first reasons."""
 
 
 def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[Check]:
-    """Return the checks that settings ask for, in the order in which they are reported.
+    """Return the checks of settings in the order of reports.
 
     Parameters
     ----------
     settings : Settings
-        By ``checks``; where these are not given, the usual ones, and over time those of the profile.
+        Their ``checks``; if these are None, the usual checks and, for motion, the checks of the profile.
     of_robot : bool
-        Whether configurations of a robot are judged.
+        Whether the checks judge configurations of a robot.
     in_time : bool
         Whether the frames follow each other in time.
 
     Raises
     ------
     InputError
-        If a name is not that of a check.
+        If there is no check of a name.
     """
     own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
     profile = load_profile(settings.profile) if isinstance(settings, ValidateSettings) else ()
@@ -90,29 +90,32 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
         raise refusal("--checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
     over_time = {**MOTION_CHECKS, **{one.name: one for one in profile}}
     found = [find_check(given, {**KNOWN, **over_time, **own}) for given in settings.checks]
-    # Checks of one's own come after those of postures, before those over time.
+    # Users' checks come after checks of postures and before checks over time.
     rank = {name: place for place, name in enumerate((*own, "", *over_time))}
     return sorted(found, key=lambda one: rank.get(one.name, rank[""]))
 
 
 def early_checks(settings: Settings) -> list[Check]:
-    """Return the checks of postures for a tree: those that have `parts` in parts, which read few points."""
+    """Return the posture checks of settings for the interpretation tree; the `parts` of a check, if it has any.
+
+    A part reads few points, so that the tree applies it early.
+    """
     asked = chosen_checks(settings, of_robot=False, in_time=False)
     postures = [check for check in asked if not getattr(check, "over_time", False)]
     return [part for check in postures for part in getattr(check, "parts", (check,))]
 
 
 class PostureJudge:
-    """Asks a check about postures (N, 14, 3) or (N, 19, 3) of a figure, as a tree does.
+    """Applies checks to postures (N, 14, 3) or (N, 19, 3) of a figure for the interpretation tree.
 
     Parameters
     ----------
     figure : Figure
-        The body whose postures they are.
+        Body of the postures.
     settings : Settings
-        Ranges, rules, contact margin.
+        Ranges, walking rules and contact margin.
     tolerance : Tolerance or None
-        Allowed differences from the figure; None for people that were measured.
+        Allowed differences from the figure; None for measured people.
     up : array (3,), optional
         Unit vector against gravity in the frame of the postures.
     """
@@ -124,21 +127,21 @@ class PostureJudge:
         self.tolerance, self.up = tolerance, up
 
     def __call__(self, check: Check, points: Array) -> Judgement:
-        """Return the judgement of a check; it has no place where the check cannot be asked."""
+        """Return the judgement of a check; without places if the check does not apply."""
         found = judge_postures(
             points, [check], self.figure, self.settings, tolerance=self.tolerance, up=self.up
         )
         return found.get(check.name) or Judgement((), np.empty((len(points), 0)))
 
     def steps(self, check: Any) -> list[Step] | None:
-        """Return a check as steps of the compiled tree; None if it has no such form."""
+        """Return the steps of a check for the compiled tree; None if the check has none."""
         if not hasattr(check, "steps"):
             return None
         return _steps(check, self.figure, self._unnamed, self.tolerance)
 
     @cached_property
     def _unnamed(self) -> ValidateSettings:
-        """The settings without checks: those may be objects by which no steps can be kept."""
+        """The settings without checks: users' checks may not be hashable, and `_steps` caches by the settings."""
         return replace(self.settings, checks=None)
 
 
@@ -146,7 +149,7 @@ class PostureJudge:
 def _steps(
     check: Any, figure: Figure, settings: ValidateSettings, tolerance: Tolerance | None
 ) -> list[Step] | None:
-    """Return a check of postures of a figure as steps of the compiled tree."""
+    """Return the steps of a posture check for the compiled tree."""
     none = np.empty((0, len(JOINTS), 3))
     body = Body(joints=none, base=figure, settings=settings, tolerance=tolerance, motion=False)
     found: list[Step] | None = check.steps(body)
@@ -162,12 +165,12 @@ def judge_postures(
     tolerance: Tolerance | None = None,
     up: Array | None = None,
 ) -> dict[str, Judgement]:
-    """Ask checks about postures (N, 14, 3) or (N, 19, 3) of a figure.
+    """Apply checks to postures (N, 14, 3) or (N, 19, 3) of a figure.
 
     Returns
     -------
     dict
-        The judgement of each check by its name; checks that cannot be asked are left out.
+        The judgement of each check by its name; without checks that do not apply.
     """
     body = Body(
         joints=points[:, : len(JOINTS)],
@@ -182,7 +185,7 @@ def judge_postures(
 
 
 def _asked(checks: Iterable[Check], body: Body) -> tuple[dict[str, tuple[Check, Judgement]], dict[str, str]]:
-    """Return by name the checks with what they found, and why the others do not apply."""
+    """Return checks with their judgements, and reasons of checks that do not apply, both by name."""
     found, not_asked = {}, {}
     for check in checks:
         try:
@@ -213,13 +216,14 @@ def validate_motion(
     motion : Motion
         Positions, or configurations.
     settings : ValidateSettings, optional
-        What decides the verdicts.
+        Checks, ranges and tolerances.
     robot : Robot, optional
-        The robot whose configurations `motion` holds, or that is to take its positions (inverse kinematics).
+        The robot of the configurations in `motion`. If `motion` has positions only, inverse kinematics fits the robot
+        to them.
     figure : Figure, optional
-        The figure that positions are compared with, with the lengths of the person if these are measured.
+        The figure that positions are compared with. It is scaled to measured people.
     tolerance : Tolerance, optional
-        Tolerance of postures of that figure itself; measured people otherwise.
+        Allowed differences from `figure`, for its own postures; without it positions are of measured people.
 
     Returns
     -------
@@ -228,7 +232,7 @@ def validate_motion(
     Raises
     ------
     InputError
-        If a check is unknown or the motion does not fit the robot.
+        If there is no such check, or the configurations are not of the robot.
     """
     asked = settings or ValidateSettings()
     if not len(motion):
@@ -239,7 +243,7 @@ def validate_motion(
         raise refusal(
             motion.source or "motion", "q", got, f"{robot.model.nq} of {robot.name}", "name the robot"
         )
-    # Points of configurations cost as much as all other checks, collision aside.
+    # The points of configurations cost as much as all checks except collision.
     placed = motion.in_time or any("joints" in check.reads for check in checks)
     reports = []
     for name, recording in motion.recordings():
@@ -256,7 +260,7 @@ def validate_motion(
 
 
 def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[Robot, Motion, Array]:
-    """Fit a robot, scaled to the person unless that is strict, to positions."""
+    """Return a robot, scaled to the person unless settings are strict, with its fit to positions and the residuals."""
     joints = motion.figure_joints
     used = robot if settings.strict else robot.scaled(joints)
     known = np.isfinite(joints).any(axis=(1, 2))
@@ -269,7 +273,7 @@ def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[R
 
 
 def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
-    """Ask all checks about one recording."""
+    """Return the report of checks about one recording."""
     by_name, not_asked = _asked(checks, body)
     found = list(by_name.values())
     quiet = OF_SOME_ROBOTS if body.settings.checks is None else ()
@@ -333,9 +337,9 @@ class Validator:
         Otherwise a robot: a name of example-robot-data (``human``, ``g1``, …), the path of a URDF, or a
         `posekit.robots.Robot`.
     settings : ValidateSettings, optional
-        What decides the verdicts.
+        Checks, ranges and tolerances.
     checks, ranges, profile, ground, strict : optional
-        As the fields of `ValidateSettings`, on top of the settings.
+        Fields of `ValidateSettings`; they override `settings`.
 
     Examples
     --------
@@ -392,11 +396,11 @@ class Validator:
         given : array or Motion
             Joints (14, 3) or (N, 14, 3), with head points (N, 19, 3), metres, NaN where unknown; or configurations
             (nq,) or (N, nq), or (N, nq - 7) without a free root, which is then at neutral. One posture is a batch of
-            one. Postures are taken as those of one person.
+            one. All postures are of one person.
         head : array (N, 5, 3), optional
             Nose, eyes and ears.
         tolerance : Tolerance, optional
-            Tolerance of postures of the figure itself; measured people otherwise.
+            Allowed differences from the figure, for its own postures; without it positions are of measured people.
 
         Returns
         -------
@@ -405,7 +409,7 @@ class Validator:
         Raises
         ------
         InputError
-            If a shape is wrong or a number is infinite or absurd.
+            If a shape is wrong, a number is infinite, or a coordinate is over 1000 km.
         """
         motion = given if isinstance(given, Motion) else self.motion(given, head)
         figure = self.figure
@@ -418,12 +422,12 @@ class Validator:
         return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
 
     def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
-        """Lay out an array of postures as `check` takes it: frames that do not follow each other in time.
+        """Return an array of postures as a motion whose frames are not in time.
 
         Raises
         ------
         InputError
-            If a shape is wrong or a number is infinite or absurd.
+            If a shape is wrong, a number is infinite, or a coordinate is over 1000 km.
         """
         count = len(self.configuration_names)
         expected = f"joints (N, {len(JOINTS)}, 3), or configurations (N, {count})"
@@ -457,12 +461,12 @@ class Validator:
         raise refusal("postures", "", f"shape {values.shape}", expected, "give one posture a row")
 
 
-#: Coordinates beyond are in no unit of length that bodies are measured in, metres.
+#: Largest plausible coordinate, metres: no unit of length gives larger ones.
 MOST_METRES: Final = 1e6
 
 
 def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
-    """Load the body that judges: the figure, a figure's own URDF, or a robot."""
+    """Return the figure or the robot of a name or a URDF."""
     from posekit.robots import Robot, load_robot
 
     if isinstance(urdf, Robot):

@@ -1,8 +1,8 @@
 """Tables of joint ranges, read from TOML of schema ``posekit.ranges/1``.
 
-A table of kind ``anatomical`` has a mean and a spread over people for each end of each angle, and couplings between
-angles; ``rotation`` and ``projected`` have limits of the angles of Lee & Chen 1985, §3.2.A, as rotations from standing
-and as printed; ``joints`` has limits of a robot's joints.
+There are four kinds of table. ``anatomical``: mean and spread over people of both ends of each angle, and couplings
+between angles. ``rotation`` and ``projected``: limits of the angles of Lee & Chen 1985, §3.2.A, as rotations from
+standing and as printed. ``joints``: limits of a robot's joints.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ KINDS: Final = ("anatomical", "rotation", "projected", "joints")
 #: Tables by name; ``urdf`` stands for the URDF's own limits.
 NAMED: Final = ("urdf", "anatomical", "table1", "table1-printed", "human_as_stick_figure")
 
-#: Standard deviation of how people hold their pelvis under the trunk in the median frame of a recording, degrees: 8
-#: between 16 recordings of one skeleton, which walks, runs, jumps and crouches.
+#: Standard deviation between recordings of the median angle between pelvis and trunk, degrees. In 16 recordings of one
+#: skeleton that walks, runs, jumps and crouches it is 8.
 MOSTLY_HELD_DEGREES: Final = 10.0
 
 #: Height of the figure's pelvis joint above the line between its hips, metres.
@@ -47,7 +47,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
     Raises
     ------
     InputError
-        If there is no such table, or it is not as the schema says.
+        If there is no such table, or it breaks the schema.
     """
     if name == "urdf":
         return None
@@ -100,7 +100,7 @@ def _is_number(value: Any) -> bool:
 
 
 def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
-    """Return the ranges of a figure's pelvis and limbs: those of a table of kind ``anatomical``, else its own."""
+    """Return the ranges of pelvis and limbs: from a table of kind ``anatomical``, else from the figure's URDF."""
     pelvis, right, left = (figure.neutral_points[JOINT[joint]] for joint in HIPS)
     return Limits.of(
         table if table and table["kind"] == "anatomical" else None,
@@ -111,20 +111,20 @@ def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
 
 
 def of_person(table: Mapping[str, Any], forward: float, outward: float) -> Mapping[str, Any]:
-    """Return anatomical ranges of a person whose hips lie before the trunk's line in the median frame.
+    """Return anatomical ranges of a person whose hips lie before the line of the trunk in the median frame.
 
-    Part of the difference from the usual is where the skeleton has its pelvis joint, which moves the zeros of pelvis
-    and hips, and part is how the person mostly held it. Which of the two is not known: an end that a moved zero takes
-    outward moves, the other stays.
+    An unusual angle of the hips has two causes: the place of the pelvis joint in the skeleton, which moves the zeros of
+    pelvis and hips, and the person's usual posture. A recording does not separate the causes. So the ranges only
+    widen: an end moves if a moved zero takes it outward, and the opposite end stays.
 
     Parameters
     ----------
     table : mapping
-        Of kind ``anatomical``.
+        Ranges of kind ``anatomical``.
     forward : float
         Angle of the hips before the trunk's line, degrees.
     outward : float
-        Angle by which straight thighs lean inward because the hips are wider apart than people's, degrees.
+        Inward lean of straight thighs, degrees, because the hips are wider apart than usual.
     """
     moved = copy.deepcopy(dict(table))
     ways = [(moved["hip"]["abduction"], -outward)]

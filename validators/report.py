@@ -1,4 +1,4 @@
-"""`Report`: one table of findings; masks, spans, decisions about clips and summaries are computed from it."""
+"""`Report`: a table of findings; masks, spans, decisions about clips and summaries are computed from the table."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from posekit.geometry import Array, Record, runs
 if TYPE_CHECKING:
     import pandas
 
-#: Largest distance between a cause and its effect, frames: the window in which trembling is measured.
+#: Largest distance between a cause and its effect, frames: the window over which `jitter` measures trembling.
 NEAR_FRAMES: Final = 15
 
-#: Gap within one span at most, seconds; the same in frames where the rate is not known, and the least.
+#: Longest gap inside one span, seconds. In frames it is at least the second number, also if the rate is not known.
 MERGED_SECONDS, MERGED_FRAMES = 0.1, 3
 
-#: Excess that counts as slight, in a check's unit: the flesh of a body, the spread of people's ranges, and the sway of
-#: measured feet. For other units it is a tenth of the bound.
+#: Excess over a bound that has severity 1, by unit: 1 cm of flesh, the spread of joint ranges between people in
+#: degrees, the sway of measured feet in metres a second. For other units it is a tenth of the bound.
 SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
 
-#: Next step of the user where none is known that fits better.
+#: Advice for findings of checks without an advice of their own in ``urdf/checks.toml``.
 USUAL_REMEDY: Final = "leave such frames out with --keep-spans, or use --repair"
 
-#: Columns of the findings that are numbers.
+#: Columns of the findings with real numbers.
 NUMBERS: Final = ("value", "lower", "upper", "margin")
 
 Columns = Mapping[str, NDArray[Any]]
@@ -41,7 +41,7 @@ Columns = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Span:
-    """Neighbouring frames of one clip that one check rejects, or is undecided about.
+    """Neighbouring frames of one clip that one check rejects, or in which it is undecided.
 
     Parameters
     ----------
@@ -52,17 +52,17 @@ class Span:
     first, last : int
         First and last frame, both included.
     frames : int
-        Number of frames that are rejected.
+        Number of rejected frames.
     worst_frame : int
-        Frame that is farthest outside.
+        Frame with the smallest margin.
     start, end : float
-        Seconds of the first and the last frame; NaN where not known.
+        Times of the first and the last frame, seconds; NaN if unknown.
     value, bound, margin : float
-        Value in the worst frame, the bound that it violates, and the difference, negative.
+        Value in the worst frame, the violated bound, and their difference, negative.
     severity : float
-        Excess in multiples of a slight one (`SLIGHT`).
+        Excess over the bound in multiples of a slight excess (`SLIGHT`).
     places : sequence of str
-        All places that are rejected, the worst first.
+        All rejected places, the worst first.
     """
 
     check: str
@@ -98,17 +98,17 @@ class ClipDecision:
     Parameters
     ----------
     file, name : str
-        File of the clip, and its name there; empty where it has none.
+        File of the clip, and its name in the file; empty if it has none.
     decision : str
-        ``keep``; ``repair?`` where `posekit.repair` can remove everything that is found; else ``drop``.
+        ``keep``; ``repair?`` if `posekit.repair` can remove all findings; otherwise ``drop``.
     reason : str
-        Check that decides it; empty for clips that are kept.
+        Name of the check with the first span; empty for clips to keep.
     frames, invalid, undecided : int
-        Number of frames, and of those that are rejected and undecided.
+        Numbers of all frames, rejected frames and undecided frames.
     severity : float
-        The largest excess in multiples of a slight one; 0 where nothing is rejected.
+        Largest severity of the spans; 0 without rejected frames.
     spans : sequence of Span
-        What is behind the decision: causes first, then the most severe.
+        Spans behind the decision: causes before their effects, then by severity.
     good : (int, int) or None
         First and last frame of the longest run of valid frames.
     """
@@ -126,43 +126,43 @@ class ClipDecision:
 
     @property
     def title(self) -> str:
-        """File and name, as printed."""
+        """File and name in one line."""
         return _title(self.file, self.name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Report(Record):
-    """What checks found in N frames.
+    """Findings of checks in N frames.
 
     Parameters
     ----------
     clip, frame : int array (N,)
-        Clip of each frame, and its number there, from 0.
+        Index of the clip of each frame, and the frame's number in that clip, from 0.
     time : array (N,)
-        Seconds; NaN where not known.
+        Seconds; NaN if unknown.
     files, names : sequence of str
         File and name of each clip.
     checks, units : sequence of K str
-        Checks that were asked, in order, and their units.
+        Names and units of the applied checks.
     places : sequence of str
-        Places that findings refer to.
+        Names of judged places; findings refer to them by index.
     findings : mapping of arrays
         Columns of the violations, sorted by frame: ``row`` (frame, from 0 to N - 1), ``check`` and ``place`` (indices),
-        ``value``, ``lower`` and ``upper`` (bounds with their tolerance), ``margin`` (negative).
+        ``value``, ``lower`` and ``upper`` (bounds with tolerance), ``margin`` (negative).
     margins : array (N, K)
-        Worst margin of each check in shares of its range, negative outside; NaN where it is undecided.
+        Smallest margin of each check in shares of its range, negative outside; NaN if undecided.
     silent : bool array (N, K)
-        Whether a check that judges postures could decide nothing.
+        Whether a check of postures is undecided at all places.
     incomplete : bool array (N,)
-        Whether a joint is not known.
+        Whether a joint is unknown.
     messages : mapping
-        What the findings of each check mean.
+        Meaning of the findings of each check.
     not_asked : mapping
-        Checks that do not apply, and why.
+        Reasons of the checks that do not apply.
     settings : mapping
-        Everything that decided the verdicts.
+        Settings and tolerances of the verdicts.
     notes, warnings, refused : sequence of str
-        What was found out about the motion, contradictions, and files that could not be read.
+        Remarks about the motion, doubts about it, and error lines of unreadable files.
 
     Examples
     --------
@@ -201,36 +201,36 @@ class Report(Record):
 
     @cached_property
     def invalid(self) -> NDArray[np.bool_]:
-        """Whether a check rejects each frame (N,)."""
+        """Whether any check rejects each frame (N,)."""
         found = np.zeros(len(self), dtype=np.bool_)
         found[self.findings["row"]] = True
         return found
 
     @cached_property
     def undecided(self) -> NDArray[np.bool_]:
-        """Whether nothing rejects a frame, but a joint is not known or a check could decide nothing (N,)."""
+        """Whether no check rejects a frame, but a joint is unknown or a check is undecided (N,)."""
         return np.asarray(~self.invalid & (self.incomplete | self.silent.any(axis=1)))
 
     @cached_property
     def ok(self) -> NDArray[np.bool_]:
-        """Whether each frame is valid: every check is decided, and none rejects it (N,)."""
+        """Whether each frame is valid: every check is decided, and no check rejects it (N,)."""
         return np.asarray(~self.invalid & ~self.undecided)
 
     @cached_property
     def worst(self) -> Array:
-        """Smallest margin of each frame (N,) in shares of the range: negative where it is rejected, NaN undecided."""
+        """Smallest margin of each frame (N,) in shares of the range: negative if rejected, NaN if undecided."""
         least = np.fmin.reduce(self.margins, axis=1, initial=np.nan)
         return np.where(self.undecided, np.nan, least)
 
     @property
     def verdicts(self) -> list[str]:
-        """``valid``, ``invalid`` or ``undecided``, a word a frame."""
+        """``valid``, ``invalid`` or ``undecided`` for each frame."""
         words = np.where(self.invalid, "invalid", np.where(self.undecided, "undecided", "valid"))
         return [str(word) for word in words]
 
     @cached_property
     def _cells(self) -> Columns:
-        """The findings, and a row of NaN for each check that is undecided about a frame, by frame and check."""
+        """The findings, with a row of NaN for each frame and check that is undecided; sorted by frame and check."""
         rows, which = np.nonzero(self.silent & self.undecided[:, None])
         nothing = {"row": rows, "check": which, "place": np.full(len(rows), -1)}
         unknown = np.full(len(rows), np.nan)
@@ -247,8 +247,8 @@ class Report(Record):
         Returns
         -------
         dict
-            ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row a violation, and a
-            row for each check that is undecided about a frame, whose numbers are NaN.
+            ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row for each violation,
+            and a row whose numbers are NaN for each frame and check that is undecided.
         """
         cells = self._cells
         undecided = np.isnan(cells["margin"]).astype(np.intp)
@@ -277,7 +277,7 @@ class Report(Record):
     def save(self, path: str | PathLike[str], *, clips: bool = False) -> None:
         """Write the report: ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md``.
 
-        With `clips`, ``.csv`` and ``.parquet`` have a row a clip, with its decision, in place of a row a finding.
+        With `clips`, ``.csv`` and ``.parquet`` have one row for each clip, with its decision, instead of the findings.
         """
         import posekit
 
@@ -317,7 +317,7 @@ class Report(Record):
         )
 
     def _spans(self, start: int, stop: int) -> Iterator[Span]:
-        """Cut the findings and the undecided frames of a clip into runs of one check."""
+        """Group the findings and the undecided frames of a clip into spans of one check."""
         step = np.diff(self.time[start:stop])
         step, gap = step[step > 0], MERGED_FRAMES
         if len(step):
@@ -331,7 +331,7 @@ class Report(Record):
                 yield self._span(check, {name: column[part] for name, column in cells.items()})
 
     def _span(self, check: int, cells: Columns) -> Span:
-        """Make a span of its cells."""
+        """Return the span of neighbouring findings of one check."""
         unit, rows = self.units[check], cells["row"]
         order = np.argsort(cells["margin"], kind="stable")
         value, lower, upper, margin = (float(cells[name][order[0]]) for name in NUMBERS)
@@ -373,7 +373,7 @@ class Report(Record):
         return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
-        """Count for each check the frames and clips that it rejects, with its most frequent place and worst finding."""
+        """Return for each check the numbers of rejected frames and clips, the most frequent place and the worst."""
         counts: dict[str, dict[str, Any]] = {}
         for k, name in enumerate(self.checks):
             found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}
@@ -394,12 +394,12 @@ class Report(Record):
         return counts
 
     def summary(self, most: int = 5) -> str:
-        """Return the report in words: the decision, the checks in frames and clips, the worst clips, notes.
+        """Return the report as text: the decision, a table of checks, the worst clips, warnings and notes.
 
         Parameters
         ----------
         most : int
-            Number of clips that are listed.
+            Largest number of listed clips.
         """
         total = max(len(self), 1)
         lines = [self.decision, ""]
@@ -444,7 +444,7 @@ def _title(file: str, name: str) -> str:
     return " ".join(part for part in (file, name) if part)
 
 
-#: Size below which a quantity is written as 0: rounding that a bound allows, in the unit of the check.
+#: Values below this size are rounding errors and are written as 0, in the unit of the check.
 NEGLIGIBLE: Final = 1e-6
 
 
@@ -462,7 +462,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
-    """Join the reports of several files into one; checks and places are matched by name."""
+    """Return one report of several; checks and places of one name are the same."""
     units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
     check_at = {name: k for k, name in enumerate(units)}
     places = dict.fromkeys(name for one in reports for name in one.places)
@@ -500,12 +500,12 @@ def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
     )
 
 
-#: Start of the note about the ground of a clip.
+#: Start of the note about an estimated ground.
 GROUND_NOTE: Final = "Ground estimated"
 
 
 def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return each note once, and one note about all estimated grounds."""
+    """Return notes without duplicates, with one note in place of all notes about estimated grounds."""
     grounds = sum(note.startswith(GROUND_NOTE) for note in notes)
     others = tuple(dict.fromkeys(note for note in notes if not note.startswith(GROUND_NOTE)))
     one = f"{GROUND_NOTE} in {plural(grounds, 'clip')}, from frames in which the body rests; state it with --ground."
@@ -514,17 +514,17 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
-    """Return the table of checks for reports: their rank among causes, whether repair helps, the user's next step."""
+    """Return ``urdf/checks.toml``: by check its rank among causes, whether repair helps, and the advice."""
     return tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
 
 
 def rank_of(check: str) -> int:
-    """Return the rank of a check among causes: 0 if other checks reject what it finds, above 1 the other way."""
+    """Return the rank of a check among causes and effects: 0 for causes, above 1 for effects, 1 for other checks."""
     return int(_known_checks().get(check, {}).get("rank", 1))
 
 
 def _in_order(spans: list[Span]) -> list[Span]:
-    """Sort spans: rejections before what is undecided, causes before effects near them, then by severity."""
+    """Sort spans: rejections before undecided spans, causes before effects near them, then by severity."""
     ranks = [rank_of(span.check) for span in spans]
     rejected = [span.verdict == "invalid" for span in spans]
 

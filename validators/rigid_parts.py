@@ -18,10 +18,10 @@ from posekit.validators.check import Judgement
 
 TORSO_POINTS: Final = [JOINT[name] for name in TORSO]
 
-#: Distance that counts as one whole share of margin at least, metres.
+#: Smallest tolerance by which margins are divided, metres.
 LEAST_SCALE: Final = 1e-3
 
-#: Signs of the torso's coordinates in its mirror image: front is back.
+#: Signs of the torso's coordinates in its mirror image, which exchanges front and back.
 MIRROR: Final = np.array([-1.0, 1.0, 1.0])
 
 
@@ -32,11 +32,11 @@ class RigidParts:
     Parameters
     ----------
     segments : tuple of (int, int)
-        Pairs of joints whose distance is judged.
+        Pairs of joints; the check judges their distances.
     torso : bool
-        Judge the torso's shape too. For exact postures the figure's torso is superimposed on the posture's, as the
-        configuration q will be, and points are compared. Otherwise the side of the line from neck to pelvis is judged
-        on which the shoulders lie, which distances do not determine.
+        Judge the shape of the torso too. For exact postures the check aligns the figure's torso with the posture's, as
+        the closed form of q does, and compares points. For other postures it judges only whether the shoulders lie on
+        the right side of the line from neck to pelvis, front or back: distances do not determine the side.
     """
 
     name = "rigid-parts"
@@ -48,18 +48,18 @@ class RigidParts:
 
     @cached_property
     def points(self) -> tuple[str, ...]:
-        """Names of the joints that are read."""
+        """Names of the joints that the check reads."""
         read = {joint for segment in self.segments for joint in segment}
         return tuple(JOINTS[joint] for joint in sorted(read | set(TORSO_POINTS if self.torso else ())))
 
     @cached_property
     def parts(self) -> list[RigidParts]:
-        """Return a check for each rigid segment that closes a loop, and one for the torso."""
+        """Return a check of each rigid segment of trunk and hips, and a check of the torso."""
         torso = RigidParts(segments=(), torso=True)
         return [*(replace(torso, segments=(segment,), torso=False) for segment in RIGID_SEGMENTS), torso]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check of exact postures as steps of the compiled tree."""
+        """Return the check as steps of the compiled tree; None unless postures are exact."""
         if body.tolerance is None or not body.tolerance.exact:
             return None
         found = [
@@ -79,7 +79,7 @@ class RigidParts:
         return found
 
     def judge(self, body: Body) -> Judgement:
-        """Compare distances with the figure's, and the torso with its own."""
+        """Compare distances and the torso with the figure's."""
         names = [segment_name(segment) for segment in self.segments]
         length = np.array([body.lengths[name] for name in names])
         value = body.segment_lengths[[SEGMENTS.index(segment) for segment in self.segments]].T
@@ -106,7 +106,7 @@ class RigidParts:
 
     @staticmethod
     def _placement(body: Body) -> tuple[Array, float, float]:
-        """Return the largest distance (N,) between the torso's joints and the figure's torso laid onto them."""
+        """Return the largest distance (N,) of a torso joint from the aligned torso of the figure, and bounds."""
         figure, points = body.figure, body.joints[:, TORSO_POINTS]
         R = torso_frame(*np.moveaxis(points, 1, 0))
 
@@ -116,6 +116,6 @@ class RigidParts:
 
         torso, tolerance = figure.neutral_points[TORSO_POINTS], body.rigid_tolerance(RIGID_SEGMENTS[0])
         value = apart(torso)
-        if not figure.side_known:  # a torso that only the mirror image fits is undecided
+        if not figure.side_known:  # a torso that fits the mirror image only is undecided
             value = np.where((value > tolerance) & (apart(torso * MIRROR) <= tolerance), np.nan, value)
         return value, -np.inf, tolerance

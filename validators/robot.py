@@ -1,4 +1,4 @@
-"""Checks of a robot's configurations: joint limits, mimicking joints, collision, and reach of given positions."""
+"""Checks of the configurations of a robot: joint limits, mimicking joints, collision, and reach of positions."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from posekit.validators.ranges import load_ranges
 if TYPE_CHECKING:
     from posekit.robots import Robot
 
-#: Difference of a mimicking joint that files written with few digits may have, degrees.
+#: Tolerance of mimicking joints, degrees: files with few digits have such rounding.
 MIMIC_DEGREES: Final = 0.5
 
-#: Penetration below which the verdict would be rounding, metres.
+#: Tolerance for rounding, metres.
 CONTACT_METRES: Final = 1e-9
 
-#: Distance up to which bodies are measured, and which counts as one whole share of margin, metres.
+#: Largest measured distance between bodies, which is also the margin that counts as 1, metres.
 NEAR_METRES: Final = 0.02
 
 
-#: Distance of a foot's joint from the ankle at most, as a share of the leg, and depth of the corners of a sole, metres.
+#: Largest distance of a foot's joint from the ankle, as a share of the leg; and range of heights of a sole, metres.
 FOOT_SHARE, SOLE_METRES = 0.1, 0.02
 
 
 @check("joint-range", unit="deg", reads=("q", "robot"))
 def robot_range(body: Body) -> Judgement:
-    """Joints are outside the limits of their URDF, or of the table of ranges that is asked for."""
+    """Joints are outside the limits of their URDF, or of the table of ranges in the settings."""
     return _range(body, "rad", float(np.degrees(1.0)))
 
 
@@ -47,7 +47,7 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
     robot, q = _of(body)
     lower, upper = np.array(robot.lower), np.array(robot.upper)
     names, table = list(robot.configuration_names), load_ranges(body.settings.ranges)
-    # Tables of another kind are of people.
+    # Tables of other kinds hold angles of people.
     limits = table["limits"] if table is not None and table["kind"] == "joints" else {}
     for at, name in enumerate(names):
         if name in limits:
@@ -68,7 +68,7 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
 
 
 def _of(body: Body) -> tuple[Robot, Array]:
-    """Return the robot and its configurations: checks that read them are asked only if both are known."""
+    """Return the robot and its configurations; both are known if a check reads them."""
     return cast("tuple[Robot, Array]", (body.robot, body.q))
 
 
@@ -76,7 +76,7 @@ def _of(body: Body) -> tuple[Robot, Array]:
 def mimic_joints(body: Body) -> Judgement:
     """Joints do not follow the joints that they mimic.
 
-    Measure how far mimicking joints are from the values of their targets.
+    The value is the difference of a mimicking joint from its value by its target.
     """
     robot, q = _of(body)
     if not robot.mimics:
@@ -89,9 +89,8 @@ def mimic_joints(body: Body) -> Judgement:
 def robot_collision(body: Body) -> Judgement:
     """Two bodies of the robot penetrate each other.
 
-    Measure the distances of pairs that touch or are near; the place ``bodies`` is the nearest pair of all.
-    Farther than `NEAR_METRES` the value is infinite, and so it is for meshes that do not touch: their distances cost
-    as much again as the verdict.
+    The value is the distance of two bodies. The place ``bodies`` is the nearest pair. Distances above `NEAR_METRES` are
+    infinite, as are distances of meshes that do not touch: measuring them would double the cost of a verdict.
     """
     robot, q = _of(body)
     if not robot.collision_pairs:
@@ -109,7 +108,7 @@ def robot_collision(body: Body) -> Judgement:
     value[known[found.frame[touching]], column] = found.distance[touching]
     links = dict(zip(robot.body_names, robot.body_links, strict=True))
     places = ["-".join(links[name] for name in robot.collision_pairs[pair]) for pair in pairs.tolist()]
-    # Pairs that touch are named themselves.
+    # Pairs that touch have places of their own.
     value[value[:, -1] < margin, -1] = np.inf
     return Judgement([*places, "bodies"], value, margin, tolerance=CONTACT_METRES, scale=NEAR_METRES)
 
@@ -118,7 +117,7 @@ def robot_collision(body: Body) -> Judgement:
 def reach(body: Body) -> Judgement:
     """Given positions of joints are beyond the reach of the robot within its limits.
 
-    Measure the distance of each joint of the fitted configuration from where it was given.
+    The value is the distance of each joint of the fitted configuration from its given position.
     """
     if body.residual is None:
         raise NotAskedError("configurations are given, not positions")
@@ -129,7 +128,10 @@ def reach(body: Body) -> Judgement:
 
 @lru_cache(maxsize=4)
 def _soles(robot: Robot) -> tuple[list[int], Array] | None:
-    """Return the joints and places (4, 3) of toes and heels: front and back corners of the boxes around the feet."""
+    """Return joint indices and positions in these joints (4, 3) of toes and heels, or None if the robot has no feet.
+
+    Toes and heels are front and back corners of the boxes around the bodies of the feet.
+    """
     import pinocchio as pin
 
     data = robot.model.createData()
@@ -159,14 +161,14 @@ def _soles(robot: Robot) -> tuple[list[int], Array] | None:
 
 
 def _box(shape: Any) -> Array:
-    """Return the corners (8, 3) of the box around a body, in its own frame."""
+    """Return the corners (8, 3) of the bounding box of a body, in the frame of the body."""
     shape.computeLocalAABB()
     ends = np.array([np.ravel(shape.aabb_local.min_), np.ravel(shape.aabb_local.max_)])
     return np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
 
 
 def sole_points(robot: Robot, q: Array) -> Array:
-    """Return toes and heels (N, 4, 3) of configurations, metres: ends of the soles; NaN if the robot has no feet."""
+    """Return the toes and heels (N, 4, 3) of configurations, metres; NaN if the robot has no feet."""
     points = np.full((len(q), len(FEET_POINTS), 3), np.nan)
     soles = _soles(robot)
     if soles is not None:

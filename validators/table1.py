@@ -1,16 +1,17 @@
 r"""Joint ranges by the angles of Lee & Chen 1985, §3.2.A: as rotations from standing, or projected as printed.
 
-The torso's frame has x forward, y down and z left. As rotations (kind ``rotation``) nothing jumps where a limb can be:
+The torso's frame has x forward, y down and z left. Angles as rotations (kind ``rotation``) are continuous wherever a
+limb can be:
 
-An upper arm u at :math:`\rho` from y is carried there by one shortest rotation; its part about z is flexion, its part
-about x abduction, :math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)` with :math:`\rho = \arccos u_y`. A
-thigh has the print's flexion :math:`\operatorname{atan2}(u_x, u_y)`, and abduction is the angle out of the plane of
-flexion. Elbow and knee bend about the axis z that the upper segment takes with it: with v the lower segment and
-:math:`\psi` its angle to u, flexion is :math:`\psi\,(v \times u) \cdot z' / \sin\psi`, the opposite at a knee. Pelvis
-and neck: the parts of the rotation of the plane about z, y and x.
+An upper arm u at :math:`\rho` from y is the image of y under a shortest rotation. The part of this rotation about z is
+flexion, the part about x is abduction, :math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)` with
+:math:`\rho = \arccos u_y`. A thigh has the printed flexion :math:`\operatorname{atan2}(u_x, u_y)`, and abduction is the
+angle out of the plane of flexion. Elbow and knee bend about z', the axis z carried along by the upper segment. With v
+the lower segment and :math:`\psi` its angle to u, flexion is :math:`\psi\,(v \times u) \cdot z' / \sin\psi`, its
+negative at a knee. Pelvis and neck have the parts about z, y and x of the rotation of their plane.
 
 As printed (kind ``projected``) flexion and abduction are angles of projections onto the planes of the frame. A
-projection without direction is undecided, and an angle jumps where a limb passes the normal of a plane.
+projection that is too short is undecided, and an angle jumps if a limb passes the normal of a plane.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 
 HIP_SIGNS: Final = (1.0, -1.0, 1.0)
-#: Signs of flexion, rotation and bending of a plane, to be the part's own.
+#: Signs of the flexion, rotation and bending of a plane that make them angles of the head.
 HEAD_SIGNS: Final = (-1.0, 1.0, -1.0)
 
 PLANE_ANGLES: Final = ("flexion", "rotation", "bending")
 
-#: Sines and cosines that are not divided by when smaller.
+#: Smallest divisor among sines and cosines.
 LEAST_SINE: Final = 1e-12
 
-#: Angle within which -180 counts as 180, degrees.
+#: Angles this near to -180 degrees count as 180, degrees.
 ROUNDING_DEGREES: Final = 1e-3
 
 
@@ -50,7 +51,10 @@ def table1_angles(body: Body, table: Mapping[str, Any], parts: Sequence[str]) ->
 
 
 def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
-    """Judge a plane against the torso's (§3.2.A iii and iv): the hips', or the head's, whose normal is its facing."""
+    """Judge the rotation of the plane of the hips or of the head against the torso (§3.2.A iii and iv).
+
+    The normal of the head's plane is the direction that the head faces.
+    """
     joints = body.joints
     if part == "pelvis":
         pelvis, right, left = (joints[:, JOINT[name]] for name in ("pelvis", "right_hip", "left_hip"))
@@ -83,7 +87,7 @@ def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judg
 
 
 def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
-    """Judge a limb (§3.2.A i and ii); the hip's range is the wide one only if the knee is flexed (Table 1, note a)."""
+    """Judge a limb (§3.2.A i and ii); a hip has its wide range only if the knee is flexed (Table 1, note a)."""
     side, ball = part.split("_")
     hinge, end = ("elbow", "wrist") if ball == "shoulder" else ("knee", "ankle")
     joints = [JOINT[f"{side}_{name}"] for name in (ball, hinge, end)]
@@ -114,7 +118,7 @@ def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judge
 def _ball(
     u: Array, joint: str, outward: float, table: Mapping[str, Any], tolerance: float
 ) -> tuple[Array, Array]:
-    """Return flexion and abduction (N, 2), degrees, and the multiple of the tolerance that they have."""
+    """Return flexion and abduction (N, 2), degrees, and the factors of their tolerances."""
     one = np.ones((len(u), 2))
     if table["kind"] == "projected":
         least = table.get("shortest_projection", 0.1) * np.linalg.norm(u, axis=1)
@@ -128,26 +132,26 @@ def _ball(
         gain = np.maximum(rho / np.maximum(sine, LEAST_SINE), 1.0)
         return np.degrees(rho * raised / np.where(sine > 0, sine, 1.0)).T, one * gain[:, None]
     across, middle = np.hypot(x, y), sum(table["hip"]["flexion"]) / 2
-    # Flexion is within half a turn of the middle of its range: from above it to below it is beyond both ends alike.
+    # Flexion is within half a turn of the middle of its range, so that it jumps where both ends are equally far.
     flexion = middle + np.mod(np.degrees(np.arctan2(x, y)) - middle + 180.0, 360.0) - 180.0
     gains = np.stack([1 / np.maximum(across, LEAST_SINE), np.ones_like(across)], axis=-1)
     return np.stack([flexion, np.degrees(np.arctan2(z, across))], axis=-1), gains
 
 
 def _hinge(u: Array, v: Array, joint: str, table: Mapping[str, Any], tolerance: float) -> tuple[Array, Array]:
-    """Return an elbow's or knee's flexion (N,), degrees, and the multiple of the tolerance that it has."""
+    """Return the flexion of an elbow or a knee (N,), degrees, and the factor of its tolerance."""
     forward = 1.0 if joint == "elbow" else -1.0
     if table["kind"] == "projected":
         w = cross(v, u)
         size = np.linalg.norm(w, axis=1)
         bend = np.degrees(np.arctan2(size, dot(u, v)))
-        # An arm held sideways bends its elbow about y: z is zero but for rounding, and zero is flexion.
+        # The elbow of an arm that points sideways bends about y: z is zero except for rounding, and counts as flexion.
         flexion = np.where(forward * w[:, 2] >= -np.radians(tolerance) * size, bend, -bend)
         return flexion, np.ones(len(flexion))
     u, v = unit(u), unit(v)
     x, y, z = u.T
     if joint == "elbow":
-        # 1 + y, without cancelling near straight up: from there it grows as the square of how far the arm is away.
+        # 1 + y without cancellation near straight up, where it is quadratic in the angle from there.
         top = np.where(y < 0, (x * x + z * z) / (1 - np.minimum(y, 0.0)), 1 + y)
         safe = np.maximum(top, LEAST_SINE**2)
         axis = np.stack([-x * z / safe, -z, 1 - z * z / safe], axis=-1)
@@ -165,9 +169,10 @@ def _hinge(u: Array, v: Array, joint: str, table: Mapping[str, Any], tolerance: 
 
 
 def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING_DEGREES) -> Array:
-    """Return the angle from the y axis towards x, degrees; NaN where the projection (x, y) is too short.
+    """Return the angle from the y axis towards x, degrees; NaN if the projection (x, y) is too short.
 
-    It is in (-180, 180] and up to the tolerance beyond: an arm straight up is flexed by 180, on either side of it.
+    The angle is between -180 and 180. Within the tolerance of -180 it continues above 180: an arm that points straight
+    up is flexed by 180, not by -180.
     """
     angle = np.degrees(np.arctan2(x, y))
     angle = np.where(angle < max(tolerance, ROUNDING_DEGREES) - 180, angle + 360, angle)

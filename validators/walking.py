@@ -1,12 +1,12 @@
 """The walking model of Lee & Chen 1985, §3.3: Rules 1-5 of one instant.
 
-The body plane holds the line from neck to pelvis and is normal to the moving direction. That is the direction that the
-trunk faces, midway between shoulders and hips; in a sequence it is the way of the neck (`WalkingRules.heading`). The
-paper takes the head's facing direction (walkers ``paper-printed``): a person who stands and turns the head by 15
-degrees then swings arm and leg of one side together, and breaks Rule 2.
+The body plane contains the line from neck to pelvis and is normal to the moving direction. The moving direction is the
+direction that the trunk faces, midway between shoulders and hips; in a sequence it is the direction of the neck's
+motion (`WalkingRules.heading`). The paper uses the direction that the head faces (walkers ``paper-printed``). A person
+who stands and turns the head by 15 degrees then breaks Rule 2, because arm and leg of one side seem to swing together.
 
-The *swing* of a joint is its displacement out of the body plane, less the one it has when the figure stands at
-neutral. A swing that does not clearly differ from zero is not evidence: rules about it are undecided.
+The *swing* of a joint is its displacement out of the body plane, minus its displacement in the neutral posture of the
+figure. Rules about a swing near zero are undecided.
 """
 
 from __future__ import annotations
@@ -26,19 +26,20 @@ from posekit.validators.check import Judgement
 LIMB_PARTS: Final = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
 
 
-#: When a swing is evidence, and what counts as parallel, flexed and vertical, by the name of the walkers; the paper
-#: gives no numbers. Least swing of elbows, of knees, and of shoulders and hips, metres; rule 4: angle between a limb's
-#: segment and the plane of moving direction and body axis; rule 5: flexion from which a knee counts as flexed, lean of
-#: the other leg from the body axis; degrees. Those of people are for real walkers (CMU motion capture, 16 clips): their
-#: shoulders lie behind, their hips before the figure's, arms turned outward leave the moving plane, and while one leg
-#: passes the other both knees are bent.
+#: Thresholds of the rules by walkers; the paper gives no numbers. ``elbow``, ``knee``, ``girdle``: least swing of
+#: elbows, of knees, and of shoulders and hips, metres. ``out`` (rule 4): largest angle between a limb's segment and the
+#: plane of moving direction and body axis, degrees. ``flexed``, ``lean`` (rule 5): least flexion of a flexed knee,
+#: largest lean of the other leg from the body axis, degrees. The thresholds of people fit real walkers (16 clips of CMU
+#: motion capture): compared with the figure, their shoulders lie behind and their hips in front, their arms turn
+#: outward out of the plane, and both knees are bent while one leg passes the other.
 THRESHOLDS: Final[Mapping[str, Mapping[str, float]]] = {
     "paper": {"elbow": 0.02, "knee": 0.02, "girdle": 0.01, "out": 10.0, "flexed": 15.0, "lean": 30.0},
     "people": {"elbow": 0.10, "knee": 0.25, "girdle": 0.06, "out": 35.0, "flexed": 40.0, "lean": 35.0},
 }
 
-#: Rules 1 to 3: two joints, and whether they swing to the same side (1) or not (-1). Not both arms, or both legs, are
-#: in front of or behind the torso; arm and leg of one side do not swing together; shoulder and elbow, hip and knee do.
+#: Rules 1 to 3: two joints that swing to the same side (1) or to opposite sides (-1) of the body plane. Rule 1: the two
+#: arms, and the two legs, swing oppositely. Rule 2: so do arm and leg of one side. Rule 3: shoulder and elbow, and hip
+#: and knee, swing together.
 SWINGS: Final[Mapping[str, tuple[str, str, int]]] = {
     **{f"rule1.{limb}": (f"right_{mid}", f"left_{mid}", -1) for limb, _, mid, _ in LIMB_PARTS},
     **{f"rule2.{side}": (f"{side}_elbow", f"{side}_knee", -1) for side in SIDES},
@@ -57,9 +58,9 @@ class WalkingRules:
     Parameters
     ----------
     rules : tuple of int, optional
-        Rules, 1 to 5; those of the settings by default.
+        Rules, 1 to 5; by default the rules of the settings.
     heading : array (N, 3), optional
-        Moving direction of each posture, unit vectors; NaN where it is not known.
+        Moving direction of each posture, unit vectors; NaN if unknown.
     """
 
     name = "walking"
@@ -71,7 +72,7 @@ class WalkingRules:
     heading: Array | None = None
 
     def judge(self, body: Body) -> Judgement:
-        """Judge the rules; values are shares of their thresholds, positive where a rule is kept."""
+        """Judge the rules; values are in multiples of the thresholds, positive if a rule holds."""
         limits = THRESHOLDS["people" if body.settings.walkers == "people" else "paper"]
         axes = self._axes(body)
         swing = _swings(body, axes[0], limits)
@@ -83,7 +84,7 @@ class WalkingRules:
         return Judgement(places, value, lower=0.0, scale=1.0)
 
     def _axes(self, body: Body) -> tuple[Array, Array, Array]:
-        """Return where the walking body moves, its left and its down (N, 3)."""
+        """Return the moving direction, the direction to the left, and the direction down the body (N, 3)."""
         joints = body.joints
         R_torso = torso_frame(*(joints[:, JOINT[name]] for name in TORSO))
         down, facing = -R_torso[:, :, 2], R_torso[:, :, 0]
@@ -100,7 +101,7 @@ class WalkingRules:
 
 
 def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
-    """Return the swing of each joint (N, 14) in multiples of the least one; NaN where it is not clear."""
+    """Return the swing of each joint (N, 14) in multiples of the least swing; NaN for smaller swings."""
     out = np.einsum("nji,ni->nj", body.joints - body.joints[:, :1], forward)
     swing = out - body.figure.neutral_points[: len(JOINTS), 0]
     least = [limits.get(name.split("_")[-1], limits["girdle"]) for name in JOINTS]
@@ -108,7 +109,7 @@ def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
 
 
 def _together(swing: Array, one: str, other: str) -> Array:
-    """Return the smaller of two swings (N,), positive if both are to the same side."""
+    """Return the smaller of the swings of two joints (N,), positive if both are to the same side."""
     a, b = swing[:, JOINT[one]], swing[:, JOINT[other]]
     return np.sign(a * b) * np.minimum(np.abs(a), np.abs(b))
 

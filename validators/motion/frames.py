@@ -1,9 +1,9 @@
-"""Checks of frames as such: missing, repeated, shuffled, exchanged sides, jumps, trembling, drifting lengths.
+"""Checks of defects of frames: missing, repeated, shuffled, exchanged sides, jumps, trembling, drifting lengths.
 
-A jump also exceeds bounds of speed, acceleration and jerk; so do exchanged labels and shuffled frames. So defects are
-found in an order (`explained`), each named once: times, then repeated frames, then the order of the motion itself, then
-right and left, then jumps. Each step sees what those before it left. The checks of motion see the rest: joints with
-right and left corrected, in slots of even time, NaN where another check has named the frame.
+A jump also exceeds bounds of speed, acceleration and jerk; so do exchanged labels and shuffled frames. To report each
+defect once, `explained` looks for defects in a fixed order: time stamps, repeated frames, frames out of order,
+exchanged sides, jumps. Each step leaves out the frames that earlier steps explain. The other checks of motion judge the
+remaining joints, with corrected sides, in slots of even time; NaN replaces frames with a defect.
 """
 
 from __future__ import annotations
@@ -30,72 +30,72 @@ from posekit.validators.motion.sides import (
 from posekit.validators.motion.timeline import Timeline, median_of_five, timeline_of
 from posekit.validators.motion.trembling import trembling_frames, trembling_of, usual_trembling
 
-#: Part of a step by which a time stamp is early that belongs to the frame before: a quarter of one is its own slot.
+#: Largest share of a step by which a time stamp may be early; an earlier stamp has no slot of its own.
 TWICE_FRAMES: Final = 0.75
 
-#: Copies of a frame in a row, at most, that are single duplicates: longer runs are a held posture (`frozen`).
+#: Largest number of successive copies of a frame that `repeated` reports; longer runs are a held posture (`frozen`).
 LONGEST_REPEAT: Final = 4.0
 
-#: Frames per second below which thrown limbs jump.
+#: Least rate at which thrown limbs do not look like jumps, frames per second.
 JUMPING_RATE: Final = 15.0
 
-#: Frames per second below which fast motion is not smooth from frame to frame.
+#: Least rate at which fast motion is smooth from frame to frame, frames per second.
 TREMBLING_RATE: Final = 25.0
 
-#: Standard deviations of measuring noise that are allowed.
+#: Tolerances for measuring noise, in standard deviations.
 TELEPORT_DEVIATIONS, JITTER_DEVIATIONS, DRIFT_DEVIATIONS = 5.0, 2.0, 4.0
 
-#: Percentage of the frames that are calm, and their trembling as a share of the median frame's, at most: noise of
-#: measuring is in all frames alike (0.5 to 0.8), a local defect is not.
+#: Noise of measuring is alike in all frames: the 2nd percentile of trembling is 0.4 to 0.9 times the median. If the
+#: ratio is smaller than this share, trembling is a local defect, and that percentile is the noise.
 CALM_PERCENT, CALM_SHARE = 2.0, 0.3
 
-#: Share of the frames with another length from which either may be the usual one.
+#: Share of frames with another length above which either length may be the usual one.
 LEAST_OTHER: Final = 0.2
 
-#: Trembling of a joint from which lengths tremble too, metres: `jitter` names that.
+#: Trembling of a joint above which `drift` allows for trembling lengths, metres; `jitter` reports it.
 SHAKEN_METRES: Final = 0.0025
 
 
-#: Distance below which two positions are one, metres: one number written with 32 and with 64 bits.
+#: Largest distance of equal positions, metres: a number written with 32 and with 64 bits differs.
 SAME_METRES: Final = 1e-6
 
-#: Step of the fastest joint in a frame from which a body moves, metres: coarse rounding alone makes no duplicate.
+#: Least step of the fastest joint in a frame of a moving body, metres. In slower motion rounding may repeat frames.
 MOVED_METRES: Final = 1e-3
 
-#: Frames before and after a run of duplicates in which the body must move.
+#: Number of frames before and after a run of duplicates in one of which the body must move.
 MOVING_FRAMES: Final = 3
 
 
-#: Joints that have no side.
+#: Joints without a side.
 MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
 
-#: Frames that are ordered at once; longer stretches are ordered in parts.
+#: Largest number of frames to order at once; longer stretches are ordered in parts.
 LONGEST_STRETCH: Final = 600
 
-#: Length of the way through a stretch in the right order, at most, as a share of the way in the given order.
+#: Largest path length of a better order, as a share of the path length in the given order.
 SHORTER_SHARE: Final = 0.6
 
-#: Least number of frames out of place in a stretch.
+#: Least number of frames out of order in a stretch.
 LEAST_FRAMES: Final = 3
 
-#: Least motion of a joint between frames that shows their order, metres.
+#: Least step of a moving joint, metres.
 LEAST_METRES: Final = 0.005
 
-#: Least number of moving joints: one or two that turn back tremble.
+#: Least number of moving joints in a frame out of order; one or two joints that turn back tremble.
 LEAST_JOINTS: Final = 3
 
-#: Frames per second from which motion shows the order: at fewer, people turn back between two frames.
+#: Least rate at which motion shows the order of frames, frames per second; at lower rates people turn back in a frame.
 ORDERED_RATE: Final = 20.0
 
-#: Frames between two turns back of one stretch, at most.
+#: Largest distance between frames of one stretch in which joints turn back.
 TURNS_APART: Final = 6
 
-#: Frames before and after a stretch that are ordered with it, so that its ends find their places.
+#: Number of frames before and after a stretch that are ordered with it, so that its ends find their places.
 AROUND_FRAMES: Final = 4
 
 
 def needs_rate(body: Body, least: float) -> None:
-    """Refuse a body with fewer than `least` frames per second."""
+    """Raise `NotAskedError` if a body has fewer than `least` frames per second."""
     if body.rate < least:
         raise NotAskedError(f"it needs {least:g} frames per second")
 
@@ -107,9 +107,9 @@ def timing(body: Body, *, missing: float = 0.5, displaced: float = 0.5) -> Judge
     Parameters
     ----------
     missing : float
-        Frames that may be missing before a frame; a part of one is time that stamps are off.
+        Allowed number of missing frames before a frame. Inexact time stamps give fractions.
     displaced : float
-        Frames by which one may be out of its place, by its time or, without times, by the motion.
+        Allowed number of frames by which a frame is out of order, by its time or by the motion.
     """
     found = explained(body)
     by_time = found.timeline.place
@@ -124,24 +124,24 @@ def timing(body: Body, *, missing: float = 0.5, displaced: float = 0.5) -> Judge
 
 @check("frozen", unit="frames", reads=("joints",), over_time=True)
 def frozen(body: Body, *, longest: float = LONGEST_REPEAT) -> Judgement:
-    """Postures are held, to rounding, while the body moves before and after.
+    """Postures are held exactly while the body moves before and after.
 
     Parameters
     ----------
     longest : float
-        Copies of a frame in a row.
+        Largest allowed number of successive copies of a frame.
     """
     return Judgement(("body",), explained(body).repeats.astype(np.float64), upper=longest)
 
 
 @check("repeated", unit="frames", reads=("joints",), over_time=True)
 def repeated(body: Body, *, most: float = 0.0) -> Judgement:
-    """Frames come again while the body moves.
+    """Frames are repeated while the body moves.
 
     Parameters
     ----------
     most : float
-        Copies of a frame in a row.
+        Largest allowed number of successive copies of a frame.
     """
     repeats = explained(body).repeats.astype(np.float64)
     short = np.where(repeats > LONGEST_REPEAT, 0.0, repeats)
@@ -155,7 +155,7 @@ def swap(body: Body, *, most: float = 0.0) -> Judgement:
     Parameters
     ----------
     most : float
-        0 allows no exchange, 1 all; see `posekit.validators.motion.sides`.
+        0 allows no exchange, 1 allows all; `posekit.validators.motion.sides` finds them.
     """
     if len(body) < 2 or body.q is not None:
         raise NotAskedError(
@@ -172,9 +172,9 @@ def teleport(clip: Body, /, *, joint: float = 0.07, body: float = 0.06) -> Judge
     Parameters
     ----------
     joint : float
-        Jump of a single joint, metres; see `posekit.validators.motion.jumps`.
+        Largest allowed jump of a single joint, metres; `posekit.validators.motion.jumps` measures it.
     body : float
-        Jump of the body, for one frame or for good, metres.
+        Largest allowed jump of the whole body, for one frame or for good, metres.
     """
     needs_rate(clip, JUMPING_RATE)
     found = explained(clip)
@@ -193,7 +193,7 @@ def jitter(body: Body, *, deviation: float = 0.006) -> Judgement:
     Parameters
     ----------
     deviation : float
-        Standard deviation of a coordinate, metres.
+        Largest allowed standard deviation of a coordinate, metres.
     """
     needs_rate(body, TREMBLING_RATE)
     found, noise = explained(body), body.noise
@@ -216,7 +216,7 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
     Parameters
     ----------
     share : float
-        Difference as a share of its median length, either way.
+        Largest allowed difference from the median length, as a share of it.
     """
     found = explained(body)
     starts, ends = (list(one) for one in zip(*LIMB_SEGMENTS, strict=True))
@@ -224,7 +224,7 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
     usual = _usual(lengths, share)
     shaken = np.maximum(found.trembling[:, starts], found.trembling[:, ends])
     shaken = np.where(shaken > SHAKEN_METRES, shaken, 0.0)
-    # A length has the noise of its two ends, the median of five frames about half of it.
+    # A length has the noise of both ends; the median of five frames has about half of it.
     allowed = DRIFT_DEVIATIONS * np.fmax(shaken, body.noise) / usual
     return Judgement(
         tuple(map(segment_name, LIMB_SEGMENTS)),
@@ -236,9 +236,10 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
 
 
 def _usual(lengths: Array, share: float) -> Array:
-    """Return the usual length of each segment of `LIMB_SEGMENTS` (K,): the median, or that of the other lengths.
+    """Return the usual length (K,) of the segments of `LIMB_SEGMENTS`, metres: the median in most clips.
 
-    Where many frames differ from the median, that length of the two is the usual one which the other side has.
+    If many frames differ from the median, the median of these frames is a candidate too; the candidate that is nearer
+    to the length of the segment's other side is the usual length.
     """
     usual = np.array([known_median(column) or np.nan for column in lengths.T])
     for k, column in enumerate(lengths.T):
@@ -250,7 +251,7 @@ def _usual(lengths: Array, share: float) -> Array:
 
 
 def _smooth(lengths: Array) -> Array:
-    """Return medians over five slots (S, K): an unknown length is the last known one beside others."""
+    """Return medians of lengths over five slots (S, K); the last known length replaces unknown neighbours."""
     known = np.isfinite(lengths)
     last = np.maximum.accumulate(np.where(known, np.arange(len(lengths))[:, None], 0), axis=0)
     return np.where(known, median_of_five(np.take_along_axis(lengths, last, axis=0)), np.nan)
@@ -258,24 +259,24 @@ def _smooth(lengths: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explained:
-    """What was found in T frames, and the motion that is left in S slots of even time.
+    """Defects of T frames, and the remaining motion in S slots of even time.
 
     Parameters
     ----------
     timeline : Timeline
-        Slot of each frame.
+        Slots of the frames.
     repeats : int array (T,)
-        Length of the run of duplicates that each frame is in; 0 for others.
+        Length of the run of duplicates around each frame; 0 for other frames.
     displaced : int array (T,)
-        Frames by which each is out of its place, by the motion.
+        Number of frames by which each frame is out of order, by the motion.
     exchanged : bool array (T, 6)
-        Pairs whose right and left are exchanged.
+        Whether right and left of each pair of joints are exchanged.
     jumps : array (S, 15)
-        Jumps of the joints and of the body, metres; see `posekit.validators.motion.jumps.jumps_of`.
+        Jumps of the joints and of the body, metres, by `posekit.validators.motion.jumps.jumps_of`.
     joints : array (S, 14, 3)
-        The motion that is left.
+        The remaining motion: corrected sides, NaN in frames with a defect.
     trembling : array (S, 14)
-        Standard deviation of trembling, metres.
+        Standard deviation of the trembling of a coordinate, metres.
     """
 
     timeline: Timeline
@@ -289,9 +290,9 @@ class Explained:
 
 @once
 def explained(body: Body) -> Explained:
-    """Find the defects of a body's frames."""
+    """Return the defects of the frames of a body."""
     timeline = timeline_of(body)
-    # Frames without a place in time come last, and are not judged.
+    # Frames without a slot come last; no check judges them.
     order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")
     back = np.argsort(order)
     joints = body.joints[order]
@@ -305,13 +306,13 @@ def explained(body: Body) -> Explained:
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
     noise = max(body.noise, *usual_trembling(joints[kept]))
     follows = np.diff(timeline.slots[order][kept]) == 1
-    # Joint ranges judge which way a knee of one posture bends; the sides of a robot follow from its names.
+    # The names of a robot's joints determine their sides.
     if len(joints) > 1 and body.q is None:
         exchanged[kept] = exchanged_pairs(
             joints[kept], body.feet[order][kept], body.head[order][kept], follows, noise
         )
     for edge, beside in ((0, 1), (-1, -2)):
-        # One frame at an end that is another posture faces elsewhere: that is a jump, no exchange of labels.
+        # A single frame at an end with all pairs exchanged is another posture, and not an exchange of labels.
         if len(joints) > 2 and exchanged[edge].all() and not exchanged[beside].any():
             exchanged[edge] = False
     joints = timeline.spread(put_right(joints, exchanged)[back])
@@ -330,15 +331,15 @@ def explained(body: Body) -> Explained:
 
 
 def duplicates(joints: Array) -> NDArray[np.intp]:
-    """Return the length of the run of duplicates around each frame (T,); 0 if it does not copy the frame before.
+    """Return the length of the run of duplicates around each frame (T,); 0 unless it copies the frame before.
 
-    A run counts where the body moves by more than a millimetre a frame shortly before and shortly after it, at an end
-    of the clip on one side. Otherwise rounding is enough to make two frames one.
+    A run counts if the body moves by more than `MOVED_METRES` in a frame shortly before and shortly after it; at an end
+    of the clip, on the other side only. In slower motion rounding alone may make two frames equal.
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, frame after frame; a joint that is unknown in both frames is the same.
+        Metres, in the order of time. A joint that is unknown in two frames counts as equal.
     """
     count = len(joints)
     lengths = np.zeros(count, dtype=np.intp)
@@ -358,19 +359,20 @@ def duplicates(joints: Array) -> NDArray[np.intp]:
 
 
 def displaced(joints: Array) -> NDArray[np.intp]:
-    """Return the frames by which each frame is out of its place (T,); 0 where the motion is even.
+    """Return the number of frames by which each frame is out of order (T,); 0 in smooth motion.
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, frame after frame.
+        Metres, in the given order.
 
     Notes
     -----
-    Frames in a wrong order make most joints turn back from step to step. A stretch of such frames is put into the
-    order that goes from its first neighbour to its last by a short way (each frame is inserted where it costs least:
-    Rosenkrantz et al. 1977, SIAM J. Comput. 6:563); where that way is less than six tenths of the given one, the frames
-    were out of order. Noise makes joints turn back, too, but no order of noisy frames is much shorter than another.
+    Frames in a wrong order make most joints turn back from step to step. Each stretch of such frames is put into an
+    order with a short path from the frame before it to the frame after it: each frame is inserted at the cheapest place
+    (Rosenkrantz et al. 1977, SIAM J. Comput. 6:563). If that path is shorter than `SHORTER_SHARE` of the given path,
+    the frames were out of order. Noise makes joints turn back too, but no order of noisy frames has a much shorter
+    path.
     """
     count = len(joints)
     places = np.zeros(count, dtype=np.intp)
@@ -389,17 +391,17 @@ def displaced(joints: Array) -> NDArray[np.intp]:
             order = _shortest(joints[rows].reshape(len(rows), -1))
             found = np.zeros(count, dtype=np.intp)
             found[rows[order]] = rows - rows[order]
-            # Frames around it that go on evenly are in their places, though there may be a shorter way through them.
+            # Frames around the stretch are in order, even if there is a shorter path through them.
             near = slice(max(first - 2, 0), last + 3)
             places[near] = found[near]
     return places
 
 
 def _without_sides(joints: Array) -> Array:
-    """Return a posture without sides (T, 20, 3), metres, so that flickering labels are not treated as a wrong order.
+    """Return postures in coordinates without sides (T, 20, 3), metres: exchanged labels do not change them.
 
-    Neck, pelvis and the middles of pairs; and the vector d between a pair as its outer product with itself over its
-    length, which is that of -d.
+    The coordinates are neck, pelvis and the middle of each pair, and for the vector d between a pair the terms of
+    d dᵀ / |d|, which are the same for -d.
     """
     right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
     across = (right - left) / 2.0
@@ -409,7 +411,7 @@ def _without_sides(joints: Array) -> Array:
 
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return the frames (T,) of every stretch that holds frames out of place."""
+    """Return whether each frame (T,) is in a stretch with frames out of order."""
     inside = np.zeros(len(places), dtype=np.bool_)
     for part in groups(np.flatnonzero(places), TURNS_APART):
         inside[part[0] : part[-1] + 1] = True
@@ -417,7 +419,7 @@ def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first and last of the stretches in which frames turn back, three of them or more."""
+    """Return the first and last frames of stretches in which joints turn back."""
     found = []
     for part in groups(np.flatnonzero(turning), TURNS_APART):
         for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
@@ -428,7 +430,7 @@ def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _shortest(points: Array) -> NDArray[np.intp]:
-    """Return an order (N,) of points (N, K) with a short way from first to last; the given one where none is."""
+    """Return an order (N,) of points (N, K) with a much shorter path from first to last; else the given order."""
     squares = (points**2).sum(axis=1)
     ways = np.sqrt(np.maximum(squares[:, None] + squares - 2 * points @ points.T, 0.0))
     given = np.arange(len(points))

@@ -1,17 +1,16 @@
-r"""The ground of a clip, estimated from where its body rests, and the height of frames above it.
+r"""The ground of a clip, estimated from resting parts of the body, and the heights of frames above it.
 
-The ground is not measured: it is where points of the body rest. Its lowest level is the 5th percentile of the lowest
-point over the frames in which something rests, its highest level the 98th: feet are seldom flat, some stand on stairs,
-and a recording's volume is never quite level. A point below the lowest level is in the ground; a body above the highest
-without rest is in the air; between them no verdict is given.
+Files do not state the ground; parts of the body rest on it. Over the frames in which a part rests, the 5th percentile
+of the lowest point is the lowest level of the ground, and the 98th is the highest: feet are seldom flat, some stand on
+stairs, and the floor of a recording is never quite level. A point below the lowest level is in the ground. A body above
+the highest level without a resting part is in the air. Between the levels there is no verdict.
 
-Stretches of frames that are lifted or lowered as a whole against the frames around them.
-
-A body on its feet never moves up or down by a step: from one frame to the next all its points would go the same way,
-which they do not a frame earlier and a frame later. The step at a frame is the median over points of
-:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, d the vertical way from frame to frame, if nine
-tenths of the points agree on its sign. A foot rests on both sides of the step: in the air many things are possible. A
-step and the next one back make a stretch.
+Frames may also be lifted or lowered as a whole against the frames around them. Then all points of the body make the
+same vertical step from one frame to the next, but not a frame earlier or later, which no body on its feet does. The
+step at a frame is the median over points of
+:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, with d the vertical displacement from frame to frame,
+if nine tenths of the points agree on its sign. A foot must rest before and after the step, since bodies in the air may
+move in such steps. A step and the next opposite step enclose the lifted frames.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
 from posekit.validators.body import LIMB_ROWS, Body, once
 from posekit.validators.motion.timeline import centred, spaced, timeline_of
 
-#: Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it.
+#: Height of the points of toes and heels over the sole, metres: joints and labels lie inside the foot.
 TOE_METRES: Final = 0.02
 
 #: Length of the foot, as a share of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1).
@@ -46,54 +45,55 @@ LEG_SHARE: Final = 0.245 + 0.246
 #: Length of the hand, wrist to fingertips, as a share of the stature (same figure).
 HAND_SHARE: Final = 0.108
 
-#: Stature that is assumed where no leg is known, metres.
+#: Assumed stature if no leg is known, metres.
 USUAL_STATURE: Final = 1.7
 
-#: Speed below which a point rests, metres a second: parts of a foot are slower in stance and faster in a swing.
+#: Largest speed of a resting point, metres a second: a foot is slower in stance and faster in a swing.
 REST_SPEED: Final = 0.25
 
-#: Height of a resting point above the body's lowest point up to which it carries the body, metres.
+#: Largest height above the lowest point of the body of a resting point that carries the body, metres.
 NEAR_METRES: Final = 0.30
 
-#: Least number of frames at rest from which the ground is estimated.
+#: Least number of frames with a resting part that give the ground.
 BY_CHANCE: Final = 3
 
-#: Height above the highest level of the ground from which a body without support is in the air, metres.
+#: Least height of a body in the air above the highest level of the ground, metres.
 AIR_METRES: Final = 0.03
 
-#: Rise of the ankle of a foot that stands on its toes, as a share of the stature; it counts where toes are not known.
+#: Rise of the ankle of a foot on its toes, as a share of the stature; used if toes are unknown.
 TIPTOE_SHARE: Final = np.hypot(FORWARD_SHARE * FOOT_SHARE, ANKLE_SHARE) - ANKLE_SHARE
 
 
-#: Frames per second; at fewer, the frames before and after the top of a jump have one height, and look like rest.
+#: Least rate, frames per second, for central differences: at lower rates the frames around the top of a jump have one
+#: height, which looks like rest.
 TURNING_RATE: Final = 20.0
 
-#: Least step, metres: clean recordings have steps of up to 0.7 cm where a foot is at rest, at 30 Hz.
+#: Least step, metres: at 30 Hz clean recordings have steps of up to 0.7 cm while a foot rests.
 LEAST_STEP_METRES: Final = 0.012
 
-#: Step from which no foot need be at rest, metres, at this rate (Hz) or more: clean recordings have up to 13 cm, in a
-#: backflip.
+#: Least step that counts without a resting foot, metres, and the least rate for it, frames per second. Clean recordings
+#: have steps of up to 13 cm (a backflip).
 SURE_STEP_METRES, SURE_RATE = 0.15, 16.0
 
-#: Difference between a step and the step back, at most, as a share of the larger.
+#: Largest difference between a step and the opposite step, as a share of the larger step.
 SAME_SHARE: Final = 0.35
 
-#: Frames of the shortest stretch: shorter ones are jumps of the body.
+#: Least number of frames of a lifted stretch; shorter stretches are jumps of the body.
 SHORTEST_FRAMES: Final = 3
 
-#: Vertical way of a resting foot in the frames before and after a step, at most, metres.
+#: Largest vertical displacement of a resting foot in the frames before and after a step, metres.
 REST_METRES: Final = 0.01
 
-#: Difference of levels of one ground, metres.
+#: Largest difference between heights of rests on one ground, metres.
 LEVEL_METRES: Final = 0.05
 
-#: Shortest flight whose fall is separable from the motion of limbs, seconds.
+#: Shortest flight whose fall can be separated from the motion of limbs, seconds.
 SHORTEST_FLIGHT: Final = 0.25
 
 #: Acceleration of gravity, metres a second squared.
 GRAVITY_ACCELERATION: Final = 9.81
 
-#: Least number of frames from which the fall of a centre of mass is measured.
+#: Least number of frames that give the acceleration of a falling centre of mass.
 FEWEST_FRAMES: Final = 6
 
 #: Least share of gravity by which the centre of mass of a body in the air falls; whole jumps have 0.8 to 1.1.
@@ -102,28 +102,28 @@ FALL_SHARE: Final = 0.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
-    """The ground of a clip, and T frames against it; heights are along up, in metres.
+    """The ground of a clip, and the heights of T frames above it; along up, in metres.
 
     Parameters
     ----------
     low : float
-        Its lowest level.
+        Lowest level of the ground.
     high : float
-        Height of its highest level above that.
+        Height of the highest level above the lowest.
     height : array (T,)
-        The lowest sole, or joint, along up.
+        Height of the lowest sole or joint.
     lifted : array (T,)
-        Height by which frames are lifted as a whole against those around them.
+        Height by which each frame is lifted as a whole against the frames around it.
     lowest : array (T,)
-        The lowest sole, or joint, over `low`, less `lifted`.
+        Height of the lowest sole or joint over `low`, minus `lifted`.
     resting : bool array (T,)
-        Whether something that can carry the body rests.
+        Whether a part of the body rests that can carry it.
     hanging : bool array (T,)
-        Whether a resting part got there without a step or a jump.
+        Whether parts rest at another level that the body reached without a step or a jump.
     centre : array (T,)
-        The centre of mass, along up.
+        Height of the centre of mass.
     in_air : bool array (T,)
-        Whether nothing rests, and the body is above all levels of the ground, standing on its toes included.
+        Whether no part rests and the body is above all levels of the ground, by more than toes and hands reach.
     """
 
     low: float
@@ -152,7 +152,7 @@ def up_of(body: Body) -> Array:
 
 @once
 def soles(body: Body) -> tuple[Array, Array]:
-    """Return the points of feet (T, 6, 3), toes, heels and ankles, and the heights of their soles along up (T, 6)."""
+    """Return the points of the feet (T, 6, 3): toes, heels, ankles; and the heights of the soles under them (T, 6)."""
     points = np.concatenate([body.feet, body.joints[:, both("ankle")]], axis=1)
     toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
     over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * stature_of(body)] * len(SIDES)
@@ -160,9 +160,9 @@ def soles(body: Body) -> tuple[Array, Array]:
 
 
 def speeds(body: Body, points: Array, frames: int = 1) -> Array:
-    """Return the speeds of points (T, P, 3) from `frames` frames before to as many after, m/s; NaN at ends.
+    """Return the speeds of points (T, P), metres a second, by central differences over 2 `frames` frames; NaN at ends.
 
-    Below `TURNING_RATE` frames a second it is the larger of the speeds before and after the frame.
+    Below `TURNING_RATE` frames per second return the larger of the speeds before and after each frame.
     """
     line = timeline_of(body)
     placed = line.spread(points)
@@ -181,10 +181,10 @@ def ground_of(body: Body) -> Ground:
     line, up = timeline_of(body), up_of(body)
     points = np.concatenate([body.joints, feet[:, : len(FEET_POINTS)]], axis=1)
     height = points @ up
-    legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them
+    legs = slice(JOINT["right_ankle"], None)  # ankles, toes and heels
     lifted = line.of_frames(lifted_by(line.spread(height), legs, body.rate, body.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
-    # The ankle of a foot whose heel is not known is its heel: it is down when the toes are up.
+    # If the heel of a foot is known, the ankle is no point of its sole; otherwise the ankle stands for the heel.
     over_ground = over_ground.copy()
     over_ground[:, 4:][:, np.isfinite(over_ground[:, 2:4]).any(axis=0)] = np.nan
     sole = np.fmin.reduce(over_ground, axis=1)
@@ -220,12 +220,12 @@ def ground_of(body: Body) -> Ground:
 
 
 def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: float) -> NDArray[np.bool_]:
-    """Leave out rests that hang in the air: at another level than those before, without a step or a jump to it.
+    """Leave out frames in which a body rests in the air: at a level that it reached without a step or a jump.
 
     Parameters
     ----------
     resting : bool array (T,)
-        Whether something rests.
+        Whether a part of the body rests.
     lowest, centre : array (T,)
         Heights of the lowest point and of the centre of mass, metres.
     step : float
@@ -234,7 +234,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
     Returns
     -------
     bool array (T,)
-        Those of `resting` that carry the body.
+        Whether a resting part carries the body.
     """
     rests = runs(resting)
     if len(rests) < 2 or not step > 0:
@@ -242,7 +242,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
     group = np.zeros(len(rests), dtype=np.intp)
     levels = np.array([np.median(lowest[start:stop]) for start, stop in rests])
     for k in range(1, len(rests)):
-        # A rest may belong to an earlier group: the body comes down again to where it rested.
+        # The body may come down again to the level of an earlier rest.
         alike = np.flatnonzero(~(np.abs(levels[:k] - levels[k]) > LEVEL_METRES))
         between = slice(rests[k - 1][1], rests[k][0])
         if len(alike):
@@ -259,7 +259,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
 
 
 def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
-    """Return whether a centre of mass (N,) falls by a share of gravity (its parabola); True where it is not known."""
+    """Return whether a centre of mass (N,) falls with a share of gravity, by a fitted parabola; True if unknown."""
     known = np.isfinite(centre)
     if known.sum() < FEWEST_FRAMES:
         return True
@@ -268,35 +268,35 @@ def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
 
 
 def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Array:
-    """Return the height by which frames are lifted against those around them.
+    """Return the height by which frames are lifted against the frames around them.
 
     Parameters
     ----------
     height : array (S, P)
-        Heights of points of the body along up, metres; NaN where a point is not known.
+        Heights of points of the body along up, metres; NaN if unknown.
     feet : slice
-        Points of the feet: one of them rests where a step is a defect.
+        Points of the feet; one of them must rest before and after a step.
     rate : float
-        Frames a second; NaN where it is not known.
+        Frames per second; NaN if unknown.
     noise : float
         Standard deviation of measured coordinates, metres.
 
     Returns
     -------
     array (S,)
-        Metres, negative where frames are lowered, 0 in most.
+        Metres; negative in lowered frames, 0 in most frames.
     """
     lifted = np.zeros(len(height))
     if len(height) < 2 * SHORTEST_FRAMES:
         return lifted
     steps = steps_of(height)
     way = np.abs(np.diff(height[:, feet], axis=0, prepend=np.nan, append=np.nan))
-    # The way to the frame before, and the way on from the frame that the step leads to.
+    # Displacements before the step and after it.
     beside = np.maximum(way[:-2], way[2:])
     rests = np.zeros(len(height), dtype=np.bool_)
     rests[1:] = (beside < REST_METRES + 3 * noise).any(axis=1)
     start = -1
-    # A falling body moves farther between frames the longer these last.
+    # At lower rates a falling body moves farther in a frame.
     longer = SURE_RATE / rate if rate < SURE_RATE else 1.0
     large = np.abs(steps) >= SURE_STEP_METRES * longer**2
     for frame in np.flatnonzero(large | (rests & (np.abs(steps) >= max(LEAST_STEP_METRES, 4 * noise)))):
@@ -313,7 +313,7 @@ def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Ar
 
 
 def steps_of(height: Array) -> Array:
-    """Return the step that most points make at each frame (S,), metres; 0 where they do not agree."""
+    """Return the vertical step that most points make at each frame (S,), metres; 0 if the points do not agree."""
     way = np.diff(height, axis=0)
     padded = np.pad(way, ((2, 2), (0, 0)), mode="edge")
     around = np.stack([padded[k : k + len(way)] for k in (0, 1, 3, 4)])

@@ -1,10 +1,9 @@
-r"""Distances of joints, and of the body, from where neighbouring frames predict them.
+r"""Jumps: distances of joints, and of the body, from the positions that neighbouring frames predict.
 
-How far a body is displaced for good, at once or over a sixth of a second, by what nothing can push it.
-
-A body that goes a way D beyond what its velocities before and after explain, in a time T, is sped up and
-slowed down again: by :math:`4 D / T^2` at least, half of the time each way. Where people are faster than that, in
-rolls, kicks and flips, their joints do not all go the same way; a body that is displaced does.
+A jump lasts one frame, or displaces the body for good, at once or over up to a sixth of a second. Forces bound
+displacements: a body that moves by D in a time T, beyond its velocities before and after, has an acceleration of at
+least :math:`4 D / T^2`, forward in the first half of the time and backward in the second. In rolls, kicks and flips
+people exceed the bound, but their joints then move in different directions; those of a displaced body do not.
 """
 
 from __future__ import annotations
@@ -18,49 +17,50 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, norm
 from posekit.validators.motion.timeline import centred, filtered
 
-#: Jump from which a frame is not judged as motion, metres.
+#: Jump above which other checks do not judge a frame, metres.
 LEAST_JUMP: Final = 0.06
 
-#: Least jump of one frame, as a share of a lasting displacement near it.
+#: Least jump of one frame near a lasting displacement, as a share of it.
 DISPLACED_SHARE: Final = 0.5
 
-#: Frames on either side by which a jump is measured.
+#: Number of frames on either side that predict a position.
 SIDE_FRAMES: Final = 3
 
-#: Multiples of the neighbours' own misfit that are subtracted from a jump: of one that comes back, and at an end of the
-#: clip. Fast motion at few frames per second fits no smooth curve, and is not a jump.
+#: Multiples of the neighbours' own misfit to subtract from a jump: inside the clip, and at its ends. Fast motion at few
+#: frames per second fits no smooth curve, and is no jump.
 JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 
 
 def _filter(at: int) -> tuple[Array, Array]:
-    """Fit a cubic, and a jump of one of them, to seven frames by least squares: two degrees of freedom are left.
+    """Return filters over seven frames: of a jump of one frame (7,), and of the other frames' misfit (2, 7).
 
-    Return the weights of the jump (7,), and of the misfit of the others from a smooth curve (2, 7), of unit length.
+    The filters are the least-squares fit of a cubic and a jump of frame `at`. The two remaining degrees of freedom
+    measure the misfit; their filters have unit length.
     """
     times = np.arange(7.0) - at
     design = np.column_stack([np.vander(times, 4, increasing=True), times == 0])
     return np.linalg.pinv(design)[-1], np.linalg.svd(design)[0][:, design.shape[1] :].T / np.sqrt(2.0)
 
 
-#: Filters by the place of the jump among seven frames: in the middle, or next to an end of the clip.
+#: Filters by the index of the jumping frame among seven frames: 3 inside a clip, 1 and 2 near its ends.
 _FILTERS: Final = {at: _filter(at) for at in (1, 2, SIDE_FRAMES)}
 _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
 def jumps_of(joints: Array, step: float) -> Array:
-    """Measure the jumps of joints (S, 14, 3) in slots of `step` seconds (NaN where not known).
+    """Return the jumps of joints (S, 14, 3) and of the body, in slots of `step` seconds (NaN if unknown).
 
     Returns
     -------
     array (S, 15)
-        Metres above the neighbours' own misfit, of each joint beside the body's, and of the body (the median joint);
-        NaN where not known.
+        Jumps above the neighbours' own misfit, metres: of each joint, relative to a jump of the body, and of the body
+        (the median joint); NaN if unknown.
 
     Notes
     -----
-    A jump of one frame is how far it is from the cubic through three frames on either side; at an end it is the third
-    difference. All less some times the misfit of the neighbours themselves. A body that stays moved is for
-    `displaced_by`.
+    The jump of one frame is its distance from the cubic through three frames on either side; at an end of the clip it
+    is the third difference. A multiple of the neighbours' misfit is subtracted. `displaced_by` measures lasting
+    displacements of the body.
     """
     count = len(joints)
     offset, misfit = (centred(one, count, SIDE_FRAMES) for one in _measured(joints, SIDE_FRAMES))
@@ -69,7 +69,7 @@ def jumps_of(joints: Array, step: float) -> Array:
     moved = alone > 0
     displaced = displaced_by(joints, step)
     if (alone > LEAST_JUMP).any():
-        # Beside a displaced body a misfit is measured from where the body went.
+        # Near a lasting displacement, smaller jumps of one frame follow from it.
         beside = sliding_window_view(np.pad(np.nan_to_num(displaced), SIDE_FRAMES), 2 * SIDE_FRAMES + 1)
         alone[alone < DISPLACED_SHARE * beside.max(axis=1)] = np.nan
         displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
@@ -84,15 +84,15 @@ def jumps_of(joints: Array, step: float) -> Array:
             for end, frame, window in ((0, at, joints[:7]), (-1, -1 - at, joints[:-8:-1])):
                 off, misfits = _measured(window, at)
                 jump = norm(off[0]) - JOINT_MISFITS * misfits[0]
-                # If the last frame jumps, its neighbours do not.
+                # If the outermost frame jumps more, the frame beside it does not jump.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
     return np.column_stack([joint, np.fmax(alone, displaced)])
 
 
 def _measured(joints: Array, at: int) -> tuple[Array, Array]:
-    """Return the jump of the frame `at` of each seven (N, 14, 3), and the misfit of the others (N, 14).
+    """Return the jump of frame `at` of each seven frames (N, 14, 3), and the misfit of the other frames (N, 14).
 
-    The farther the frame is from their middle, the less sure is its jump: the misfit counts more.
+    The misfit is scaled by the uncertainty of the jump, which grows with the distance of `at` from the middle.
     """
     jump, misfit = _FILTERS[at]
     unsure = np.linalg.norm(jump) / np.linalg.norm(_FILTERS[SIDE_FRAMES][0])
@@ -100,40 +100,40 @@ def _measured(joints: Array, at: int) -> tuple[Array, Array]:
     return filtered(joints, jump), unsure * np.sqrt(squares)
 
 
-#: Longest time over which a body is displaced, seconds: slower displacements are motion.
+#: Longest time of a displacement, seconds; slower displacements are motion.
 LONGEST_SECONDS: Final = 1.0 / 6.0
 
-#: Step between the times over which displacements are looked for, seconds.
+#: Difference between the times over which displacements are measured, seconds.
 BETWEEN_SECONDS: Final = 1.0 / 30.0
 
-#: Time before and after over which the velocity of joints is measured, seconds.
+#: Time before and after a displacement that gives the velocities of joints, seconds.
 VELOCITY_SECONDS: Final = 1.0 / 15.0
 
 #: Largest acceleration of a whole body, metres a second squared: three times its weight, less its own; runners and
 #: jumpers reach it (Cavanagh & Lafortune 1980, J. Biomech. 13).
 PUSHED_ACCELERATION: Final = 20.0
 
-#: Least speed of another displacement beside one, as a share of its speed: half of it follows from misled velocities.
+#: Least speed of a second displacement beside one, as a share of its speed: wrong velocities alone give half.
 BESIDE_SHARE: Final = 0.75
 
-#: Multiple of the median difference of joints from the body's displacement that is subtracted from it.
+#: Multiple of the median distance of joints from the body's displacement to subtract from the displacement.
 APART_TIMES: Final = 2.0
 
 
 def displaced_by(joints: Array, step: float) -> Array:
-    """Return lasting displacements of the body, in the frames in which it moves (S,); NaN in others.
+    """Return lasting displacements of the body in the slots of the displacement (S,), metres; NaN in other slots.
 
     Parameters
     ----------
     joints : array (S, 14, 3)
         Metres, in slots of even time; NaN where unknown.
     step : float
-        Seconds a slot; if it is NaN, only displacements within one frame are found.
+        Seconds a slot. If it is NaN, displacements take one slot only.
 
     Returns
     -------
     array (S,)
-        Metres beyond what forces and the joints' own motion explain.
+        Displacement, metres, minus the parts due to forces and to the motion of joints.
     """
     timed = step > 0
     side, apart = (
@@ -141,7 +141,7 @@ def displaced_by(joints: Array, step: float) -> Array:
     )
     most = int(LONGEST_SECONDS / step + 1e-6) if timed else 1
     known = np.isfinite(joints[..., 0])
-    # The mean is a fast screen: it is displaced with the body.
+    # The mean joint moves with a displaced body: a fast first test.
     centre = np.nan_to_num(joints).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, None]
     gaps = np.concatenate([[0], np.cumsum(~known.any(axis=1))])
     best, over = np.full(len(joints), -np.inf), np.ones(len(joints), dtype=np.intp)
@@ -150,13 +150,13 @@ def displaced_by(joints: Array, step: float) -> Array:
         beyond = _beyond(joints, centre, gaps, count, side, pushed) / count
         better = beyond > best
         best[better], over[better] = beyond[better], count
-    # The fastest window is the displacement: a window that ends amid it is misled by a velocity of half of it.
+    # The fastest window covers the displacement exactly; windows that end inside it have wrong velocities.
     found = np.full(len(joints), np.nan)
     while best.max(initial=0.0) > 0:
         first = int(best.argmax()) + 1
         last = first + int(over[first - 1]) - 1
         found[first : last + 1] = best[first - 1] * over[first - 1]
-        # Windows with these frames repeat it; slower windows beside them follow from it.
+        # Windows that overlap the displacement repeat it; slower windows beside it follow from it.
         starts, fastest = np.arange(len(best)), best[first - 1]
         again = (starts < last) & (starts + over >= first)
         beside = (starts - side < last + apart) & (starts + over + side >= first - apart)
@@ -167,9 +167,10 @@ def displaced_by(joints: Array, step: float) -> Array:
 def _beyond(
     joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
 ) -> Array:
-    """Return the unexplained displacement (S,) in the `count` slots after each slot; 0 if all is explained.
+    """Return the unexplained displacement in the `count` slots after each slot (S,), metres, 0 or more.
 
-    It needs the joints, their mean (S, 3), and the number of empty slots before each (S + 1,).
+    `centre` (S, 3) is the mean of the joints, `gaps` (S + 1,) the number of empty slots before each slot, and `pushed`
+    the displacement that forces explain.
     """
     weights = np.zeros(count + 2 * side + 1)
     share = count / (2.0 * side)
@@ -187,7 +188,7 @@ def _beyond(
 
 def middle(values: Array) -> Array:
     """Return the median over the known joints of (S, 14, ...)."""
-    ordered = np.sort(values, axis=1)  # what is not known comes last
+    ordered = np.sort(values, axis=1)  # unknown joints come last
     number = np.isfinite(values).sum(axis=1, keepdims=True)
     low, high = (
         np.take_along_axis(ordered, np.maximum(k, 0), axis=1) for k in ((number - 1) // 2, number // 2)

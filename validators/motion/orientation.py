@@ -1,4 +1,4 @@
-"""Bodies that are upside down, or lie because another axis points up than the file states."""
+"""Orientation: bodies are upside down, or lie because the file states a wrong up axis."""
 
 from __future__ import annotations
 
@@ -12,31 +12,32 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import up_of
 
-#: Frames of which a share tells the orientation.
+#: Least number of frames of a judged clip.
 FEWEST_FRAMES: Final = 5
 
-#: Cosine between trunk and up below which a body is upside down.
+#: Largest cosine between trunk and up of a body that is upside down.
 INVERTED_COSINE: Final = -0.5
 
-#: Cosine (32 degrees) of trunk and legs with an axis along which a body stands.
+#: Least cosine (32 degrees) between an axis and the trunk and legs of a body that stands along the axis.
 UPRIGHT_COSINE: Final = 0.85
 
 #: Largest cosine (60 degrees) between trunk and up of a body that lies.
 LYING_COSINE: Final = 0.5
 
-#: Way of the hips from which a straight body that lies travels: people who lie do not.
+#: Least range of the hips across an axis, metres, of a body that travels: people who lie do not.
 TRAVEL_METRES: Final = 0.4
 
-#: Range of the height of the lowest joint, 5th to 95th percentile, metres: a body that lies stays on the ground.
+#: Largest range of the height of the lowest joint, 5th to 95th percentile, metres, of a body that lies.
 LEVEL_METRES: Final = 0.1
 
-#: Coordinate of the lowest joint along up, metres, of a person on the plane through the origin.
+#: Range of the lowest joint along up, metres, of a person on the plane through the origin.
 SOLE_METRES: Final = (-0.03, 0.2)
 
-#: Percentiles of that coordinate, and the range between the outer two, metres. Flights take up to 40 % of the frames.
+#: Percentiles of the lowest joint along up, and the largest difference of the outer two, metres, for a person who stays
+#: on that plane. Flights may take 40 % of the frames.
 STEADY_PERCENTILES, STEADY_METRES = (5, 50, 60), 0.12
 
-#: Height of the wrists below the neck from which hands may carry a body that is upside down, metres.
+#: Least distance of both wrists below the neck of a body on its hands, metres.
 REACH_METRES: Final = 0.1
 
 
@@ -55,7 +56,7 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     Parameters
     ----------
     upside_down, aligned : float
-        Shares of the frames that show it.
+        Least shares of the frames that show a body upside down, and a body straight along another axis.
     """
     if not body.motion or len(body) < FEWEST_FRAMES:
         raise NotAskedError(f"it needs {FEWEST_FRAMES} frames of motion")

@@ -1,4 +1,4 @@
-"""Profiles: which checks over time are asked, with which thresholds, as TOML tables."""
+"""Profiles: TOML tables that choose checks over time and their thresholds."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
 
 @lru_cache(maxsize=16)
 def load_profile(name: str) -> tuple[FunctionCheck, ...]:
-    """Load a profile by its name, or from a TOML file of schema ``posekit.profile/1``.
+    """Return the checks of a profile, with its thresholds, in the order of `MOTION_CHECKS`.
 
-    Its checks over time have its thresholds, and the order of `MOTION_CHECKS`.
+    A profile has a name, or is a TOML file of schema ``posekit.profile/1``.
 
     Raises
     ------
     InputError
-        If there is no such profile, or it is not as the schema says.
+        If there is no such profile, or it breaks the schema.
     """
     asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "--profile").get("checks", {})
     for check, thresholds in asked.items():

@@ -1,10 +1,9 @@
-"""Rules by which others select motion, each as its authors compute it, for named profiles.
+"""Published rules for selecting motion, as their authors compute them, for named profiles.
 
 PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and its code) judges parts of four seconds that overlap by half a
-second, by vertices of SMPL-X's feet; here a contact is a point of the foot as near the ground. ProtoMotions (Tessler et
-al. 2024, its data filters) and HoloMotion (2025, its curation) bound single frames. The measure of skating is that of
-Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV); it calls much of what real feet do skating, `sliding` does
-not.
+second. It uses vertices of the feet of SMPL-X; here points of the feet replace them. ProtoMotions (Tessler et al. 2024,
+its data filters) and HoloMotion (2025, its curation) bound values of single frames. `skating` is the measure of Guided
+Motion Diffusion (Karunratanakul et al. 2023, ICCV); unlike `sliding` it rejects many steps of real walks.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import ground_of, soles, up_of
 from posekit.validators.motion.timeline import timeline_of
 
-#: Parts of a clip that PHUMA judges as a whole, their overlap, and their least duration, seconds.
+#: Duration, overlap and least duration of the parts of a clip that PHUMA judges, seconds.
 CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS = 4.0, 0.5, 1.0
 
-#: Order of the low-pass filter, which runs forward and backward.
+#: Order of the low-pass filter; it runs forward and backward.
 BUTTERWORTH_ORDER: Final = 4
 
-#: Time by which the way of the root is mirrored at its ends before it is filtered, seconds.
+#: Duration of the mirrored padding at both ends of the root's path before the filter, seconds.
 PADDED_SECONDS: Final = 2.0
 
 
@@ -35,18 +34,18 @@ PADDED_SECONDS: Final = 2.0
 def skating(
     body: Body, *, height: float = 0.05, way: float = 0.025, rate: float = 20.0, smoothed: int = 5
 ) -> Judgement:
-    """Feet near the ground go along it too far in a frame.
+    """Feet near the ground move along it too far in a frame.
 
     Parameters
     ----------
     height : float
-        Height over the ground up to which a foot touches it, in two frames, metres.
+        Largest height over the ground of a foot that touches it, metres; in this frame and the frame before.
     way : float
-        Way along the ground that it may go in a frame of the measure, metres.
+        Largest allowed displacement along the ground in a frame at `rate`, metres.
     rate : float
-        Frames per second of the measure.
+        Frames per second for which `way` holds.
     smoothed : int
-        Odd number of frames whose mean way counts.
+        Odd number of frames over which displacements are averaged.
     """
     points, height_along = soles(body)
     known = np.asarray(np.isfinite(points).any(axis=(0, 2)))
@@ -69,9 +68,9 @@ def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Ju
     Parameters
     ----------
     least : float
-        Share of the frames.
+        Least share of the frames.
     window : float
-        Range of heights of soles that are the ground's, metres; the ground is where most frames have theirs.
+        Range of the heights of soles on the ground, metres. The ground is the window with the soles of most frames.
     """
     level = _voted(body, window)
     touches = np.asarray((np.abs(_soles(body) - level) <= window / 2).any(axis=1), dtype=np.float64)
@@ -85,9 +84,9 @@ def root_height(body: Body, *, least: float = 0.6, most: float = 1.5, window: fl
     Parameters
     ----------
     least, most : float
-        Metres.
+        Bounds of the height, metres.
     window : float
-        As in `ContactShare`.
+        As in `contact_share`.
     """
     value = body.height[:, both("hip")].mean(axis=1) - _voted(body, window)
     return Judgement(("root",), value, least, most)
@@ -100,9 +99,9 @@ def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) ->
     Parameters
     ----------
     root : float
-        Distance of the middle of the hips (SMPL's pelvis) from over the hull of ankles and toes, metres.
+        Largest horizontal distance of the middle of the hips (SMPL's pelvis) from the hull of ankles and toes, metres.
     pelvis : float
-        The same of the pelvis joint, some 10 cm above (SMPL's first joint of the spine), metres.
+        Largest horizontal distance of the pelvis joint, some 10 cm above (SMPL's first spine joint), metres.
     """
     feet, _ = soles(body)
     points = _hips(body), body.joints[:, JOINT["pelvis"]]
@@ -118,9 +117,9 @@ def root_jerk(body: Body, *, most: float = 50.0, cutoff: float = 3.0) -> Judgeme
     Parameters
     ----------
     most : float
-        Mean length of third differences of the root's position, metres a second cubed.
+        Largest mean jerk of the root, by third differences, metres a second cubed.
     cutoff : float
-        Cutoff of the low-pass filter that the root's way passes, hertz.
+        Cutoff of the low-pass filter of the root's path, hertz.
     """
     if body.rate <= 2.0 * cutoff:
         raise NotAskedError(f"it needs more than {2.0 * cutoff:g} frames per second")
@@ -149,11 +148,11 @@ def above_ground(
     Parameters
     ----------
     lowest : float
-        Height of the lowest point over the ground from which it is below, metres (negative).
+        Least allowed height of the lowest point over the ground, metres (negative).
     highest : float
-        Height of the lowest point over the ground that may last, metres.
+        Largest height of the lowest point over the ground that may last longer than `lasting`, metres.
     lasting : float
-        Seconds.
+        Longest allowed time above `highest`, seconds.
     """
     height = ground_of(body).height - body.ground
     upper = np.full(len(body), np.inf)
@@ -170,7 +169,7 @@ def root_speed(body: Body, *, most: float = 10.0) -> Judgement:
     Parameters
     ----------
     most : float
-        Speed of the middle of the hips, metres a second.
+        Largest allowed speed of the middle of the hips, metres a second.
     """
     return Judgement(("root",), _speeds(body, _hips(body)[:, None]), upper=most)
 
@@ -182,7 +181,7 @@ def body_speed(body: Body, *, most: float = 15.0) -> Judgement:
     Parameters
     ----------
     most : float
-        Speed of any joint, metres a second.
+        Largest allowed speed of any joint, metres a second.
     """
     return Judgement(JOINTS, _speeds(body, body.joints), upper=most)
 
@@ -193,16 +192,16 @@ def _hips(body: Body) -> Array:
 
 
 def _speeds(body: Body, points: Array) -> Array:
-    """Return speeds since the frame before (T, P) of points (T, P, 3), metres a second."""
+    """Return the speeds of points (T, P, 3) since the frame before (T, P), metres a second."""
     line = timeline_of(body)
     placed = line.spread(points)
     return line.of_frames(norm(np.diff(placed, axis=0, prepend=np.nan)) / body.dt)
 
 
 def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) -> Array:
-    """Return, for each frame, the worst mean of values (T, K) over the parts of the clip that it is in.
+    """Return for each frame (T, K) the worst mean of values (T, K) over the parts of the clip that contain the frame.
 
-    The last `inside` slots of a part are left out: differences that start there reach beyond it.
+    The mean leaves out the last `inside` slots of a part, because differences that start there reach beyond the part.
     """
     if len(body) * body.dt < LEAST_SECONDS:
         raise NotAskedError(f"it needs {LEAST_SECONDS:g} s of motion")
@@ -221,14 +220,14 @@ def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) ->
 
 
 def _soles(body: Body) -> Array:
-    """Return the heights of soles (T, P) along up, by toes and heels, or by ankles where there are none."""
+    """Return the heights of soles (T, P) along up, by toes and heels, or by ankles if toes and heels are unknown."""
     height = soles(body)[1]
     toes = height[:, : len(FEET_POINTS)]
     return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
 
 
 def _voted(body: Body, window: float) -> float:
-    """Return the stated ground, or the middle of the window of heights that has most frames."""
+    """Return the stated ground, or the middle of the window of heights with the soles of most frames."""
     if body.settings.ground is not None:
         return body.settings.ground
     lowest = np.sort(np.fmin.reduce(_soles(body), axis=1))

@@ -1,9 +1,10 @@
 """Exchanged right and left joints, found by continuity, by lengths and by the direction that a body faces.
 
-Each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is, in every frame, as labelled or
-exchanged. The 64 states of a frame have an energy: of the parts that join pairs, of the direction in which the body
-faces, of how far right and left are from where they were. The least of a clip is found by dynamic programming over
-the stretches between frames in which some pair seems to turn over (Viterbi 1967, IEEE Trans. Inf. Theory 13).
+In every frame each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is as labelled or exchanged:
+64 states. A state has an energy by the lengths of segments between pairs, by the direction that the body faces, and by
+the distances of right and left joints from their previous positions. The sequence of states with the least energy is
+found by dynamic programming (Viterbi 1967, IEEE Trans. Inf. Theory 13). States change only at frames in which the
+motion of some pair suggests an exchange.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, cross, dot, known_median, norm, unit
 from posekit.skeleton import JOINT, N_TRUNK_JOINTS, both
 
-#: Parts with a right and a left joint.
+#: Names of the pairs of a right and a left joint.
 SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 
 RIGHT_JOINTS: Final = tuple(JOINT[f"right_{name}"] for name in SIDE_PAIRS)
 LEFT_JOINTS: Final = tuple(JOINT[f"left_{name}"] for name in SIDE_PAIRS)
 
-#: Which pairs are exchanged (64, 6).
+#: Whether each pair is exchanged in each state (64, 6).
 _PAIR_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
 
-#: Pairs that a segment of a limb joins.
+#: Pairs with a limb segment between them.
 _LIMB_LINKS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
 
-#: Sign of each evidence in each state (7, 64): that two pairs belong together, where hips face, and where shoulders do.
+#: Sign of each kind of evidence in each state (7, 64): five for pairs that belong together, hips, shoulders.
 _AS_LABELLED: Final = np.array(
     [
         *(1 - 2 * (_PAIR_STATES[:, a] != _PAIR_STATES[:, b]) for a, b in (*_LIMB_LINKS, (0, 3))),
@@ -36,46 +37,46 @@ _AS_LABELLED: Final = np.array(
     ]
 )
 
-#: Difference of fit that is full evidence of how two pairs belong together, as a share of the length.
+#: Difference between two lengths that is full evidence, as a share of the length.
 LENGTH_SHARE: Final = 0.1
 
-#: Usual deviation of a limb's length from its median from which its ends belong to two limbs, metres.
+#: Least median deviation of a limb's length if its ends often belong to two limbs, metres.
 TORN_METRES: Final = 0.02
 
-#: Distance of a knee or a toe in front of the leg that is full evidence of where the hips face, metres.
+#: Distance of a knee or a toe in front of the leg that is full evidence of the direction of the hips, metres.
 BEND_METRES: Final = 0.03
 
-#: Standard deviations of measuring noise that are full evidence.
+#: Distance that is full evidence in measured data, in standard deviations of noise.
 NOISE_FACTOR: Final = 5.0
 
-#: Distance between two joints that is full evidence of their identity in the next frame, metres.
+#: Least distance between right and left that gives full evidence of their identity in the next frame, metres.
 APART_METRES: Final = 0.1
 
-#: Cost of an exchange between two frames, in frames of evidence.
+#: Energy of a change of state between two frames, in frames of evidence.
 TURNING_COST: Final = 1.0
 
-#: Weight of continuity between two frames, in frames of evidence.
+#: Weight of the continuity between two frames, in frames of evidence.
 CONTINUITY_WEIGHT: Final = 6.0
 
-#: Cost of an exchanged pair in a frame, in frames of evidence: labels are more often right than wrong.
+#: Energy of an exchanged pair in a frame, in frames of evidence: most labels are right.
 EXCHANGED_COST: Final = 0.03
 
 
 def exchanged_pairs(
     joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_], noise: float
 ) -> NDArray[np.bool_]:
-    """Return which of `SIDE_PAIRS` have right and left exchanged (T, 6).
+    """Return whether right and left of each of `SIDE_PAIRS` are exchanged (T, 6).
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, one after the other in time; NaN gives no evidence.
+        Metres, in the order of time; NaN if unknown.
     feet : array (T, 4, 3)
         Right and left toe, right and left heel.
     head : array (T, 5, 3)
         Nose, eyes and ears.
     follows : bool array (T - 1,)
-        Whether each frame but the first is the next one in time.
+        Whether each frame except the first directly follows the frame before it in time.
     noise : float
         Standard deviation of measured coordinates, metres.
     """
@@ -97,7 +98,7 @@ def exchanged_pairs(
 
 
 def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
-    """Exchange right and left of joints (T, 14, 3) at pairs (T, 6)."""
+    """Return joints (T, 14, 3) with right and left exchanged at the given pairs (T, 6)."""
     if not swapped.any():
         return points
     mended, turned = points.copy(), swapped[..., None]
@@ -107,7 +108,7 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
 
 
 def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: float) -> Array:
-    """Return the evidence, -1 to 1, that pairs are as labelled (T, 7): five relations, hips, shoulders."""
+    """Return the evidence, -1 to 1, that pairs are as labelled (T, 7), in the order of `_AS_LABELLED`."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
@@ -125,7 +126,7 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
     sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
     together[:, 4] = _sure(dot(across_shoulders, across_hips) / sizes * 2.0)
     forward = unit(cross(trunk, across_hips))
-    # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
+    # If the thigh is at more than a right angle to the trunk, the knee is still in front of the line from hip to ankle.
     legs = (joints[:, both("hip")] + joints[:, both("ankle")]) / 2.0
     bends = dot(joints[:, both("knee")] - legs, forward[:, None])
     toes = dot(feet[:, :2] - joints[:, both("ankle")], forward[:, None])
@@ -137,11 +138,11 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
 
 
 def _length(straight: Array, crossed: Array, torn: float) -> float:
-    """Return a segment's length: the median of the labelled lengths or, if these scatter, the mode of all lengths.
+    """Return a segment's length: the median of the labelled lengths or, if they scatter, the mode of all lengths.
 
-    The right length is half of all lengths, as labelled and crossed, whatever share of a clip is exchanged: the
-    middle of the shortest interval with two fifths of them (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69,
-    1012-1016).
+    All lengths are the labelled and the crossed ones. Half of them are right, whatever share of a clip is exchanged.
+    The mode is the middle of the shortest interval with two fifths of all lengths (Robertson & Cryer 1974, J. Am. Stat.
+    Assoc. 69, 1012-1016).
     """
     middle = known_median(straight)
     if not known_median(np.abs(straight - middle)) > torn:
@@ -154,14 +155,14 @@ def _length(straight: Array, crossed: Array, torn: float) -> float:
 
 
 def _sure(evidence: Array) -> Array:
-    """Bound evidence to -1 and 1; unknown evidence is 0."""
+    """Return evidence between -1 and 1; unknown evidence is 0."""
     return np.asarray(np.nan_to_num(np.clip(evidence, -1.0, 1.0)))
 
 
 def _continuity(joints: Array, across: Array) -> Array:
-    """Return the evidence that a pair was exchanged since the frame before (T - 1, 6), -1 to 1.
+    """Return the evidence, -1 to 1, that each pair was exchanged since the frame before (T - 1, 6).
 
-    It is how much shorter the ways of both joints are when they change places, beside the way of the trunk.
+    The evidence is the decrease of both joints' displacements, relative to the trunk's, if the joints change places.
     """
     moved = np.diff(joints[:, :N_TRUNK_JOINTS], axis=0)
     known = np.isfinite(moved[..., 0])
@@ -177,7 +178,7 @@ def _continuity(joints: Array, across: Array) -> Array:
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
-    """Return the states (N,) of least energy, given energies (N, 64) and evidence of exchanges (N - 1, 6)."""
+    """Return the sequence of states (N,) of least energy, by energies (N, 64) and evidence of exchanges (N - 1, 6)."""
     differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]

@@ -1,9 +1,9 @@
-r"""Speeds of feet that stand.
+r"""Sliding: standing feet that move evenly along the ground.
 
-A foot that stands flat neither rises nor turns: its ankle and its toes have one velocity, which is 0. In recordings it
-is not: skin and markers move, feet roll, and joints lie above the sole; so the speed of the slowest point alone, by
-which skating is often measured, calls every other step of a real walk sliding. Real feet never go on evenly: a foot
-slides if its points have for a time one velocity, the same from frame to frame, and along the ground.
+The points of a standing foot should not move. In recordings they do: skin and markers move, feet roll, and joints lie
+above the sole. Published measures of skating use the speed of the slowest point, and reject every other step of a real
+walk. But real feet never move evenly. Here a foot slides if all its points have the same velocity along the ground for
+some time. The whole body drifts if everything that carries it has one common velocity.
 """
 
 from __future__ import annotations
@@ -21,46 +21,48 @@ from posekit.validators.motion.frames import needs_rate
 from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of, up_of
 from posekit.validators.motion.timeline import median_of_five, timeline_of
 
-#: Height above the highest level of the ground up to which a foot is down, metres: a swinging foot's toes clear 1 to 6
-#: cm, and are faster.
+#: Largest height of a foot on the ground above its highest level, metres. Toes of a swinging foot clear the ground by 1
+#: to 6 cm, but are faster.
 DOWN_METRES: Final = 0.04
 
-#: Height up to which any joint may carry the body, metres: hands and knees of crawling bodies do.
+#: Largest height above the ground of joints that may carry the body, metres: also hands and knees of crawling bodies.
 LOW_METRES: Final = 0.1
 
-#: Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`.
+#: Indices of toe, heel and ankle of the right and the left foot in `posekit.validators.motion.ground.soles`.
 FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
 
-#: Unevenness of a slide of several points, at most, as a share of its speed.
+#: Largest unevenness of a slide of several points, as a share of its speed.
 EVEN_SHARE: Final = 0.3
 
-#: Speed above which a foot swings, metres a second, if noise hides how uneven a swing is.
+#: Largest speed of a slide, metres a second, if noise hides the unevenness of swinging feet.
 SWINGING_SPEED: Final = 1.0
 
-#: Height of the hips above a foot that stands, as a share of the legs' length: crawling bodies drag their feet.
+#: Least height of the hips above a standing foot, as a share of the legs' length: crawling bodies drag their feet.
 UPRIGHT_SHARE: Final = 0.6
 
+#: Least rate without `SLOW_FACTOR`, frames per second.
 VIDEO_RATE: Final = 29.0
-#: Factor of the least duration at fewer frames per second: medians of five frames hide a foot's roll.
+
+#: Factor of the least duration at lower rates: medians of five frames hide the roll of a foot.
 SLOW_FACTOR: Final = 2.0
 
-#: Frames per second from which resting feet are visible.
+#: Least rate at which resting feet are visible, frames per second.
 SLIDING_RATE: Final = 15.0
 
 
-#: Speeds of a drift of the whole body that are looked for, metres a second; real walks have up to 0.04 for a second.
+#: Range of speeds of a drift of the whole body, metres a second; real walks drift by up to 0.04 for a second.
 LEAST_DRIFT, LONGEST_DRIFT = 0.05, 1.0
 
-#: Least duration of a drift, and the windows whose median velocity is a candidate for its velocity, seconds.
+#: Least duration of a drift, and duration of windows whose median velocities are candidates for its velocity, seconds.
 DRIFT_SECONDS, CANDIDATE_SECONDS = 0.8, 0.4
 
-#: Least share of the slots of a drift in which a foot is down.
+#: Least share of the slots of a drift in which a point is near the ground.
 KNOWN_SHARE: Final = 0.6
 
-#: Mean distance of velocities from a drift's, as a share of its speed, at most.
+#: Largest mean distance of velocities from the velocity of a drift, as a share of its speed.
 DRIFT_FIT: Final = 0.55
 
-#: Share of its speed by which a drift must explain the velocity of each frame better than rest does.
+#: Least improvement of a drift over rest as the explanation of a velocity, as a share of the drift's speed.
 DRIFT_PENALTY: Final = 0.25
 
 
@@ -73,13 +75,13 @@ def sliding(
     Parameters
     ----------
     fastest : float
-        Metres a second that a standing foot may go.
+        Largest allowed speed of a standing foot, metres a second.
     lasting : float
-        Seconds for which it goes on.
+        Least duration of a slide, seconds.
     uneven : float
-        Metres a second by which velocities of one slide differ at most, between points of the foot and over time.
+        Largest difference of velocities in a slide, between points of the foot and over time, metres a second.
     rising : float
-        Metres a second that a foot on the ground goes up or down at most.
+        Largest vertical speed of a foot on the ground, metres a second.
     """
     needs_rate(body, SLIDING_RATE)
     line, up, (feet, height), ground = timeline_of(body), up_of(body), soles(body), ground_of(body)
@@ -108,7 +110,7 @@ def sliding(
         start, stop, speed = drift
         for first, last in runs(np.asarray(value.any(axis=1))):
             if first < stop and last > start:
-                value[first:last] = 0.0  # one defect is named once
+                value[first:last] = 0.0  # report the drift only
         value[start:stop] = speed
     return Judgement([f"{side}_foot" for side in SIDES], line.of_frames(value), upper=fastest)
 
@@ -116,7 +118,7 @@ def sliding(
 def _slides(
     body: Body, points: Array, down: Flags, count: int, bounds: tuple[float, float, float, float]
 ) -> Flags:
-    """Return the slots (S,) in which a foot (S, 3, 3) slides evenly for at least `count` slots.
+    """Return whether a foot (S, 3, 3) slides evenly, for at least `count` slots, in each slot (S,).
 
     The bounds are those of `sliding` for speed, unevenness and rise, and the noise of a speed, metres a second.
     """
@@ -137,7 +139,7 @@ def _slides(
     share = EVEN_SHARE if known.sum() > 1 else 0.0
     steady = differs < np.maximum(uneven, share * norm(even)) + noise
     steady &= sliding_window_view(flat, count).all(axis=1)
-    # Where noise lets feet differ by more than they slide, evenness is not evidence.
+    # Evenness is no evidence if noise may change velocities by more than the speed of the slide.
     steady &= norm(even) > max(fastest, noise / EVEN_SHARE)
     if noise > uneven:
         steady &= norm(even) < SWINGING_SPEED
@@ -149,8 +151,8 @@ def _slides(
 def _stance_way(points: Array, low: Flags, up: Array) -> Array:
     """Return the way along the ground, since the slot before, of the slowest low point of the body (S, 3), metres.
 
-    Something that carries a body stands still, so that the way is near zero in every slot; NaN in slots without a low
-    point.
+    A part of the body that carries it stands still, so that the way of clean motion is near zero; NaN in slots without
+    a low point.
 
     Parameters
     ----------
@@ -168,10 +170,10 @@ def _stance_way(points: Array, low: Flags, up: Array) -> Array:
 
 
 def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
-    """Find the stretch of slots in which feet stand with one common velocity: start, stop, and its speed.
+    """Return start, stop and speed of the stretch of slots with one common velocity of standing points; None if none.
 
-    The stretch maximizes the sum over frames of how much better the velocity explains them than rest does (the maximum
-    sum of consecutive numbers: Bentley 1984, Commun. ACM 27:865).
+    The stretch maximizes the summed improvement of the common velocity over rest as the explanation of the velocities
+    (S, 3) (the maximum sum of consecutive numbers: Bentley 1984, Commun. ACM 27:865).
     """
     known = np.isfinite(velocity[:, 0])
     count = max(round(CANDIDATE_SECONDS / step), 3)
@@ -202,7 +204,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
 
 
 def _ends(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
-    """Move the ends of a slide, outward by at most `most` slots, to where its summed gain (S - 1,) is largest."""
+    """Return the ends of a slide, moved outward by at most `most` slots to the largest sum of gains (S - 1,)."""
     middle = (start + stop) // 2
     before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
     after = np.cumsum(gained[middle : stop + most])

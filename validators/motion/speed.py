@@ -1,4 +1,4 @@
-"""Speeds, accelerations and jerks of joints, against bounds that people have been measured to keep."""
+"""Speeds, accelerations and jerks of joints against measured bounds of people; joint speeds of robots."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.frames import explained
 from posekit.validators.motion.timeline import spaced, timeline_of
 
-#: Least time over which differences are taken, seconds: more frames per second add noise.
+#: Shortest time between the points of a difference, seconds: shorter times amplify noise.
 SHORTEST_SECONDS: Final = 1.0 / 60.0
 
-#: Standard deviations of noise by which a difference may be off.
+#: Tolerance of differences in standard deviations of their noise.
 NOISE_DEVIATIONS: Final = 5.0
 
-#: Velocity from which a URDF's number means that there is no limit, radians or metres a second.
+#: A URDF with this or a larger velocity limit has no limit, radians or metres a second.
 NO_LIMIT: Final = 1e6
 
 
@@ -40,18 +40,24 @@ def speed(body: Body, *, trunk: float = 14.0, limbs: float = 30.0) -> Judgement:
 
 @check("acceleration", unit="m/s²", reads=("joints", "time"), over_time=True)
 def acceleration(body: Body, *, trunk: float = 400.0, limbs: float = 1200.0) -> Judgement:
-    """Speeds of joints change faster than those of people can; bounds as those of `speed`."""
+    """Speeds of joints change faster than those of people can.
+
+    Parameters are those of `speed`.
+    """
     return _derivative(body, 2, trunk, limbs)
 
 
 @check("jerk", unit="m/s³", reads=("joints", "time"), over_time=True)
 def jerk(body: Body, *, trunk: float = 48_000.0, limbs: float = 144_000.0) -> Judgement:
-    """Accelerations of joints change faster than those of people can; bounds as those of `speed`."""
+    """Accelerations of joints change faster than those of people can.
+
+    Parameters are those of `speed`.
+    """
     return _derivative(body, 3, trunk, limbs)
 
 
 def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement:
-    """Judge the difference of an order over a sixtieth of a second or a frame."""
+    """Judge a derivative by differences over a sixtieth of a second, or over one frame if that is longer."""
     found = explained(body)
     stride = max(round(SHORTEST_SECONDS / body.dt), 1)
     weights = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
@@ -67,7 +73,7 @@ def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement
 
 
 def _over_gaps(joints: Array) -> Array:
-    """Return metres a slot from where each joint was last known (S, 14); NaN where it was not or is not known."""
+    """Return the mean speed of each joint over the gap before its slot (S, 14), metres a slot; NaN without a gap."""
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)
@@ -101,7 +107,7 @@ def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judg
         joints = zip(robot.model.joints, sizes, strict=True)
         revolute = [size == 1 and "P" not in joint.shortname() for joint, size in joints for _ in range(size)]
         limits = np.where(revolute, most, np.inf)
-    # The root has no limit; 0 or a huge number in a URDF is none.
+    # The root has no limit, and 0 or a huge number in a URDF stands for no limit.
     limited = np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))
     if not len(limited):
         raise NotAskedError("the URDF has no velocity limits")

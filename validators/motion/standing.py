@@ -1,4 +1,4 @@
-"""Checks against the ground: bodies in it, above it without support, in the air for too long, or about to fall over."""
+"""Checks against the ground: bodies are in it, hover above it, are in the air for too long, or would fall over."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from posekit.validators.motion.ground import (
     up_of,
 )
 
-#: Standard deviations of noise by which the lowest of several points may be lower than they are.
+#: Tolerance of the height of the lowest point, in standard deviations of noise.
 PENETRATION_DEVIATIONS: Final = 3.0
 
-#: Time before and after a frame within which a body that a stated ground carries touches it.
+#: Time before and after each frame, seconds, in which a body on a stated ground touches it.
 TOUCH_SECONDS: Final = 0.4
 
-#: Height over a stated ground of one that is not level, metres: recordings of one laboratory slope by 2 to 4 cm.
+#: Tolerance for a stated ground that is not level, metres: floors of one laboratory slope by 2 to 4 cm.
 UNLEVEL_METRES: Final = 0.03
 
-#: Height of an ankle over its height on a flat foot, metres, within `TOUCH_SECONDS` of any frame: only toes stand for
-#: longer.
+#: Tolerance for lifted heels if toes are unknown, metres: nobody stands on the toes for longer than `TOUCH_SECONDS`
+#: before and after a frame.
 HEEL_METRES: Final = 0.04
 
-#: Standard deviations of noise by which the fastest of the joints may be faster than it is.
+#: Tolerance of the speed of the fastest joint, in standard deviations of noise.
 STILL_DEVIATIONS: Final = 4.0
 
-#: Height above the lowest sole up to which a foot bears, metres.
+#: Largest height of a foot that carries the body above the lowest sole, metres.
 BEARING_METRES: Final = 0.06
 
-#: Height of the hips above the feet of a person who stands, as a share of the legs' length: lower hips may sit.
+#: Least height of the hips of a standing person above the feet, as a share of the legs' length: lower hips may sit.
 SITTING_SHARE: Final = 0.8
 
 
@@ -56,9 +56,10 @@ def penetration(body: Body, *, depth: float = 0.025, unlevel: float = 0.1) -> Ju
     Parameters
     ----------
     depth : float
-        Depth that is allowed, metres.
+        Allowed depth, metres.
     unlevel : float
-        Metres by which an estimated ground may be lower than where something rests; not where that hangs.
+        Tolerance for an estimated ground that is not level, metres. It does not apply to parts that rest at a level
+        which the body reached without a step or a jump.
     """
     ground, stated = ground_of(body), body.settings.ground
     if stated is None:
@@ -75,18 +76,19 @@ def floating(
 ) -> Judgement:
     r"""Bodies are above the ground, and nothing holds them there.
 
-    A body in the air falls: its centre of mass has the acceleration :math:`-g`. A body hovers if it is above all levels
-    of the ground, no part of it rests, and its centre of mass falls at less than half of gravity. Over a stated ground
-    a body also floats if its lowest rests are above it, or if it does not come near it within 0.4 s.
+    The centre of mass of a body in the air has the acceleration :math:`-g`. A body hovers if it is above all levels of
+    the ground, no part of it rests, and its centre of mass falls with less than half of gravity. Over a stated ground a
+    body also floats if its lowest resting parts are above the ground, or if it does not come near the ground within
+    0.4 s.
 
     Parameters
     ----------
     height : float
-        Height that is allowed, metres.
+        Allowed height, metres.
     shortest : float
-        Seconds below which a flight is not judged: limbs hide its fall.
+        Least duration of a judged flight, seconds: in shorter ones, limbs hide the fall.
     fall : float
-        Least share of gravity by which the centre of mass of a body in the air falls.
+        Least downward acceleration of the centre of mass of a body in the air, as a share of gravity.
     """
     ground, stated = ground_of(body), body.settings.ground
     over = ground.lifted.copy()
@@ -103,7 +105,7 @@ def floating(
 
 
 def _untouched(height: Array, body: Body) -> Array:
-    """Return the least height (T,) within `TOUCH_SECONDS` of each frame, and 0 if it is below the ground."""
+    """Return the least height (T,) within `TOUCH_SECONDS` of each frame; 0 if that is below the ground."""
     half = max(round(TOUCH_SECONDS / body.dt), 1)
     padded = np.pad(np.where(np.isnan(height), np.inf, height), half, constant_values=np.inf)
     least = sliding_window_view(padded, 2 * half + 1).min(axis=-1)
@@ -117,7 +119,7 @@ def support(body: Body, *, longest: float = 1.0) -> Judgement:
     Parameters
     ----------
     longest : float
-        Seconds.
+        Longest allowed flight, seconds.
     """
     lasts = np.zeros(len(body))
     for start, stop in runs(ground_of(body).in_air):
@@ -134,11 +136,11 @@ def balance_still(
     Parameters
     ----------
     beyond : float
-        Distance of the centre of mass beyond the feet that is allowed, metres.
+        Allowed distance of the centre of mass beyond the feet, metres.
     slower : float
-        Speed below which all joints are still, metres a second.
+        Largest speed of any joint of a still body, metres a second.
     lasting : float
-        Seconds for which the body must be still.
+        Least time for which the body is still, seconds.
     """
     value = np.full(len(body), np.nan)
     still = np.flatnonzero(_stands(body, slower, lasting))
@@ -148,8 +150,8 @@ def balance_still(
 
 
 def _stands(body: Body, slower: float, lasting: float) -> NDArray[np.bool_]:
-    """Return the frames (T,) in which the body stands, and is still for long enough."""
-    # Over this number of frames, noise moves more slowly than the bound for standing still.
+    """Return whether the body stands still in each frame (T,), for at least `lasting` seconds."""
+    # Number of frames over which noise alone is slower than the bound.
     noise = STILL_DEVIATIONS * body.noise / (np.sqrt(2) * body.dt)
     frames = len(body) if noise >= slower * len(body) else max(int(np.ceil(noise / slower)), 1)
     fast = np.nan_to_num(speeds(body, body.joints, frames), nan=0.0).max(axis=1)
@@ -161,29 +163,29 @@ def _stands(body: Body, slower: float, lasting: float) -> NDArray[np.bool_]:
 
 @check("balance", unit="m", reads=("joints", "up"))
 def balance(body: Body, *, beyond: float = 0.0) -> Judgement:
-    """Bodies have their centre of mass beyond the feet, as if they stood still in every frame.
+    """Centres of mass are beyond the feet, as if the body stood still in every frame.
 
     Parameters
     ----------
     beyond : float
-        Distance beyond the feet that is allowed, metres.
+        Allowed distance beyond the feet, metres.
     """
     value = beyond_feet(body)
     return Judgement(("centre_of_mass",), value, upper=beyond, tolerance=2 * body.noise, scale=0.1)
 
 
 def upright(body: Body, share: float) -> NDArray[np.bool_]:
-    """Return the frames (T,) whose hips are above the feet by a share of the legs' length."""
+    """Return whether the hips are above the feet by a share of the legs' length in each frame (T,)."""
     hips = body.height[:, both("hip")].mean(axis=1)
     ankles = np.fmin.reduce(body.height[:, both("ankle")], axis=1)
     return np.asarray(hips - ankles > share * LEG_SHARE * stature_of(body))
 
 
 def beyond_feet(body: Body) -> Array:
-    """Return how far the centre of mass is beyond the feet that bear (T,), metres; negative over them."""
+    """Return the distance of the centre of mass beyond the feet on the ground (T,), metres; negative over them."""
     feet, height = soles(body)
     bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
-    # A foot reaches beyond its known points: all of it beyond an ankle, its end and edges beyond a toe.
+    # A foot reaches beyond its known points: most of its length beyond an ankle, its end and edges beyond a toe.
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
     reach = (0.4 if toes else FORWARD_SHARE) * FOOT_SHARE * stature_of(body)
     centre = centre_of_mass(body.joints)

@@ -1,4 +1,4 @@
-"""Frames on an even grid of time: so that a gap is a gap, and neighbours are neighbours."""
+"""Frames on an even grid of time, so that missing frames leave gaps; and filters on that grid."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.validators.body import Body, once
 
-#: Largest number of slots of a gap: longer gaps are cut to it.
+#: Largest number of slots of a gap; longer gaps become this long.
 LONGEST_GAP: Final = 16
 
-#: Slots that are filtered at a time.
+#: Number of slots in one batch of a filter.
 CACHED_SLOTS: Final = 256
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
-    """The slot of each frame of a clip on an even grid of time, and gaps and displacements by its time stamps.
+    """Slots of the frames of a clip on an even grid of time, with gaps and wrong order by the time stamps.
 
     Parameters
     ----------
     slots : int array (T,)
-        Ascending with time, one step of the clip's rate each; -1 for a frame whose time another has.
+        Slot of each frame, ascending with time; slots are one step of the clip's rate apart. -1 for a frame with the
+        time of an earlier frame.
     count : int
-        The number of slots.
+        Number of slots.
     place : int array (T,)
-        Frames by which each is out of its place in time.
+        Number of frames by which each frame is away from its place in the order of time.
     missing : array (T,)
-        Steps that lie between a frame and the one before it in time, beyond one; NaN where times are not known.
+        Number of missing steps of time before each frame; NaN if times are unknown.
     """
 
     slots: NDArray[np.intp]
@@ -41,14 +42,14 @@ class Timeline:
     missing: Array
 
     def spread(self, values: Array) -> Array:
-        """Put values of frames (T, ...) into their slots (S, ...); NaN where a slot has no frame."""
+        """Return values of frames (T, ...) by slot (S, ...); NaN in slots without a frame."""
         found = np.full((self.count, *values.shape[1:]), np.nan)
         placed = self.slots >= 0
         found[self.slots[placed]] = values[placed]
         return found
 
     def of_frames(self, values: Array) -> Array:
-        """Return, for each frame, what is in its slot: (S, ...) to (T, ...); NaN where it has none."""
+        """Return values of slots (S, ...) by frame (T, ...); NaN in frames without a slot."""
         found = np.asarray(values, dtype=np.float64)[self.slots]
         found[self.slots < 0] = np.nan
         return found
@@ -56,7 +57,7 @@ class Timeline:
 
 @once
 def timeline_of(body: Body) -> Timeline:
-    """Place the frames of a clip by their times, or one after the other where times are not known."""
+    """Return the timeline of a clip; without known times, each frame is in the slot of its index."""
     count = len(body)
     frames = np.arange(count)
     if not body.dt > 0 or not np.isfinite(body.time).all():
@@ -65,7 +66,7 @@ def timeline_of(body: Body) -> Timeline:
         )
     order = np.argsort(body.time, kind="stable")
     steps = np.diff(body.time[order], prepend=body.time[order[:1]] - body.dt) / body.dt
-    # A stamp that is a quarter of a step off is still in its slot: videos have such; one that is no later has none.
+    # A time stamp may be early by 3/4 of a step, as in some videos. A frame that is hardly later has no slot.
     ways = np.clip(np.round(steps), 0, LONGEST_GAP).astype(np.intp)
     ways[(ways == 0) & (steps > 0.25)] = 1
     ways[:1] = 1
@@ -90,7 +91,7 @@ def filtered(points: Array, weights: Array) -> Array:
 
 
 def centred(values: Array, count: int, first: int) -> Array:
-    """Lay the output of a filter (N, ...) amid NaN (count, ...), from some frame on."""
+    """Return the output of a filter (N, ...) padded with NaN to (count, ...); it starts at index `first`."""
     found = np.full((count, *values.shape[1:]), np.nan)
     found[first : first + len(values)] = values[: max(count - first, 0)]
     return found
@@ -104,10 +105,10 @@ def spaced(points: Array, weights: Sequence[float] | Array, apart: int) -> Array
 
 
 def median_of_five(values: Array) -> Array:
-    """Return medians over five slots (S, ...), mirrored at the ends: NaN where one is not known."""
+    """Return medians over five slots (S, ...), mirrored at the ends; NaN if one of the five is unknown."""
     padded = np.pad(values, ((2, 2), *[(0, 0)] * (values.ndim - 1)), mode="reflect")
     a, b, c, d, e = (padded[k : k + len(values)] for k in range(5))
-    # The least and the greatest of two pairs are not the median of five; it is that of the two between and the fifth.
+    # Drop the smaller of two minima and the larger of two maxima: the median of the remaining three is that of all.
     low = np.maximum(np.minimum(a, b), np.minimum(d, e))
     high = np.minimum(np.maximum(a, b), np.maximum(d, e))
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))

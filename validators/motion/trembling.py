@@ -1,4 +1,4 @@
-"""Trembling of joints, and its frames: the remainder of motion without its smooth part."""
+"""Trembling of joints: the remainder of motion without its smooth part."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from posekit.validators.motion.timeline import centred, filtered, spaced
 #: Frames over which trembling is measured.
 TREMBLING_FRAMES: Final = 15
 
-#: Part of the second difference over three frames that fast motion leaves in the sixth difference.
+#: Share of the second difference over three frames that fast motion adds to the sixth difference.
 CURVED_SHARE: Final = 0.4
 
-#: Standard deviations of noise that are subtracted from the trembling of a length: one number varies more than three.
+#: Number of standard deviations of noise to subtract from the trembling of a length.
 LENGTHS_NOISE: Final = 2.0
 
-#: Part of the trembling of a length that counts as a joint's: its other end may tremble too.
+#: Share of the trembling of a length that is due to one joint; its other end may tremble too.
 BOTH_ENDS: Final = 0.8
 
-#: Median length of a vector of three normal coordinates of unit deviation, and of one.
+#: Medians of the length of a vector of three normal coordinates of unit deviation, and of the size of one coordinate.
 MEDIAN_OF_THREE, MEDIAN_OF_ONE = 1.5382, 0.6745
 
-#: Frames between two stretches that are one, at most.
+#: Largest distance between frames of one stretch.
 NEAR_FRAMES: Final = 4
 
-#: Frames by which the edges of a stretch are looked for, either way.
+#: Number of frames before and after a stretch in which its ends may lie.
 EDGE_FRAMES: Final = 20
 
-#: Frames from which the usual trembling is measured.
+#: Largest number of frames that give the usual trembling.
 SAMPLED_FRAMES: Final = 2000
 
 #: Largest evidence of one joint in one frame: natural logarithm of a ratio of likelihoods.
 MOST_EVIDENCE: Final = 6.0
 
-#: Ratio of trembling outside a stretch to that inside, by which its ends are found: 0.15 to 0.55 find the same ends.
+#: Assumed ratio of trembling outside a stretch to trembling inside it: 0.15 to 0.55 give the same ends.
 OUTSIDE_SHARE: Final = 0.35
 
-#: Order of the differences that measure what is not smooth.
+#: Order of the differences that measure trembling.
 SIXTH_ORDER: Final = 6
 
 _SEGMENTS_OF: Final = tuple(
@@ -57,14 +57,14 @@ _CURVATURE: Final = np.array([1.0, 0, 0, -2.0, 0, 0, 1.0]) / 9.0
 
 
 def trembling_of(joints: Array, noise: float = 0.0) -> Array:
-    """Return the standard deviation of a coordinate's trembling (S, 14), metres, of joints in even time (S, 14, 3).
+    """Return the standard deviation (S, 14), metres, of the trembling of a coordinate of joints (S, 14, 3) in slots.
 
     Notes
     -----
-    The sixth difference of noise of deviation s has the deviation s sqrt(924) in each coordinate. Its median length
-    over 15 frames is that of noise which lasts, not of one jump; what the curvature of fast motion leaves in it
-    is taken off. Lengths of segments are judged likewise, whose sixth differences no motion enters: a joint trembles
-    where the lengths of all its segments do, by more than the noise of measuring asks for.
+    The sixth difference of noise with deviation s has the deviation s sqrt(924) in each coordinate. Its median length
+    over 15 frames measures lasting noise and ignores single jumps. The part due to the curvature of fast motion is
+    subtracted. The lengths of segments give a second measure, because motion does not change them: a joint also
+    trembles if the lengths of all its segments do, by more than the noise of measuring.
     """
     if len(joints) <= SIXTH_ORDER:
         return np.full(joints.shape[:2], np.nan)
@@ -89,7 +89,7 @@ def usual_trembling(joints: Array, percents: Sequence[float] = (50.0,)) -> Array
 
 
 def _windows(rough: Array) -> Array:
-    """Return medians over windows of (N, K), of every third frame and repeated beside it; unknown is 0."""
+    """Return running medians of (N, K), computed at every third row and repeated in between; unknown values are 0."""
     half = TREMBLING_FRAMES // 2
     padded = np.pad(np.nan_to_num(rough), ((half, half + 2), (0, 0)))
     windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
@@ -98,13 +98,13 @@ def _windows(rough: Array) -> Array:
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the frames in which joints tremble (S, 14), given windows in which they do (S, 14).
+    """Return whether joints tremble in each slot (S, 14), given centres of windows in which they do (S, 14).
 
     Notes
     -----
-    A window blurs the ends of a stretch. They are put where fourth differences, which five frames enter, turn from
-    those of a third of the noise to those of the noise inside, by the likelihood of normal noise, all joints of the
-    stretch together.
+    Windows blur the ends of a stretch. Fourth differences, which span five frames, are more local. Assuming normal
+    noise that is `OUTSIDE_SHARE` as large outside the stretch, the ends maximize the likelihood of the fourth
+    differences of all trembling joints.
     """
     rough = norm(spaced(joints, _FOURTH, 1))
     exact = np.zeros(hot.shape, dtype=np.bool_)
@@ -119,7 +119,7 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
         evidence = np.clip(np.nan_to_num(ratio), -MOST_EVIDENCE, MOST_EVIDENCE).sum(axis=1)
         total = np.concatenate([[0.0], np.cumsum(evidence)])
         middle = (first + last) // 2
-        # A fourth difference reaches two frames beyond the noise, with less evidence than inside.
+        # Fourth differences reach two frames beyond the noise, where their evidence is weaker.
         ends = (
             low + int(total[: middle - low + 1].argmin()) + 1,
             middle + int(total[middle - low :].argmax()) - 2,
