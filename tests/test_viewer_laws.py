@@ -16,7 +16,7 @@ import posekit
 from posekit.body import segment_lengths, with_head
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.motion import Motion
-from posekit.skeleton import DOFS, JOINT, TREE_SEGMENTS
+from posekit.skeleton import DOFS, JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_views
 from posekit.viewer.scene import Stage, camera_lines
 from posekit.viewer.subjects import subjects_of
@@ -143,6 +143,133 @@ def test_a_page_lists_findings_with_their_numbers(folder: Path) -> None:
     assert float(shown[0][1].rstrip("°")) == pytest.approx(first.value, rel=5e-3)
     bound = first.lower if first.value < first.lower else first.upper
     assert float(shown[0][2].rstrip("°")) == pytest.approx(bound, rel=5e-3)
+
+
+def test_a_page_of_a_report_lists_its_clips_the_worst_first(folder: Path) -> None:
+    report = random_report(5)
+    posekit.render(report, folder / "many.html")
+    data, clips = data_of(folder / "many.html"), report.clips
+    assert (data["kind"], data["frames"], data["decision"]) == ("report", [], report.decision)
+    order = [one["clip"] for one in data["clips"]]
+    kept = [clips[k].decision == "keep" for k in order]
+    assert sorted(order) == list(range(len(clips))) and data["moreClips"] == 0
+    assert kept == sorted(kept)  # clips to keep come last
+    severities = [clips[k].severity for k, keep in zip(order, kept, strict=True) if not keep]
+    assert severities == sorted(severities, reverse=True)
+    for one in data["clips"]:
+        clip, mine = clips[one["clip"]], np.asarray(report.clip) == one["clip"]
+        assert (one["path"], one["frames"], one["reason"]) == (clip.title, int(mine.sum()), clip.reason)
+        assert one["bad"] == int((np.array(report.verdicts)[mine] != "valid").sum())
+        spans = [(span["check"], span["first"], span["last"], span["worst"]) for span in one["spans"]]
+        assert spans == [
+            (span.check, span.first, span.last, span.worst_frame) for span in clip.spans[: len(spans)]
+        ]
+        assert len(spans) + one["more"] == len(clip.spans) and len(spans) == min(40, len(clip.spans))
+    counts = report.by_check()
+    assert [one["name"] for one in data["checks"]] == list(counts)
+    for one in data["checks"]:
+        assert {name: one[name] for name in counts[one["name"]]} == counts[one["name"]]
+    assert data["notes"] == list(report.notes)
+
+
+def test_findings_of_several_clips_are_at_their_frames(folder: Path, tmp_path: Path) -> None:
+    clips = [gesture(30, slice(5, 9)), gesture(40), gesture(20, slice(12, 20))]
+    for name, clip in zip("abc", clips, strict=True):
+        posekit.save(clip, tmp_path / f"{name}.npz")
+    report = posekit.validate(tmp_path)
+    posekit.render(report, folder / "clips.html", view=clips)
+    data, table = data_of(folder / "clips.html"), report.to_pandas()
+    assert [(one["clip"], one["number"]) for one in data["frames"]] == [
+        (k, number) for k, clip in enumerate(clips) for number in range(len(clip))
+    ]
+    assert data["left"] == 0 and data["kind"] == "motion"
+    for one in data["frames"]:
+        mine = table[(table["clip"] == report.clips[one["clip"]].title) & (table.frame == one["number"])]
+        shown = [place for place, *_ in one.get("findings", {}).get("0", [])]
+        named = [(data["places"][place]["check"], data["places"][place]["where"]) for place in shown]
+        assert sorted(named) == sorted(zip(mine.check, mine.place, strict=True))
+    for clip in data["clips"]:
+        for span in clip["spans"]:
+            at = data["frames"][span["index"]]
+            assert (at["clip"], at["number"]) == (clip["clip"], span["worst"])
+    for at, body in enumerate(points_of(data)):
+        motion = clips[data["frames"][at]["clip"]]
+        joints = motion.figure_joints[data["frames"][at]["number"]]
+        apart = np.linalg.norm(joints[:, None] - joints[None], axis=-1)
+        shown = np.linalg.norm(body[0, :14, None] - body[0, None, :14], axis=-1)
+        np.testing.assert_allclose(shown, apart, atol=2e-3)
+
+
+def test_a_page_of_a_noisy_result_holds_its_answers(folder: Path) -> None:
+    exact = random_views(3, np.random.default_rng(6), distance=(4.0, 5.0))
+    camera = PinholeCamera(K=np.array([[900, 0, 320], [0, 900, 240], [0, 0, 1.0]]), size=(640, 480))
+    noise = np.random.default_rng(7).normal(0, 3.0, (3, 14, 2))
+    image = camera.project(exact.truth) + noise
+    image[1, JOINT["left_wrist"]] = np.nan
+    seen = posekit.View(
+        camera=camera,
+        image=image,
+        time=exact.time,
+        root=exact.truth[:, 0],
+        deviation=3.0,
+        lengths=dict(FIGURE.lengths),
+        pictures=("a.png", "b.png", "c.png"),
+    )
+    found = posekit.recover(seen, length_deviation=0.03, group=0.2, follow=2)
+    posekit.render(found, folder / "noisy.html", view=seen)
+    data, table, answer = data_of(folder / "noisy.html"), found.survivors, found.answer
+    bits = unpacked(data, "inferred")
+    assert [[bool(one >> k & 1) for k in range(14)] for one in bits.tolist()] == table.inferred.tolist()
+    np.testing.assert_allclose(unpacked(data, "radius").reshape(-1, 14), 1000 * table.radius, atol=1.0)
+    np.testing.assert_array_equal(unpacked(data, "groups"), table.group)
+    assert found.path is not None
+    paths = unpacked(data, "paths").reshape(3, -1, len(data["points"]), 3)[:, :, :14] * data["step"]
+    assert data["paths"]["probability"] == pytest.approx(found.path.probability.tolist(), rel=1e-3)
+    for k, one in enumerate(data["frames"]):
+        span = np.linalg.norm(np.diff(found.path.joints[:, k], axis=1), axis=-1)
+        np.testing.assert_allclose(np.linalg.norm(np.diff(paths[k], axis=1), axis=-1), span, atol=2e-3)
+        assert data["paths"]["survivor"][k] == found.path.survivor[:, k].tolist()
+        assert (one["picture"], one["reason"]) == (f"{'abc'[k]}.png", found.frames.reason[k])
+        assert one["sure"] == pytest.approx(answer.sure[k], rel=1e-3) and one["sureOf"] == answer.sure_of[k]
+        assert one["unlisted"] == pytest.approx(found.frames.unlisted_probability[k], rel=5e-3)
+        assert one["unlistedCount"] == found.frames.unlisted[k]
+        assert one["nearer"] == answer.nearer[k].tolist()
+        np.testing.assert_allclose(
+            np.array(one["nearerSure"], dtype=float), answer.nearer_sure[k], atol=5.1e-4
+        )
+        rows = answer.representatives[k]
+        assert one["moreRepresentatives"] == max(len(rows) - 6, 0)
+        assert [each["p"] for each in one["representatives"]] == pytest.approx(
+            answer.represented[k][:6].tolist(), rel=1e-3
+        )
+        first = table.joints[rows[0]]
+        for each, row in zip(one["representatives"], rows, strict=False):
+            other = table.joints[row]
+            change = {
+                JOINTS[b]: (other[b, 2] - other[a, 2]) - (first[b, 2] - first[a, 2]) for a, b in TREE_SEGMENTS
+            }
+            large = sorted(
+                (name for name in change if abs(change[name]) > 0.05), key=lambda n: -abs(change[n])
+            )
+            words = [f"{name} {'farther' if change[name] > 0 else 'nearer'}" for name in large[:2]]
+            assert each["how"] == ", ".join(words).replace("_", " ")
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.5])
+def test_the_image_of_a_page_has_square_pixels(folder: Path, aspect: float) -> None:
+    joints = random_views(1, np.random.default_rng(6)).truth
+    camera = ScaledOrthographicCamera(scale=200.0, aspect=aspect)
+    seen = posekit.View(camera=camera, image=camera.project(joints), time=np.zeros(1), truth=joints)
+    found = posekit.recover(seen)
+    posekit.render(found, folder / "flat.html", view=seen)
+    data = data_of(folder / "flat.html")
+    shown = np.array(data["frames"][0]["image"][:14])
+    np.testing.assert_allclose(shown, 200.0 * joints[0, :, :2], rtol=1e-5, atol=1e-3)
+    assert data["camera"]["parallel"] is True
+    truth = unpacked(data, "truth").reshape(1, -1, 3)[:, :14] * data["step"]
+    up = np.array([data["camera"][name] for name in ("right", "down", "forward")])
+    turned = truth[0] @ up.T - joints[0]
+    np.testing.assert_allclose(turned, np.broadcast_to(turned[0], (14, 3)), atol=2e-3)
 
 
 def test_bodies_of_a_page_are_those_of_the_figure(folder: Path, motion: posekit.Motion) -> None:
