@@ -2,10 +2,9 @@
 
     python -m benchmarks.tree [--views 20] [--batch 2000]
 
-Brute force lifts all 8192 leaves of a view in one NumPy batch and asks every check about every leaf that
-has a solution. Collisions are asked of Pinocchio's pool, over whole configurations without the head, which the
-views do not show. Survivors must be those of `posekit.recover`. The neck is given. Times are processor's time of one
-run.
+Brute force lifts all 8192 leaves of a view in one NumPy batch and judges every leaf that has a solution with every
+check. Pinocchio's pool tests the collisions of whole configurations, without the head, because the views show no head
+points. The survivors must equal those of `posekit.recover`. The neck is given. Times are processor times of one run.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ SETTINGS = RecoverSettings()
 
 
 def leaves(view: View, frame: int, figure: Figure) -> Array:
-    """Place the joints of all 8192 leaves (8192, 14, 3); NaN without a solution."""
+    """Return the joints of all 8192 leaves (8192, 14, 3), metres, camera frame; NaN for leaves without a solution."""
     camera: Any = view.camera  # of a pinhole, without distortion
     K, image = camera.K, view.image[frame]
     rays = np.linalg.solve(K, np.concatenate([image, np.ones((len(image), 1))], axis=1).T).T

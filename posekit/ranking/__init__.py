@@ -1,4 +1,4 @@
-"""Which survivor, and how probable: from the image, a prior of postures, gravity and the ground."""
+"""Probabilities of survivors, from the image, a prior of postures, gravity and the ground."""
 
 from posekit.ranking.prior import Prior as Prior
 from posekit.ranking.prior import load_prior as load_prior

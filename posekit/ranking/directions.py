@@ -1,7 +1,7 @@
-r"""A posture as unit vectors in the torso's frame: smooth where angles are not, and turning with the torso.
+r"""A posture as unit vectors in the frame of its torso. Unlike angles they have no singularities.
 
-The torso's axes are x forward, y left and z from the pelvis to the neck. The vectors are the hips' left and down, the
-eight segments of the limbs, and, where it is known, the direction against gravity.
+The torso's axes are x forward, y left and z from the pelvis to the neck. The vectors are the left and the down axis of
+the hips, the directions of the eight limb segments, and the direction against gravity if it is known.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from posekit.geometry import Array, cross, dot, perpendicular, unit
 from posekit.skeleton import JOINT, SIDES, segment_name
 
-#: Upper arm, forearm, thigh and shank of the right side, then of the left.
+#: Joints (start, end) of upper arm, forearm, thigh and shank of the right side, then of the left side.
 LIMB_SEGMENTS: Final = tuple(
     (JOINT[f"{side}_{start}"], JOINT[f"{side}_{end}"])
     for side in SIDES
@@ -28,18 +28,20 @@ DIRECTION_NAMES: Final = ("hips.left", "hips.down", *map(segment_name, LIMB_SEGM
 
 UP_INDEX: Final = len(DIRECTION_NAMES) - 1
 
-#: Offset of the pelvis from the line between the hips over their distance, below which it shows no direction.
+#: Distance of the pelvis from the line between the hips over the distance between the hips (dimensionless). Below it
+#: the pelvis does not determine the hips' down axis.
 FLAT_PELVIS: Final = 0.1
 
-#: Noise of a few pixels, or lengths known to some hundredths, hide a slope of ten degrees (dimensionless).
+#: Smoothing constant c of `log_room` (dimensionless): noise of a few pixels, or of a few per cent in the lengths, hides
+#: a slope of ten degrees.
 LEAST_COSINE: Final = 0.2
 
-#: Average of one segment's log room over directions that are spread evenly.
+#: Mean of one segment's term of `log_room` over uniformly distributed directions.
 USUAL_LOG_ROOM: Final = 1 - 0.5 * math.log(1 + LEAST_COSINE**2) - LEAST_COSINE * math.atan(1 / LEAST_COSINE)
 
 
 def directions(joints: Array, up: Array | None = None) -> Array:
-    """Return the directions of postures.
+    """Return the unit vectors that describe postures.
 
     Parameters
     ----------
@@ -51,8 +53,8 @@ def directions(joints: Array, up: Array | None = None) -> Array:
     Returns
     -------
     array (N, 11, 3), or (N, 10, 3) without `up`
-        Unit vectors in the torso's frame, in the order of `DIRECTION_NAMES`; NaN where one of their joints is not
-        known, all of them where neck, a shoulder or the pelvis is not.
+        Unit vectors in the torso's frame, in the order of `DIRECTION_NAMES`. A vector is NaN if one of its joints is
+        unknown; all vectors are NaN if the neck, a shoulder or the pelvis is unknown.
     """
     neck, right, left, pelvis, right_hip, left_hip = np.moveaxis(joints[:, :6], 1, 0)
     down = unit(pelvis - neck)
@@ -70,17 +72,18 @@ def directions(joints: Array, up: Array | None = None) -> Array:
 
 
 def log_room(joints: Array) -> Array:
-    r"""Return the logarithm of the solid angle that one area of the image stands for, above its average (N,).
+    r"""Return the logarithm of the solid angle of directions per area of the image, minus its mean (N,).
 
-    A direction is a point of the sphere and its image is a shadow: :math:`d\omega = dA / |\cos\theta|`, with
-    :math:`\theta` the angle with the ray. A segment in the image plane stands for more directions than one that points
-    to the camera. Noise blurs the edge: :math:`\cos\theta` counts as :math:`\sqrt{\cos^2\theta + c^2}`.
+    A direction is a point on the unit sphere, and its image is the projection of that point:
+    :math:`d\omega = dA / |\cos\theta|`, with :math:`\theta` the angle between segment and ray. The same area of the
+    image holds more directions for a segment parallel to the image than for one that points to the camera. Noise limits
+    the density: :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
-        Camera frame, any unit. Rays are parallel to z where a joint is not in front of the camera. A segment with an
-        unknown end counts nothing.
+        Camera frame, any unit. The rays of a posture are parallel to z if one of its joints is not in front of the
+        camera. A segment with an unknown end contributes 0.
     """
     parallel = np.asarray((joints[:, :, 2] <= 0).any(axis=1))[:, None, None]
     along = joints[:, ENDS] - joints[:, STARTS]

@@ -1,11 +1,11 @@
-r"""The prior of postures: mixtures of Student's t over directions, with the weights of each kind of evidence.
+r"""The prior of postures: mixtures of Student's t distributions over directions, and the weights of all log terms.
 
 .. math::
 
     \log p(x) = c + \log \sum_k s_k \left(1 + \frac{(x - m_k)^T S^{-1} (x - m_k)}{\nu}\right)^{-(\nu + d) / 2}
 
-Some of its coordinates alone have the same law, with their part of m and S (Kotz & Nadarajah 2004, Multivariate t
-distributions and their applications, §1.10): an unknown coordinate is left out by leaving it out.
+The marginal distribution of some coordinates has the same form, with their rows of m and their rows and columns of S
+(Kotz & Nadarajah 2004, Multivariate t distributions and their applications, §1.10). Unknown coordinates are dropped.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
 
 PRIORS: Final = DATA / "priors"
 
-#: Weights of coordinates in a sum that is the same for equal coordinates and for no others.
+#: Weights of a sum of coordinates by which equal points are recognised: different points have different sums.
 UNEVEN: Final = np.sqrt(2.0 + np.arange(3 * len(DIRECTION_NAMES)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StudentMixture(Record):
-    """A mixture of K t distributions of d coordinates that differ in their middles only.
+    """A mixture of K t distributions of d coordinates with the same scale and different centres.
 
     Parameters
     ----------
     means : array (K, d)
-        Middles m.
+        Centres m.
     scale : array (d, d)
         S, symmetric and positive definite.
     dof : float
-        Degrees of freedom: the fewer, the heavier the tails.
+        Degrees of freedom; fewer degrees give heavier tails.
     share : array (K,)
-        Share s of each distribution; taken in proportion.
+        Share s of each distribution; the shares are scaled to sum to one.
     """
 
     means: Array
@@ -63,20 +63,20 @@ class StudentMixture(Record):
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.scale)))
 
     def part(self, rows: Any) -> StudentMixture:
-        """Return the distribution of some coordinates alone."""
+        """Return the marginal distribution of some coordinates."""
         return replace(self, means=self.means[:, rows], scale=self.scale[rows][:, rows])
 
     def widened(self, variance: Array) -> StudentMixture:
-        """Return the same with more variance (d,) in each coordinate."""
+        """Return the mixture with a variance (d,) added to each coordinate."""
         return replace(self, scale=self.scale + np.diag(variance))
 
     def excess(self, x: Array, count: int) -> Array:
-        """Return the log-density above its average over the distribution (N,), of the first `count` coordinates.
+        """Return the log-density (N,) of the first `count` coordinates, minus its mean over the distribution.
 
         Parameters
         ----------
         x : array (N, d)
-            NaN where a coordinate is not known: the known ones are judged, against their own average.
+            Coordinates; NaN if unknown. The marginal distribution of the known coordinates is used.
         count : int
             Number of leading coordinates.
         """
@@ -89,13 +89,13 @@ class StudentMixture(Record):
             if len(columns):
                 part, width = self if len(columns) == count else self.part(columns), len(columns)
                 some = x[np.ix_(rows, columns)]
-                # Exact postures of a frame share limbs: equal coordinates are judged once.
+                # Exact postures of a frame share limbs: equal coordinates are evaluated once.
                 _, first, which = np.unique(some @ UNEVEN[:width], return_index=True, return_inverse=True)
                 found[rows] = (part._log_sum(some[first], width) - part._usual(width))[which]
         return found
 
     def _usual(self, count: int) -> float:
-        """Mean logarithm of the density over the distribution; of single components where they do not overlap."""
+        """Return the mean log-density of the first `count` coordinates, as if the components did not overlap."""
         if count not in self._averages:
             power = (self.dof + count) / 2
             own = power * (digamma(power) - digamma(self.dof / 2))
@@ -115,7 +115,7 @@ class StudentMixture(Record):
         right = np.column_stack([-2 * middles, np.ones(len(middles)), self.dof + dot(middles, middles)])
         base = left @ right.T / self.dof
         power = (self.dof + count) / 2
-        # Counted from the nearest component, no power vanishes.
+        # Relative to the nearest component no power underflows.
         nearest = base.min(axis=1)
         each = np.exp(power * np.log(nearest[:, None] / base))  # faster than a power
         return np.asarray(np.log(each @ self.share) - power * np.log(nearest))
@@ -134,20 +134,20 @@ def digamma(x: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Prior(Record):
-    r"""A prior of postures, and the weights of the terms that `posekit.ranking.rank` adds up.
+    r"""A prior of postures, and the weights of the log terms of `posekit.ranking.log_terms`.
 
     Parameters
     ----------
     blocks : sequence of (names, StudentMixture, bool)
-        Directions that are judged together, and whether only `up` is judged, given the others.
+        Names of directions, their joint distribution, and whether only the density of `up`, given the other
+        directions, counts.
     temperature : float
-        Metres: for exact postures the log-density of directions is divided by 1 + deviation / temperature. A posture
-        that is a centimetre off is not a draw from a distribution that is sharp to a degree.
+        Metres. The log-density of directions of exact postures is divided by 1 + deviation / temperature, because the
+        directions of a posture with errors of a centimetre vary by more than the prior's fine structure.
     weights, noisy : mapping of str to float
-        Weight of each term for exact postures, and for modes under noise.
+        Weight of each log term for exact postures, and for modes under noise.
     balance, contact : (float, float)
-        Scale s (m) and average u of :math:`u - \log(1 + (d / s)^2)`, the log-density of a distance that is mostly
-        small.
+        Scale s (m) and mean u of the log-density :math:`u - \log(1 + (d / s)^2)` of a distance d.
     """
 
     blocks: Sequence[tuple[tuple[str, ...], StudentMixture, bool]]
@@ -159,19 +159,19 @@ class Prior(Record):
     _wide: dict[tuple[int, float], StudentMixture] = field(default_factory=dict)
 
     def judge(self, found: Array, sine: float = 0.0) -> tuple[Array, Array]:
-        """Return the log-densities of directions (N, 10 or 11, 3), each above its average.
+        """Return the log-densities of directions (N, 10 or 11, 3), each minus its mean over the prior.
 
         Parameters
         ----------
         found : array
             `posekit.ranking.directions.directions`, with `up` or without.
         sine : float
-            Sine of the deviation of `up`: its variance is added.
+            Sine of the standard deviation of `up`; its square is added to the variance.
 
         Returns
         -------
         posture, gravity : array (N,)
-            Terms of the posture alone, and of `up` given the posture; 0 where nothing is known.
+            Log-density of the posture, and of `up` given the posture; 0 if no direction is known.
         """
         posture, gravity = np.zeros(len(found)), np.zeros(len(found))
         for index, (names, student, conditional) in enumerate(self.blocks):
@@ -194,12 +194,12 @@ class Prior(Record):
 
 @lru_cache(maxsize=4)
 def load_prior(name: str = "people") -> Prior:
-    """Load a prior by name, or from a TOML table of the same form.
+    """Load a prior by name, or from a TOML file of the same form as the built-in prior.
 
     Raises
     ------
     InputError
-        If there is no such table, or a part of it is missing.
+        If there is no such file, or a part of it is missing.
     """
     path = Path(name) if name.endswith(".toml") else PRIORS / f"{name}.toml"
     try:
@@ -220,7 +220,7 @@ def load_prior(name: str = "people") -> Prior:
 
 
 def _block(table: Mapping[str, Any], dof: float) -> tuple[tuple[str, ...], StudentMixture, bool]:
-    """Read one block: rows of numbers are lines of text; its scale is given as the lower triangle."""
+    """Read one block. Matrices are texts with a row in each line; the scale is a lower triangle."""
     names = tuple(table["directions"])
     scale = np.zeros((3 * len(names), 3 * len(names)))
     for row, line in enumerate(table["scale"].splitlines()):

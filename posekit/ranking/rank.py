@@ -1,4 +1,4 @@
-"""The probability of each survivor: its fit to the picture times how usual such a posture is."""
+"""The probability of each survivor: its likelihood of the image times the prior of its posture."""
 
 from __future__ import annotations
 
@@ -16,19 +16,22 @@ from posekit.ranking.prior import Prior, digamma, load_prior
 from posekit.ranking.standing import standing
 from posekit.skeleton import RIGID_SEGMENTS
 
-#: Standard deviation of the tilt of a camera that is assumed to be level.
+#: Standard deviation of the tilt of a camera that is assumed to be level, degrees.
 LEVEL_WITHIN_DEGREES: Final = 20.0
 
-#: Degrees of freedom of a misfit's t distribution: torsos give now and then by more than they mostly do.
+#: Degrees of freedom of the t distribution of a rigid distance's error: errors of torsos have heavy tails.
 MISFIT_DEGREES_OF_FREEDOM: Final = 4.0
 
-#: Least deviation of a distance inside torso and hips: a real torso is not more rigid (CMU motion capture).
+#: Least standard deviation of a distance inside torso and hips, metres: real torsos are not more rigid (CMU motion
+#: capture).
 MIN_DEVIATION_METRES: Final = 0.006
 
-#: Tolerance of rigid distances over the deviation of the survivors, as the weights were fitted.
+#: Ratio of the tolerance of rigid distances to the deviation of the survivors (dimensionless), as in the fit of the
+#: prior's weights.
 PER_TOLERANCE: Final = 2.2
 
-#: Distances from ankles to centre of mass, and between ankles: a wrong `up` moves one beside the other by as much.
+#: Distance from ankles to centre of mass, and between the ankles, metres: an error of `up` by a small angle changes
+#: `standing` by these distances times the angle.
 CENTRE_OF_MASS_HEIGHT_METRES, STANCE_WIDTH_METRES = 0.9, 0.4
 
 
@@ -39,11 +42,11 @@ class Up(Record):
     Parameters
     ----------
     direction : array (3,)
-        Unit vector in the frame of the postures (x right, y down, z forward). A level camera by default.
+        Unit vector in the frame of the postures (x right, y down, z forward).
     deviation : float
-        Its standard deviation, degrees.
+        Standard deviation of the direction, degrees.
     source : str
-        Its origin, as a result states it.
+        Description of where the direction comes from; a result states it.
     """
 
     direction: Array
@@ -55,13 +58,13 @@ class Up(Record):
 
     @staticmethod
     def level() -> Up:
-        """Assume that the camera is held level: up is against the image's y."""
+        """Return the direction for a level camera: opposite to the image's y axis."""
         source = f"assumed: a level camera, within {LEVEL_WITHIN_DEGREES:g} degrees"
         return Up(direction=np.array([0.0, -1.0, 0.0]), deviation=LEVEL_WITHIN_DEGREES, source=source)
 
 
 def deviation_of_tolerance(rigid: float) -> float:
-    """Return the deviation (m) of survivors of a tree that allowed rigid distances to differ by `rigid` metres."""
+    """Return the standard deviation (m) of a tree's survivors, given its tolerance of rigid distances (m)."""
     return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
 
 
@@ -85,23 +88,24 @@ def log_terms(
     deviation : float
         Deviation of the joints of exact postures, metres.
     chi2 : array (N,), optional
-        Misfit of modes under noise. Without it the four rigid distances are judged.
+        Misfit of modes under noise. Without it the errors of the four rigid distances count.
     log_volume : array (N,), optional
-        Half the log determinant of the covariance of each mode: the volume of the postures that it stands for.
+        Half the log determinant of the covariance of each mode.
     lengths : array (17,), optional
         Segment lengths in the order of `posekit.skeleton.SEGMENTS`, metres, for exact postures.
     length_residual : array (N,), optional
-        Shortfall of the worst segment against its image, metres.
+        Metres by which the worst segment is too short to reach the ray of its image point.
     up : Up, optional
-        Without it gravity, balance and contact say nothing.
+        Without it there are no terms for gravity, balance and contact.
     prior : Prior, optional
         The built-in one by default.
 
     Notes
     -----
     The terms are ``image``, ``posture`` (directions of segments in the torso's frame), ``gravity`` (up given the
-    posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and ``foreshortening``. Each
-    but chi2 is counted from its average over true postures, so that an unknown one is neither for nor against.
+    posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and ``foreshortening``; modes
+    under noise also have ``volume``. The mean over true postures is subtracted from each term except chi2, so that a
+    term that cannot be evaluated is 0.
     """
     prior = prior or load_prior()
     # NumPy's loops then run along the postures, not along x, y, z.
@@ -130,7 +134,7 @@ def log_terms(
 
 
 def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: float) -> Array:
-    """Return the log-density (N,) of the rigid distances and of the shortfall, above its average."""
+    """Return the log-density (N,) of the errors of rigid distances and of the length residual, minus its mean."""
     start, end = np.array(RIGID_SEGMENTS).T
     apart = joints[:, end] - joints[:, start]
     off = np.sqrt(dot(apart, apart)) - lengths[-len(RIGID_SEGMENTS) :]
@@ -144,9 +148,10 @@ def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: fl
 
 
 def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
-    """Return probabilities (N,) in proportion to the exponential of scores, within each frame (N,) from 0.
+    """Return probabilities (N,) proportional to the exponential of scores (N,); they sum to one over each frame.
 
-    If all scores of a frame are minus infinity its members are equally probable.
+    `frame` (N,) is the frame of each score, from 0. All members of a frame are equally probable if all its scores are
+    minus infinity.
     """
     if not len(score):
         return np.empty(0)
@@ -160,7 +165,7 @@ def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
 def rank(
     joints: Array, frame: NDArray[np.intp], terms: Mapping[str, Array] | None = None, **evidence: object
 ) -> Array:
-    r"""Give every posture a probability within its frame.
+    r"""Return the probability of every posture within its frame.
 
     .. math:: p_i = e^{\sum_t w_t f_t(i)} / \sum_j e^{\sum_t w_t f_t(j)}
 
@@ -169,16 +174,16 @@ def rank(
     joints : array (N, 14, 3)
         Camera frame, metres.
     frame : int array (N,)
-        Frame of each.
+        Frame of each posture.
     terms : mapping of str to array (N,), optional
-        Further log terms.
+        More log terms.
     **evidence
         Parameters of `log_terms`.
 
     Returns
     -------
     array (N,)
-        They sum to one over a frame.
+        Probabilities; they sum to one over each frame.
     """
     found = {**log_terms(joints, **evidence), **(terms or {})}  # type: ignore[arg-type]
     return softmax(np.sum(list(found.values()), axis=0), frame)

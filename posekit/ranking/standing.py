@@ -1,8 +1,8 @@
-r"""Standing: distance of the centre of mass from over the feet, and height of one foot above the other.
+r"""Standing: horizontal distance between centre of mass and support, and height of one ankle above the other.
 
-The height of the ground is not known from one picture. A person who stands, stands on the lower foot, and on both
-where both are low. The support is the line from the lower ankle towards the other, shortened by
-:math:`e^{-h^2 / 2 (10 cm)^2}`, with h the other ankle's height above the lower.
+One picture does not show the height of the ground. A standing person is supported by the lower foot, and by both feet
+if both are low. The support is the line from the lower ankle towards the higher one, times
+:math:`e^{-h^2 / 2 (10 cm)^2}`, with h the height difference of the ankles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from posekit.geometry import Array, dot, perpendicular
 from posekit.skeleton import JOINT, SIDES
 
-#: Height above the lower ankle at which the other carries little any more, metres.
+#: Length scale of the height difference at which the higher ankle stops supporting the body, metres.
 SUPPORT_HEIGHT_METRES: Final = 0.10
 
 TRUNK_MASS: Final = 0.0681 + 0.31195 + 0.1182
@@ -36,7 +36,7 @@ LIMB_MASSES: Final = (
 def centre_of_mass(joints: Array) -> Array:
     """Return the centre of mass (N, 3) of postures (N, 14, 3).
 
-    A limb's part without one of its ends is left out; NaN where neck or hips are not known.
+    Parts of limbs with an unknown end are left out. The result is NaN if the neck or a hip is unknown.
     """
     neck = joints[:, JOINT["neck"]]
     down = joints[:, [JOINT["right_hip"], JOINT["left_hip"]]].mean(axis=1) - neck
@@ -65,9 +65,9 @@ def standing(joints: Array, up: Array) -> tuple[Array, Array]:
     Returns
     -------
     off : array (N,)
-        Distance of the centre of mass from over the support, metres; NaN where the joints do not show it.
+        Horizontal distance of the centre of mass from the support, metres; NaN if neck, a hip or an ankle is unknown.
     apart : array (N,)
-        Height of one ankle above the other, metres; likewise.
+        Height of one ankle above the other, metres; NaN if an ankle is unknown.
     """
     right, left = joints[:, JOINT["right_ankle"]], joints[:, JOINT["left_ankle"]]
     rise = dot(left - right, up)

@@ -1,4 +1,4 @@
-// Angles of limbs and pelvis, and their limits: the same formulas as posekit/solver/limits.py.
+// Angles of limbs and pelvis, and their limits, by the formulas of posekit/solver/limits.py.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ constexpr double VALGUS_SIGN[2] = {-1, 1};
 constexpr double SEAM = -115.0 * M_PI / 180.0, LEAST_LEFT = 0.1;
 constexpr int COUPLINGS = 12, KNOTS = 8;
 
-// As the dtype LIMITS of limits.py; all fields are doubles.
+// The layout of the dtype LIMITS of limits.py; all fields are doubles.
 struct Limits {
   double mean[2][4][2], limit[4][4][2], pelvis[3][2], sinus[2], hip_turn[2];
   double by_elevation, between_hips, couplings, role[COUPLINGS][5], knots[COUPLINGS][3][KNOTS];
@@ -33,12 +33,13 @@ inline Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x 
 inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 inline double turned(double a, double middle) { return a - 2 * M_PI * std::nearbyint((a - middle) / (2 * M_PI)); }
 
-// A part's frame and how it turns with its points: rotation vector = G first' + H other'.
+// The frame of torso or hips, and the maps G and H from velocities of its two directions to its rotation vector:
+// G first' + H other'.
 struct Frame {
   Vec forward, left, up, first, normal;
   double length, lean, across;
   bool by_down;  // the first axis is down (torso), or left (hips)
-  // Transposed product of a covector with the two maps.
+  // The products of the transposed maps with a covector w of rotations: on_first = G' w, on_other = H' w.
   void pull(Vec w, Vec& on_first, Vec& on_other) const {
     double along = dot(w, first);
     on_first = (1 / length) * (cross(w, first) - (along * lean / across) * normal);
@@ -75,13 +76,13 @@ double interpolated(double x, const double* at, const double* y, int n) {
   return y[n - 1];
 }
 
-// Ranges of hips and shoulders are rounded off with small whole powers.
+// Powers and roots of the sinus exponent; 2 and 3 are the usual ones.
 double raised(double x, double power) { return power == 2 ? x * x : power == 3 ? x * x * x : std::pow(x, power); }
 double root(double x, double power) {
   return power == 2 ? std::sqrt(x) : power == 3 ? std::cbrt(x) : std::pow(x, 1 / power);
 }
 
-// Elevation, plane and turn of an arm, the same in all writings; zero for legs.
+// Elevation, plane and turn of an arm, which do not depend on the Euler branch; zero for legs.
 struct Reading {
   double elevation, plane, offset;
 };
@@ -95,11 +96,11 @@ Reading reading_of(int limb, const double g[4]) {
   return {elevation, plane, twist - (1 - std::cos(elevation)) * from_side};
 }
 
-// Angles of a limb in one writing with their bounds, radians: flexion or elevation, abduction, rotation, hinge.
+// Angles of a limb in one Euler branch and their bounds, radians: flexion or elevation, abduction, rotation, hinge.
 struct Written {
   double value[4], bound[2][4];
 };
-// `slack` (radians) widens the sinus; a bound by an angle that is not known (NaN) is none.
+// `slack` (radians) widens the sinus. An unknown angle (NaN) bounds nothing.
 Written written(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double slack) {
   const int kind = limb / 2, over = way / 2, flipped = way & 1;
   const bool arm = kind == 0 && L.by_elevation > 0;
@@ -182,7 +183,7 @@ Limb limb_of(const double x[J][3], int m, const Frame& R) {
   return s;
 }
 
-// Angles of the hips' frame in the torso's, with what their derivatives need.
+// Angles of the hips' frame in the torso's frame, and the terms that their derivatives use.
 struct Pelvis {
   double g[3], sine, cosine;
   Vec axis;
@@ -198,12 +199,12 @@ Pelvis pelvis_of(const Frame& torso, const Frame& hips) {
   return s;
 }
 
-// A limb as the check of joint ranges states it: angle, lower and upper bound, tolerance, degrees.
+// The judgement of a limb by the check of joint ranges: rows angle, lower bound, upper bound, tolerance, degrees.
 struct Stated {
   double row[4][4];
 };
-// In the usual writing, else in the one that is least outside. Below a bend of `straight`, and where `tolerance` leaves
-// it open, a rotation is not known (validators/joint_range.py; all in degrees).
+// The usual Euler branch is stated if it passes, else the least violated one. The rotation is unknown (NaN) if the bend
+// is below `straight`, or if `tolerance` does not determine it (validators/joint_range.py; all in degrees).
 Stated stated(const Limits& L, int limb, const double g[4], double tolerance, double straight) {
   constexpr double RADIAN = M_PI / 180, UNSEEN = 45;
   const double sine = std::fabs(std::sin(g[3])), least = std::max(tolerance * RADIAN / M_PI, 2.2250738585072014e-308);

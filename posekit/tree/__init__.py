@@ -1,4 +1,4 @@
-"""The exact interpretation tree: every near-far choice of 13 joints, pruned by checks as early as they can be asked."""
+"""The exact interpretation tree: all near-far choices of 13 joints, pruned level by level by checks."""
 
 from posekit.tree.tree import Trees as Trees
 from posekit.tree.tree import grow as grow

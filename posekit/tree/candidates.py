@@ -1,7 +1,8 @@
-"""Every position that every joint can have: one lift for each way to reach it.
+"""All positions that each joint can have.
 
-A node at level j of the tree is a code of j bits, one a joint in tree order, the first the highest: 0 near, 1 far. A
-joint's position depends only on the bits of the joints on its path from the root. So 86 lifts place all 8192 leaves.
+A node at level j of the tree is a code of j bits, one for each joint in tree order, the highest bit for the first
+joint: 0 near, 1 far. The position of a joint depends only on the bits of the joints on its path from the root.
+Therefore 86 positions serve all 8192 leaves.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from posekit.geometry import Array, Ints
 from posekit.skeleton import JOINTS, PARENTS
 
 OPEN, NO_SOLUTION, COINCIDENT, BEHIND, MISSING = range(5)
-#: Reasons, before the joint's name, of branches that end before any check is asked.
+#: Reasons for branches without a position; the joint's name is appended. No check judges these branches.
 UNJUDGED: Final = {
     NO_SOLUTION: "no-solution",
     COINCIDENT: "coincident",
@@ -34,19 +35,19 @@ DEPTH: Final = len(JOINTS) - 1
 
 @lru_cache(maxsize=64)
 def path_of(joint: int) -> tuple[int, ...]:
-    """Return the joints whose branches place a joint, in the order of the path; the root's is empty."""
+    """Return the joints on the path from the root to a joint, in order, without the root."""
     return () if joint <= 0 else (*path_of(PARENTS[joint]), joint)
 
 
 @lru_cache(maxsize=1024)
 def support_of(points: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the joints on whose branches the positions of some points depend, in tree order."""
+    """Return the joints, in tree order, whose branches determine the positions of some points."""
     return tuple(sorted({joint for point in points if point < len(JOINTS) for joint in path_of(point)}))
 
 
 @lru_cache(maxsize=512)
 def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return a table from all codes at a level to the bits of some joints, the first joint's the highest."""
+    """Return the bits of some joints for every code at a level (2^level,); the highest bit is the first joint's."""
     codes = np.arange(1 << level, dtype=np.int64)
     picked = np.zeros_like(codes)
     for joint in joints:
@@ -55,12 +56,12 @@ def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
     return picked
 
 
-#: Column of each joint's first candidate.
+#: Column of the first candidate of each joint in `Candidates.table`.
 FIRST: Final = (0, *accumulate(1 << len(path_of(joint)) for joint in range(len(JOINTS))))
 
 HEAD_COLUMN: Final = FIRST[-1]
 
-#: Joints by the number of segments between them and the root.
+#: Joints in groups, by the number of segments between a joint and the root.
 GENERATIONS: Final = tuple(
     [joint for joint in range(1, len(JOINTS)) if len(path_of(joint)) == count] for count in range(1, 5)
 )
@@ -73,11 +74,13 @@ class Candidates:
     Parameters
     ----------
     table : array (F, 87 + 5 + 1, 3)
-        Positions, camera frame, metres: each joint's from column ``FIRST[joint]`` on, the head's five points, NaN.
+        Positions, camera frame, metres. The candidates of a joint begin at column ``FIRST[joint]``; then come five head
+        points and a column of NaN.
     state : int array (F, 87)
         `OPEN`, or a key of `UNJUDGED`.
     excess : array (F, 87)
-        Metres by which the segment to the joint is too short for its image; negative if it reaches past its ray.
+        Metres by which the segment to the joint is too short to reach the ray of its image point; negative if it is
+        longer than the distance to the ray.
     """
 
     table: Array
@@ -93,9 +96,9 @@ class Candidates:
         Parameters
         ----------
         camera : Camera
-            Lifts; its first axis counts frames.
+            Camera of the F frames.
         image : array (F, 14, 2)
-            Image points; a joint that was not seen (NaN), and all joints beyond it, stay unknown.
+            Image points. An unseen joint (NaN) and all joints beyond it stay unknown.
         root : array (F, 3)
             The neck, camera frame, metres.
         lengths : array (F, 17)
@@ -103,7 +106,7 @@ class Candidates:
         head : array (F, 5, 3)
             Head points, metres; NaN where not known.
         slack : float
-            Metres by which a segment may be too short for its image and count as tangent to its ray.
+            Metres. A segment that is too short by less is treated as tangent to the ray of its image point.
         """
         frames = len(image)
         table = np.full((frames, HEAD_COLUMN + 6, 3), np.nan)
@@ -129,13 +132,13 @@ class Candidates:
         return Candidates(table=table, state=state, excess=excess)
 
     def column(self, level: int, point: int, code: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the column of a point, of 19, for codes (N,) at a level."""
+        """Return the columns (N,) of a point (a joint or a head point) for codes (N,) at a level."""
         if point >= len(JOINTS):
             return np.full(len(code), HEAD_COLUMN + point - len(JOINTS))
         return FIRST[point] + bits(level, path_of(point))[code]
 
     def places(self, level: int, points: Sequence[int], frame: Ints, code: NDArray[np.int64]) -> Array:
-        """Return positions (N, 19, 3) of nodes, of some points; NaN for the others."""
+        """Return the positions (N, 19, 3) of nodes, metres; NaN for points that are not among `points`."""
         width = self.table.shape[1]
         place = np.full((len(code), len(JOINTS) + 5), width - 1)
         for point in points:

@@ -1,4 +1,4 @@
-"""Steps of the compiled tree: branches, and the checks that come with posekit as numbers."""
+"""Steps of the compiled tree: branches, and posekit's own checks written as numbers."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ try:
 except ImportError:
     compiled = None
 
-#: Kinds of steps. Numbers of a distance: metres; of a torso: its four joints, and whether its mirror image is
-#: undecided; of two capsules: centre and half length of each, both radii, and the distance that they must keep.
+#: Kinds of steps. A distance has one number: metres. A torso has the coordinates of its four joints (12), and 1 if its
+#: mirror image is undecided. Two capsules have centre and half length of each, the sum of their radii, and the least
+#: distance between them, metres.
 BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES = range(6)
 
 
@@ -25,11 +26,12 @@ class Step(NamedTuple):
     Attributes
     ----------
     places : tuple of str
-        Places that it judges.
+        Names of the places that the step judges.
     numbers : tuple of 25 float
-        Kind, limb, tolerance, the joints that are read (eight, -1 for none), and the numbers of the kind.
+        Kind, limb, tolerance, eight indices of joints that the step reads (-1 if fewer), and fourteen numbers of the
+        kind.
     limits : record, optional
-        Joint ranges (`posekit.solver.Limits.numbers`), which limbs and pelvis are judged by.
+        Joint ranges of limbs and pelvis (`posekit.solver.Limits.numbers`).
     """
 
     places: tuple[str, ...]
@@ -47,7 +49,7 @@ def step(
     limb: int = 0,
     limits: NDArray[np.void] | None = None,
 ) -> Step:
-    """Make a step; `points` and `numbers` are filled up."""
+    """Return a step; missing points are -1 and missing numbers are 0."""
     read = (*points, *(-1,) * (8 - len(points)))
     return Step(
         tuple(places), (kind, limb, tolerance, *read, *numbers, *(0.0,) * (14 - len(numbers))), limits

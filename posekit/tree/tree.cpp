@@ -1,4 +1,4 @@
-// The exact interpretation tree with the checks that come with posekit: the same steps as posekit/tree/tree.py.
+// The exact interpretation tree with posekit's own checks: the same steps as posekit/tree/tree.py.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
@@ -14,27 +14,27 @@ namespace {
 
 constexpr int PARENT[J] = {-1, 0, 0, 0, 3, 3, 1, 2, 6, 7, 4, 5, 10, 11};
 constexpr int FIRST[J] = {0, 1, 3, 5, 7, 11, 15, 19, 23, 31, 39, 47, 55, 71};  // column of each joint's first candidate
-constexpr double PARALLEL = 1e-30, NEAR = 0.1;  // as in robots/collision.py and validators/collision.py
+constexpr double PARALLEL = 1e-30, NEAR = 0.1;  // as in geometry/segments.py and validators/collision.py
 enum Kind { BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES };
 
-// Level and number of the first reason, then the numbers of steps.py.
+// Level, number of the first reason, and the numbers of a step of steps.py.
 struct Step {
   double level, reason, kind, limb, tolerance, points[8], numbers[14];
 };
 struct Verdict {
-  int place;  // of the first violation; PASSED, or UNKNOWN where it was not asked
+  int place;  // of the first violation; PASSED, or UNKNOWN before the step has judged
   double value, lower, upper;
 };
 constexpr int PASSED = -1, UNKNOWN = -2;
 
-// Column of a joint's position at a node; its own branch is the lowest bit of the candidate.
+// Column of a joint's position at a node; the lowest bit of the candidate is the joint's own branch.
 int column_of(int joint, int level, std::int64_t code) {
   int candidate = 0;
   for (int j = joint, k = 0; j > 0; j = PARENT[j]) candidate |= (code >> (level - j) & 1) << k++;
   return FIRST[joint] + candidate;
 }
 
-// Distance between segments g + t b and s a, s and t in [-1, 1] (robots/collision.py).
+// Distance between segments g + t b and s a with s and t in [-1, 1] (geometry/segments.py).
 double segment_distance(Vec g, Vec a, Vec b) {
   const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ag = dot(a, g), bg = dot(b, g);
   const Vec normal = cross(a, b);
@@ -51,7 +51,7 @@ double segment_distance(Vec g, Vec a, Vec b) {
   return std::sqrt(least);
 }
 
-// Largest distance of the torso's joints from a torso laid onto them.
+// Largest distance between the torso's joints and a rigid torso (or its mirror image) placed on them.
 double placement(const Frame& R, const double x[J][3], const double* torso, double mirror) {
   double most = 0;
   for (int j = 0; j < 4; ++j, torso += 3) {
@@ -115,7 +115,7 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Longs = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Bytes = py::array_t<std::int8_t, py::array::c_style | py::array::forcecast>;
 
-// A step, the joints that it reads, and the branches on which their positions depend.
+// A step, the joints that it reads, the joints whose branches determine their positions, and the verdicts of a frame.
 struct Ask {
   const Step* step;
   std::vector<int> reads, support;
@@ -132,7 +132,7 @@ struct Ask {
   }
 };
 
-// Takes nodes, by frame, through consecutive steps; returns the nodes that are left and what was lost.
+// Applies consecutive steps to nodes (ordered by frame); returns the remaining nodes and the pruned branches.
 py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Doubles steps, Longs frame, Longs code) {
   if (steps.shape(1) * sizeof(double) != sizeof(Step)) throw std::invalid_argument("steps of another layout");
   Limits L{};
@@ -174,7 +174,7 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
         for (int joint : ask.support) key = key << 1 | (node >> (level - joint) & 1);
         Verdict& found = ask.known[key];
         if (found.place == UNKNOWN) {
-          for (double& one : x[END[(int)s.limb]]) one = NAN;  // the lower segment may not be read
+          for (double& one : x[END[(int)s.limb]]) one = NAN;  // a step may read the upper segment alone
           for (int joint : ask.reads) std::memcpy(x[joint], positions[column_of(joint, level, node)], sizeof x[joint]);
           found = judged(s, L, x);
         }

@@ -1,8 +1,8 @@
 """The binary interpretation tree (Lee & Chen 1985, section 3.1), grown level by level over many frames at once.
 
-A node is a frame and a code. What a check says about it depends on the branches of the few joints that the check reads.
-So each check is asked once for every different choice of those branches that is still alive, and its answer serves all
-nodes that share it: given the torso, the four limbs are judged alone.
+A node is a frame and a code. The judgement of a check depends only on the branches of the few joints that the check
+reads. Each check therefore judges every remaining combination of these branches once, for all nodes that share it: the
+four limbs are judged independently of each other.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from posekit.tree.candidates import (
 )
 from posekit.tree.steps import BRANCH, Step, step
 
-#: Frames grown together: enough to spread the overhead of NumPy, few enough to keep memory small.
+#: Number of frames grown together: enough to spread the overhead of NumPy, few enough to keep memory small.
 FRAMES_AT_ONCE: Final = 512
 
-#: Possible keys a node from which they are sorted instead of being looked up in a table.
+#: Ratio of possible keys to nodes. Above it distinct keys are found by sorting, below it with a table of all keys.
 SPARSE_FROM: Final = 64
 
 
@@ -46,13 +46,13 @@ class Pruned(NamedTuple):
     Attributes
     ----------
     level : int array (P,)
-        A branch stands for the 2^(13 - level) leaves below it.
+        Level of the branch; 2^(13 - level) leaves are below it.
     reason : int array (P,)
-        Row of `Trees.reasons`: the first that is violated.
+        Row of `Trees.reasons`: the first violation.
     frame, code : int array (P,)
-        The branches.
+        Frame of the branch, and its code of `level` bits.
     value, lower, upper : array (P,)
-        Values found there, and their bounds.
+        Violating value and its bounds.
     """
 
     level: Ints
@@ -65,7 +65,7 @@ class Pruned(NamedTuple):
 
     @staticmethod
     def joined(parts: Sequence[Pruned]) -> Pruned:
-        """Put branches one after the other."""
+        """Concatenate pruned branches."""
         return Pruned(*(np.concatenate(column) for column in zip(NOTHING, *parts, strict=True)))
 
 
@@ -79,17 +79,17 @@ class Trees:
     Parameters
     ----------
     frame, code : int array (N,)
-        Frame of each survivor, and its 13 branches: the first joint's the highest bit, 0 near, 1 far.
+        Frame of each survivor, and its 13 branches as bits: 0 near, 1 far, the highest bit for the first joint.
     joints : array (N, 14, 3)
-        Positions, camera frame, metres; NaN where a joint was not seen, and beyond it.
+        Positions, camera frame, metres; NaN for joints that are not seen, and for joints beyond them.
     length_residual : array (N,)
-        Metres by which the worst segment is too short for its image and was taken as tangent to its ray.
+        Metres by which the worst segment is too short to reach the ray of its image point.
     losses : Pruned
         Pruned branches of each frame, in the order of pruning.
     reasons : tuple of (str, str)
         ``check/place`` and the unit of its values.
     candidates : tuple of Candidates
-        Positions of all branches, of `FRAMES_AT_ONCE` frames each.
+        Positions of all branches, one entry for each `FRAMES_AT_ONCE` frames.
     count : int
         F.
     """
@@ -109,13 +109,13 @@ class Trees:
 
     @cached_property
     def branches(self) -> NDArray[np.str_]:
-        """Each survivor's 13 branches as 0 (near) and 1 (far)."""
+        """The 13 branches of each survivor (N,) as a string of 0 (near) and 1 (far)."""
         digits = np.uint32(ord("0")) + (self.code[:, None] >> np.arange(DEPTH)[::-1] & 1)
         return digits.astype(np.uint32).view(f"U{DEPTH}")[:, 0]
 
     @cached_property
     def rejected(self) -> list[Counter[str]]:
-        """Leaves of the full tree that were lost, by frame and reason; with the survivors they make 8192."""
+        """Number of rejected leaves of each frame by reason; with the survivors they sum to 8192."""
         width = max(len(self.reasons), 1)
         weight = 1 << (DEPTH - self.losses.level)
         number = np.bincount(self.losses.frame * width + self.losses.reason, weight, self.count * width)
@@ -126,7 +126,7 @@ class Trees:
 
     @cached_property
     def levels(self) -> NDArray[np.int64]:
-        """Survivors by level (F, 14): distinct beginnings of the remaining codes (section 4.1.B)."""
+        """Number of nodes at each level (F, 14) from which a survivor descends (Lee & Chen 1985, section 4.1.B)."""
         shift = DEPTH - np.arange(DEPTH + 1)
         key = (self.frame[:, None] << DEPTH | self.code[:, None]) >> shift  # ascending, as the survivors are
         new = np.diff(key, axis=0, prepend=-1) > 0
@@ -159,23 +159,24 @@ def grow(
     Parameters
     ----------
     camera : Camera
-        Lifts segments; its first axis counts frames.
+        Camera of the F frames.
     image : array (F, 14, 2)
-        Image points in tree order; NaN where a joint was not seen.
+        Image points in tree order; NaN for joints that are not seen.
     root : array (F, 3)
         The neck, camera frame, metres.
     lengths : array (17,) or (F, 17)
         Metres, in the order of `posekit.skeleton.SEGMENTS`.
     checks : sequence of checks
-        Asked in this order at the first level where all their ``points`` are placed; by default all joints.
+        A check judges at the first level at which all its ``points`` (by default all joints) have positions; checks of
+        the same level judge in this order.
     judge : callable, optional
-        ``judge(check, points (N, 19, 3))`` returns the check's judgement of postures with head points; NaN marks points
-        that the check does not read. By default ``check.judge(points)``. It may have a method ``steps(check)`` that
-        returns the check as steps of the compiled tree (`posekit.tree.steps`), or None.
+        ``judge(check, points (N, 19, 3))`` returns the check's judgement of N postures; points that the check does not
+        read are NaN. By default ``check.judge(points)``. The callable may have a method ``steps(check)`` that returns
+        the check as steps of the compiled tree (`posekit.tree.steps`), or None.
     head : array (F, 5, 3), optional
-        Head points, metres. A check that reads head points is not asked in frames that lack them.
+        Head points, metres. A check that reads head points judges no frame without them.
     tolerance : float
-        Metres by which a segment may be too short for its image and count as tangent to its ray.
+        Metres. A segment that is too short by less is treated as tangent to the ray of its image point.
 
     Returns
     -------
@@ -221,7 +222,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check, or None for branches to a joint, with the level at which it is asked and the points that it reads."""
+    """A check with the level at which it judges and the points that it reads; None in place of a check to branch."""
 
     level: int
     check: Any
@@ -232,20 +233,20 @@ class _Planned(NamedTuple):
 def _planned(
     checks: Sequence[Any], form: Callable[[Any], Sequence[Step] | None] | None, head: Array
 ) -> list[_Planned]:
-    """Order branches and checks; those that the compiled tree takes have their steps."""
+    """Return branches and checks in the order of levels, with their steps where the compiled tree has them."""
     branch = [step(BRANCH, ())] if steps.compiled else None
     plan = [_Planned(level, None, (), branch) for level in range(1, DEPTH + 1)]
     for check in checks:
         points = tuple(POINT[name] for name in getattr(check, "points", ()) or JOINTS)
         if max(points) > DEPTH and not np.isfinite(head).any():
-            continue  # a check that reads head points is not asked without them
+            continue  # the check reads head points, and no frame has any
         level = max([1, *(point for point in points if point <= DEPTH)])
         plan.append(_Planned(level, check, points, form(check) if steps.compiled and form else None))
     return sorted(plan, key=lambda planned: planned.level)
 
 
 def _numbered(reasons: dict[tuple[str, str], int], names: Iterable[str], unit: str) -> Ints:
-    """Return the rows (K,) of reasons among all; new ones are added."""
+    """Return the rows (K,) of named reasons in `reasons`; names that are missing are added."""
     return np.array([reasons.setdefault((name, unit), len(reasons)) for name in names], dtype=np.int64)
 
 
@@ -260,7 +261,7 @@ def _compiled(
     code: NDArray[np.int64],
     reasons: dict[tuple[str, str], int],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
-    """Take nodes through consecutive steps of the compiled tree."""
+    """Apply consecutive steps of the compiled tree to nodes: return the remaining and the pruned ones."""
     rows, limits = [], None
     for planned in plan:
         for one in planned.steps or ():
@@ -285,7 +286,7 @@ def _taken(
     reasons: dict[tuple[str, str], int],
     ask: Callable[[Any, Array], Any],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
-    """Take nodes through one step: branches to a joint, or a check."""
+    """Apply one step, a branch or a check, to nodes: return the remaining and the pruned ones."""
     level, check = planned.level, planned.check
     if check is None:
         frame, code, reason, value, lower, upper = _branched(found, level, frame, code)
@@ -313,7 +314,7 @@ def _taken(
 def _branched(
     found: Candidates, joint: int, frame: Ints, code: NDArray[np.int64]
 ) -> tuple[Ints, NDArray[np.int64], Ints, Array, Array, Array]:
-    """Give every node a near and a far successor, each with the reason that excludes it (-1: none), and its numbers."""
+    """Give every node a near and a far successor, each with a reason for pruning (-1 if it stays), value and bounds."""
     frame, code = np.repeat(frame, 2), np.repeat(code, 2) << 1
     code[1::2] |= 1
     column = FIRST[joint] + bits(joint, path_of(joint))[code]
@@ -329,7 +330,10 @@ def _asked(
     code: NDArray[np.int64],
     ask: Callable[[Any, Array], Any],
 ) -> tuple[tuple[str, ...], Ints, Array, Array, Array]:
-    """Ask a check about every distinct choice of its own branches; return where each node fails (-1: nowhere)."""
+    """Judge each distinct combination of the branches that a check reads.
+
+    Return the places of the check, and the violated place (-1 for none), value and bounds of each node.
+    """
     level, check, points, _ = planned
     support = support_of(points)
     node, row = _distinct((frame << len(support)) | bits(level, support)[code])
@@ -352,7 +356,7 @@ def _asked(
 
 
 def _distinct(key: Ints) -> tuple[Ints, Ints]:
-    """Return one node of each distinct key (N,), which is not negative, and which of them each node has."""
+    """Return one node for each distinct key, and the index of that node for every key (N,); keys are not negative."""
     width = int(key.max()) + 1
     if width > SPARSE_FROM * len(key):
         _, node, row = np.unique(key, return_index=True, return_inverse=True)
