@@ -52,7 +52,7 @@ def draw_taylor(folder: Path) -> list[Path]:
         found = search(family, {one.constraint: 1.0}, family.flips_of(one.points))
         figure, title = _figure(6, 4), f"{one.figure}b: {one.constraint}"
         axis = figure.subplots()
-        axis.semilogy(found.curve_s / s, np.maximum(found.curve(0), 1e-16))
+        axis.semilogy(found.curve_s / s, np.maximum(found.curve_residual, 1e-16))
         axis.set(xlim=(0.9, 3), xlabel="s / true s", ylabel="residual", title=title)
         paths.append(folder / f"taylor.{one.figure.lower().replace('. ', '')}.png")
         figure.savefig(paths[-1], dpi=100)

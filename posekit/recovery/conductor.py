@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio
 
 import posekit
-from posekit.body import Figure, LengthUncertainty, with_head
+from posekit.body import Figure, with_head
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
 from posekit.geometry import Array, Flags, Ints, up_vector
@@ -77,9 +77,7 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
     5
     """
     settings = settings or RecoverSettings()
-    person = figure_of_view(view, settings, figure)
-    lengths = uncertainty_of(view, settings, own_figure=figure is not None)
-    conductor = _Conductor(view, settings, person, lengths)
+    conductor = _Conductor(view, settings, figure)
     for stage, at_once in conductor.stages():
         left = np.array(sorted(conductor.found.open), dtype=np.intp)
         starts = range(0, len(left), at_once)
@@ -97,9 +95,9 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
 class _Conductor:
     """Facts that all frames of a view share: person, noise, checks, and the way up."""
 
-    def __init__(
-        self, view: View, settings: RecoverSettings, person: Figure, lengths: LengthUncertainty
-    ) -> None:
+    def __init__(self, view: View, settings: RecoverSettings, figure: Figure | None) -> None:
+        person = figure_of_view(view, settings, figure)
+        lengths = uncertainty_of(view, settings, own_figure=figure is not None)
         self.view, self.settings, self.person, self.lengths = view, settings, person, lengths
         self.sight: Sight = sight_of(view, person, settings, lengths)
         self.photograph = isinstance(view.camera, ScaledOrthographicCamera)
@@ -306,8 +304,8 @@ def _why(nearest: Modes) -> str:
     named = sorted((name for name in size if size[name] > NAMED_DEVIATIONS), key=lambda name: -size[name])
     if not named:
         return "every posture is less likely than 1 in 10,000 by chi-square: give a larger --deviation"
-    words = ", ".join(f"{name} by {size[name]:.1f} deviations" for name in named[:MOST_NAMED])
-    return f"no posture fits: the nearest misses {words}"
+    misses = ", ".join(f"{name} by {size[name]:.1f} deviations" for name in named[:MOST_NAMED])
+    return f"no posture fits: the nearest misses {misses}"
 
 
 def _up_of(view: View) -> Up:

@@ -42,6 +42,17 @@ SCALE_DEVIATIONS: Final = {"likely": 0.08, "min": 0.08, "stature": 0.03}
 LONGEST_TOO_SHORT: Final = 0.3
 
 
+def point_offsets(points: Array, scale: Array) -> Array:
+    """Return the deviations (N, 14) of the points (N, 14, 2) of photographs at scales (N,), metres.
+
+    Nearer parts look larger, by the unknown distance of the camera: more so far from the middle.
+    """
+    metres = (points - np.nanmean(points[:, :6], axis=1, keepdims=True)) / scale[:, None, None]
+    aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
+    relief = DISTANCE_DEVIATION * RELIEF_METRES / USUAL_DISTANCE_METRES
+    return np.asarray(np.hypot(PHOTOGRAPH_OFFSETS, relief * aside))
+
+
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
     r"""Return a scaled orthographic problem as a camera at the usual distance d sees it, before the person's middle.
 

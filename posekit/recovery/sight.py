@@ -17,16 +17,7 @@ from posekit.cameras.lee_chen import camera_position, rotation_to_paper
 from posekit.errors import PosekitError, refusal
 from posekit.geometry import Array, Record
 from posekit.recovery.objects import parse_scale
-from posekit.recovery.scales import (
-    DISTANCE_DEVIATION,
-    PHOTOGRAPH_OFFSETS,
-    RELIEF_METRES,
-    SCALE_DEVIATIONS,
-    USUAL_DISTANCE_METRES,
-    figure_linkage,
-    likely_scale,
-    scales_of,
-)
+from posekit.recovery.scales import SCALE_DEVIATIONS, figure_linkage, likely_scale, point_offsets, scales_of
 from posekit.settings import RecoverSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -281,10 +272,7 @@ def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: 
     frame, scale = np.array(rows, dtype=np.intp), np.array(scales)
     confidence = np.clip(np.nan_to_num(view.confidence[frame, : len(JOINTS)], nan=1.0), LEAST_CONFIDENCE, 1.0)
     image = view.image[frame]
-    metres = (square[frame] - np.nanmean(square[frame, :6], axis=1, keepdims=True)) / scale[:, None, None]
-    aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
-    # Nearer parts look larger, by the distance of the camera: more so far from the middle.
-    off = np.hypot(PHOTOGRAPH_OFFSETS, DISTANCE_DEVIATION * RELIEF_METRES / USUAL_DISTANCE_METRES * aside)
+    off = point_offsets(square[frame], scale)
     root = np.zeros((len(frame), 3))
     root[:, :2] = square[frame, 0] / scale[:, None]
     return Sight(

@@ -9,5 +9,4 @@ from posekit.recovery.objects.linkage import read_nearer as read_nearer
 from posekit.recovery.objects.recover import ObjectRecovery as ObjectRecovery
 from posekit.recovery.objects.recover import parse_scale as parse_scale
 from posekit.recovery.objects.recover import recover_object as recover_object
-from posekit.recovery.objects.scale import Minima as Minima
 from posekit.recovery.objects.scale import search as search

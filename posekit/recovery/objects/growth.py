@@ -111,12 +111,12 @@ def grow(
         if extent[k] > lengths[k] + allowed.tangent:
             rejected[f"length/{names[k]}"] += len(signed) << (later + 1)
             return np.empty((0, len(linkage.points), 3)), np.empty((0, len(lengths)))
-        depths = np.array([-dZ[k], dZ[k]])
         if dZ[k] <= LEVEL * lengths.max():
-            depths = dZ[[k]]
+            signed[:, k] = dZ[k]
             rejected[f"level/{names[k]}"] += len(signed) << later
-        signed = np.repeat(signed, len(depths), axis=0)
-        signed[:, k] = np.tile(depths, len(signed) // len(depths))
+        else:
+            signed = np.repeat(signed, 2, axis=0)
+            signed[::2, k], signed[1::2, k] = -dZ[k], dZ[k]
         ready = set(basis[: number + 1])
         for check in checks:
             depends = set(np.flatnonzero(check.rows.any(axis=0)))

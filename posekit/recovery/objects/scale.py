@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import nearest, refusal
+from posekit.errors import refusal
 from posekit.geometry import Array, Record
 from posekit.recovery.objects.family import AT_BOUND, ZERO_COEFFICIENT, LinkageFamily, off_flat, with_depth
 
@@ -71,8 +71,7 @@ class Minima(Record):
     flips : int array (M, S)
         1 where the first end of a segment is nearer, -1 where its second is, 0 where it does not matter.
     curve_s, curve_residual : array (G,)
-        Scales from the bound on, and the least residual over all flips there.
-    constraints : Constraints
+        Scales from the bound on, and the least residual there over all flips (Taylor 2000, Figs. 7b and 8b).
     """
 
     s: Array
@@ -80,16 +79,10 @@ class Minima(Record):
     flips: NDArray[np.int8]
     curve_s: Array
     curve_residual: Array
-    constraints: Constraints
 
     def __len__(self) -> int:
         """Count the minima."""
         return len(self.s)
-
-    def curve(self, number: int) -> Array:
-        """Return the residual of one minimum's own flips over `curve_s` (Taylor 2000, Figs. 7b and 8b)."""
-        signs = self.flips[number].astype(np.float64)
-        return self.constraints.evaluate(np.where(signs == 0, 1.0, signs), GRID)[0]
 
 
 class Constraints:
@@ -125,8 +118,6 @@ class Constraints:
         self.rest = np.where(self.bounding, 0.0, rest * (lengths + self.at_scale))
         every: list[tuple[float, NDArray[np.intp], Residual]] = []
         for kind, weight in weights.items():
-            if kind not in CONSTRAINT_KINDS:
-                raise refusal("", "scale", kind, "a known constraint", nearest(kind, CONSTRAINT_KINDS))
             found = self._terms(kind, unit)
             if not found:
                 got, remedy = f"nothing of {linkage.name} to search by {kind}", "fix the scale another way"
@@ -219,15 +210,15 @@ def search(
     constraints = Constraints(family, weights, none if given is None else given)
     signs, psi, envelope = _minima(constraints)
     residual, _ = constraints.evaluate(signs, psi)
-    at_bound = psi <= VANISHED_ANGLE
+    psi = np.where(psi <= VANISHED_ANGLE, 0.0, psi)
     flips = np.zeros(signs.shape, dtype=np.int8)
     flips[:, constraints.matter] = signs[:, constraints.matter]
-    flips[np.ix_(at_bound, constraints.bounding)] = 0
-    s = family.minimum_scale / np.cos(np.where(at_bound, 0.0, psi))
+    flips[np.ix_(psi == 0, constraints.bounding)] = 0
+    s = family.minimum_scale / np.cos(psi)
     exact = np.where(residual <= ZERO_RESIDUAL, 0.0, residual)
     order = np.lexsort((s, exact))
     # Minima that differ by rounding alone are one.
-    key = np.column_stack([flips[order], np.round(np.where(at_bound, 0.0, psi)[order] / SAME_ANGLE)])
+    key = np.column_stack([flips[order], np.round(psi[order] / SAME_ANGLE)])
     _, first = np.unique(key, axis=0, return_index=True)
     order = order[np.sort(first)]
     return Minima(
@@ -236,7 +227,6 @@ def search(
         flips=flips[order],
         curve_s=family.minimum_scale / np.cos(GRID),
         curve_residual=envelope,
-        constraints=constraints,
     )
 
 
