@@ -254,7 +254,7 @@ class TestFactsAboutAnArray:
         (lambda: posekit.validate(STANDING, rate=30, checks=3), "checks"),
         (lambda: posekit.validate(STANDING, rate=30, ranges=3), "ranges"),
         (lambda: posekit.validate(STANDING, rate=30, profile=3), "profile"),
-        (lambda: posekit.validate(STANDING, rate=30, urdf=3), "robot"),
+        (lambda: posekit.validate(STANDING, rate=30, urdf=3), "urdf"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", camera=np.eye(3)), "camera"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", size="wide"), "size"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", rate=0), "rate"),
@@ -305,3 +305,16 @@ def test_the_figure_is_the_robot_of_its_validator() -> None:
     validator = posekit.Validator()
     assert validator.robot is validator.figure
     assert validator.check(validator.robot.neutral).ok.all()
+
+
+def test_rows_of_a_robot_have_z_up_and_the_order_of_their_layout() -> None:
+    q = np.tile(posekit.Validator("g1").robot.neutral, (30, 1))
+    q[:, 2] = 0.79
+    good = posekit.validate(q, urdf="g1", rate=50)
+    assert good.ok.all()
+    assert not good.not_asked  # the ground, too, is judged: z of a URDF's world points up
+    mujoco = q[:, [0, 1, 2, 6, 3, 4, 5, *range(7, q.shape[1])]]
+    turned = posekit.validate(mujoco, urdf="g1", rate=50)
+    assert "orientation" in turned.clips[0].reason  # upside down: the quaternion has another order
+    read = posekit.validate(mujoco, urdf="g1", rate=50, layout="robot_qpos")
+    np.testing.assert_allclose(read.worst, good.worst, atol=1e-9)

@@ -471,6 +471,9 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
 
     if isinstance(urdf, Robot):
         return urdf
+    if not isinstance(urdf, str | Path):
+        expected = "a name, the path of a URDF, or a posekit.Robot"
+        raise refusal("", "urdf", shown(type(urdf).__name__), expected, "load it with posekit.load_robot")
     name = str(urdf)
     if name in ("figure", "stick_figure"):
         return load_figure()

@@ -8,8 +8,9 @@ import numpy as np
 
 from posekit.errors import refusal
 from posekit.following.detections import Detections
-from posekit.formats import joint_arrays
+from posekit.formats import joint_arrays, robot_tables
 from posekit.formats.detection_rows import Rows, detections_of
+from posekit.formats.layout import load_layout
 from posekit.formats.options import Options
 from posekit.geometry import Array
 from posekit.motion.motion import Motion
@@ -46,8 +47,12 @@ def has_layout(given: Any, layout: str | None) -> bool:
 
 
 def motion_of(values: Any, options: Options) -> Motion:
-    """Read joints in space (T, J, 3) in the order of a layout."""
-    return joint_arrays.read({"": numbers(values)}, "array", options)
+    """Read joints in space (T, J, 3), or configurations of a robot (T, nq), in the order of a layout."""
+    values = numbers(values)
+    if values.ndim != 2:
+        return joint_arrays.read({"": values}, "array", options)
+    whole = load_layout(options.layout).fields.get("whole", {}) if options.layout else {}
+    return robot_tables.read({whole.get("sure", [""])[0]: values}, "array", options)
 
 
 def key_points_of(values: Any, options: Options) -> Detections:

@@ -139,14 +139,17 @@ class Judge:
         if has_layout(given, layout):
             import posekit
 
-            opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate)
+            opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate, urdf=self.name)
             return opened
         if isinstance(given, Motion):
             motion, frame = given, np.asarray(given.frame)
         else:
             if unit is not None and np.ndim(given) == 3:
                 given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
-            motion = self.validator("").motion(given)
+            validator = self.validator("")
+            motion = validator.motion(given)
+            if rate and validator.figure is None and motion.q is not None:
+                up = up or "+z"  # of URDFs (REP-103)
             frame = np.arange(len(motion))
         changes: dict[str, Any] = {"up": up} if up else {}
         changes |= {"frame": frame, "time": frame / rate} if rate else {}
