@@ -78,7 +78,7 @@ def parse(data: bytes, source: str) -> C3d:
         raise damaged("POINT:USED", "no points", "points in space")
     if not section < start <= len(data):
         raise damaged("header", f"frames from byte {start:,}", "frames after the parameters")
-    parameters = _parameters(data[section + 4 : start], processor, damaged)
+    parameters = _parameters(data[:start], section + 4, processor, damaged)
     scale = next(iter(_numbers(parameters, "POINT:SCALE")), scale)
     if not math.isfinite(scale) or scale == 0:
         raise damaged("POINT:SCALE", f"{scale:g}", "a finite number that is not 0")
@@ -131,22 +131,24 @@ def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width:
     return count
 
 
-def _parameters(section: bytes, processor: int, damaged: Any) -> dict[str, Any]:
-    """Return parameters by group and name, ``POINT:FRAMES``: lists of text, or arrays of numbers."""
+def _parameters(data: bytes, place: int, processor: int, damaged: Any) -> dict[str, Any]:
+    """Return parameters by group and name, ``POINT:FRAMES``: lists of text, or arrays of numbers.
+
+    They begin at the byte `place` and end with the data at the latest.
+    """
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Any]] = []
-    place = 0
 
     def taken(count: int) -> bytes:
         nonlocal place
-        if place + count > len(section):
+        if not 0 <= count <= len(data) - place:
             raise damaged(
-                "parameters", f"an end {len(section) - place} bytes after byte {place}", f"{count} bytes"
+                f"parameters, byte {place}", f"a length of {count} bytes", f"0 to {len(data) - place}"
             )
         place += count
-        return section[place - count : place]
+        return data[place - count : place]
 
-    while section[place : place + 2] and section[place] != 0:
+    while place + 2 <= len(data) and data[place] != 0:
         if len(groups) + len(found) > MAX_PARAMETERS:
             raise damaged("parameters", f"more than {MAX_PARAMETERS:,}", "fewer")
         length, group = struct.unpack("bb", taken(2))
@@ -159,12 +161,12 @@ def _parameters(section: bytes, processor: int, damaged: Any) -> dict[str, Any]:
             kind, ranks = struct.unpack("bB", taken(2))
             dimensions = tuple(taken(ranks))
             if kind not in _SIZES:
-                raise damaged(f"parameters, {shown(name)}", f"type {kind}", "one of -1, 1, 2, 4")
+                raise damaged(f"parameters, byte {start}", f"type {kind}", "one of -1, 1, 2, 4")
             value = _value(kind, dimensions, taken(math.prod(dimensions) * _SIZES[kind]), processor)
             found.append((group, name, value))
         if not offset:
             break
-        taken(max(start + offset - 2 - place, 0))
+        taken(start + offset - 2 - place)  # 0, or what the format's later versions add
     for group, name, _ in found:
         if group not in groups:
             raise damaged("parameters", f"{shown(name)} in no group", "a group of each parameter")
