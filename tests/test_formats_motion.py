@@ -946,3 +946,73 @@ def test_a_row_a_landmark_is_read_by_its_number(tmp_path: Path) -> None:
     (tmp_path / "twice.csv").write_text("\n".join([*lines, lines[-1]]) + "\n", encoding="utf-8")
     with pytest.raises(posekit.InputError, match="twice"):
         posekit.open(tmp_path / "twice.csv", rate=30)
+
+
+def test_triangulated_points_with_a_score_are_in_space(tmp_path: Path) -> None:
+    """Anipose: x, y, z, error, number of cameras and score of each point, millimetres, and the frame's number."""
+    motion = walking()
+    limbs = [name for name in JOINTS if name not in ("neck", "pelvis")]
+    columns: dict[str, Any] = {}
+    for name in limbs:
+        columns |= {f"{name}_{axis}": motion.points([name])[:, 0, k] * 1000 for k, axis in enumerate("xyz")}
+        columns |= {f"{name}_error": 1.5, f"{name}_ncams": 3, f"{name}_score": 0.9}
+    rows = [
+        ",".join(str(np.broadcast_to(one, len(motion))[k]) for one in columns.values()) + f",{k}"
+        for k in range(len(motion))
+    ]
+    (tmp_path / "anipose.csv").write_text("\n".join([",".join([*columns, "fnum"]), *rows]) + "\n")
+    found = posekit.open(tmp_path / "anipose.csv", rate=RATE)
+    assert isinstance(found, Motion) and found.unit == "mm" and found.up == "+z"
+    np.testing.assert_allclose(found.points(limbs), motion.points(limbs), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [
+        ("time", 1),
+        ("timestamp", 1),
+        ("Timestamp", 1e3),
+        ("timestamp", 1e6),
+        ("time_ms", 1e3),
+        ("timestamp", 1e9),
+    ],
+)
+def test_times_are_in_the_unit_of_their_name_or_their_steps(tmp_path: Path, name: str, scale: float) -> None:
+    motion = walking()
+    points = {
+        f"{joint}_{axis}": motion.joints[:, k, i]
+        for k, joint in enumerate(POINTS)
+        for i, axis in enumerate("xyz")
+    }
+    columns = {name: 1e6 + np.arange(len(motion)) * scale / 25, **points}
+    rows = [",".join(repr(float(one[k])) for one in columns.values()) for k in range(len(motion))]
+    (tmp_path / "walk.csv").write_text("\n".join([",".join(columns), *rows]) + "\n")
+    np.savez(tmp_path / "walk.npz", **{name: columns[name]}, joints=motion.joints, joint_names=POINTS)
+    for ending in ("csv", "npz"):
+        assert posekit.open(tmp_path / f"walk.{ending}").rate == pytest.approx(25)
+
+
+@pytest.mark.parametrize(
+    ("angles", "place", "more"),
+    [
+        ("poses", "trans", {}),
+        ("pose", "transl", {}),
+        ("smpl_poses", "smpl_trans", {"smpl_scaling": np.array([93.0])}),
+        ("pose_world", "trans_world", {"pose": np.ones((6, 72)), "trans": np.zeros((6, 3))}),
+    ],
+)
+def test_smpls_angles_are_read_under_their_names(tmp_path: Path, angles: str, place: str, more: Any) -> None:
+    """AMASS, AIST++ (whose place has its own unit), WHAM (whose other angles and places are the camera's)."""
+    poses, trans = np.zeros((6, 72)), np.cumsum(np.full((6, 3), 0.1), axis=0)
+    poses[:, 48] = 0.4
+    arrays = {angles: poses, place: trans * more.get("smpl_scaling", 1.0), **more}
+    (tmp_path / "smpl.pkl").write_bytes(pickle.dumps({"one": arrays}))
+    np.savez(tmp_path / "amass.npz", poses=poses, trans=trans)
+    found, amass = (posekit.open(tmp_path / name, rate=30) for name in ("smpl.pkl", "amass.npz"))
+    np.testing.assert_allclose(found.joints, amass.joints, atol=1e-12)
+
+
+def test_matrices_of_cameras_are_no_points(tmp_path: Path) -> None:
+    np.savez(tmp_path / "cameras.npz", cam_poses=np.tile(np.eye(4), (30, 1, 1)))
+    with pytest.raises(posekit.InputError, match='got the entries "cam_poses"'):
+        posekit.open(tmp_path / "cameras.npz")

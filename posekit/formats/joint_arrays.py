@@ -16,8 +16,8 @@ from posekit.formats.body_checks import UNIT_WORDS, points_motion
 from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options
-from posekit.formats.robot_tables import TIMES, time_and_rate
-from posekit.formats.tables import Table, by_row, columns_of_points, csv_text
+from posekit.formats.robot_tables import time_and_rate
+from posekit.formats.tables import TIMES, Table, by_row, columns_of_points, csv_text, seconds
 from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -57,7 +57,8 @@ def _key(document: Held) -> str | None:
         if isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim > 1
     }
     named = next((name for name in POINTS if name in arrays), None)
-    shaped = [name for name, rank in arrays.items() if rank > 2 and document[name].shape[-1] in (3, 4)]
+    shapes = {name: document[name].shape[-2:] for name, rank in arrays.items() if rank > 2}
+    shaped = [name for name, (count, axes) in shapes.items() if axes in (3, 4) and count > 4]  # no matrices
     return named if named is not None or len(shaped) != 1 else shaped[0]
 
 
@@ -169,7 +170,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
         twice = next(name for name in names if names.count(name) > 1)
         raise refusal(path, "columns", f"{shown(twice)} twice", "each name once", "rename one of the two")
     time_name = next((name for name in names if name.casefold() in TIMES), None)
-    frame_name = next((name for name in FRAMES if name in names), None)
+    frame_name = next((name for name in names if name.casefold() in FRAMES), None)
     who = next((table.texts(name) for name in PEOPLE if name in names), [])
     caliscope = set(CALISCOPE_COLUMNS) <= set(names)
     if caliscope:
@@ -200,7 +201,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
     if caliscope:
         fields["layout"] = load_layout("mediapipe_33")
     if time_name:
-        fields["time"] = table.checked(time_name)[rows]
+        fields["time"] = seconds(time_name, table.checked(time_name)[rows])
     return points_motion(points, labels, path, options, **fields)
 
 

@@ -39,6 +39,8 @@ def looks_like(table: Table) -> bool:
     if set(CALISCOPE) <= set(table.names):
         return True
     points = _in_pictures(table.names)
+    if any(name.endswith("_ncams") for name in table.names):
+        return False  # Anipose's points in space have a score, too
     deep = any("z" in parts for parts in columns_of_points(table.names).values())
     sure = any("sure" in parts for parts in points.values())
     return len(points) >= LEAST_POINTS and (sure or not deep)

@@ -20,6 +20,7 @@ from posekit.formats import json_file
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.node import Node
 from posekit.formats.options import Options
+from posekit.formats.tables import TIMES
 from posekit.geometry import Array
 
 #: Fields of a person's points in OpenPose's files; the second in files older than 2018.
@@ -29,8 +30,6 @@ LANDMARKS: Final = ("pose_landmarks", "poseLandmarks", "landmarks")
 N_LANDMARKS: Final = 33
 #: Pixels that a picture may have a side.
 LARGEST_SIDE: Final = 10**6
-#: Names of a frame's time, and their unit in seconds; a ``timestamp`` far above seconds is in milliseconds.
-SECONDS: Final = {"time": 1, "timestamp": 1, "timestamp_s": 1, "timestamp_ms": 1e-3, "timestamp_us": 1e-6}
 
 
 def looks_like(document: Any) -> bool:
@@ -257,8 +256,8 @@ def _landmark(one: Node) -> tuple[float, float, float]:
 
 def _time(frame: Node) -> float:
     """Return a frame's time in seconds; NaN if it has none."""
-    name = next((name for name in SECONDS if type(frame.value.get(name)) in (int, float)), None)
-    return frame.at(name).number(most=1e18) * SECONDS[name] if name else np.nan
+    name = next((name for name in TIMES if type(frame.value.get(name)) in (int, float)), None)
+    return frame.at(name).number(most=1e18) * (TIMES[name] or 1.0) if name else np.nan
 
 
 def _size(holder: Any, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:

@@ -16,14 +16,13 @@ from posekit.errors import refusal, shown
 from posekit.formats.body_checks import METRES, times
 from posekit.formats.layout import Layout, load_layout
 from posekit.formats.options import Options
-from posekit.formats.tables import Table
+from posekit.formats.tables import TIMES, Table, seconds
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, quaternion_rotate
 from posekit.geometry.units import FARTHEST_COORDINATE
 from posekit.motion import Motion
 
 ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
-TIMES: Final = ("time", "times", "timestamp", "timestamps", "t", "time_s")
 COUNTS: Final = ("frame", "index", "frame#", "")
 #: Layouts of files in the order in which they are tried: a simulator's file may have arrays of the root, too.
 KINDS: Final = "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
@@ -250,7 +249,8 @@ def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | Non
     name = next((name for name in columns if name.lower() in TIMES), None)
     key = next((name for name in RATES if name in columns), None)
     rate = np.empty(0) if key is None else np.ravel(_value(columns, key))
-    return (None if name is None else np.ravel(_value(columns, name))), float(rate[0]) if rate.size else None
+    time = None if name is None else seconds(name, np.ravel(_value(columns, name)))
+    return time, float(rate[0]) if rate.size else None
 
 
 def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:

@@ -27,8 +27,12 @@ if TYPE_CHECKING:
 
 #: Joints of the body, which SMPL, SMPL+H and SMPL-X have alike and first.
 N_JOINTS: Final = 22
-_ANGLES: Final = ("poses", "pose", "root_orient pose_body", "global_orient body_pose", "fullpose")
-_PLACES: Final = ("trans", "transl", "translation", "Th")
+#: Names of the angles and of the root's place; WHAM's are in the world and, without this word, in the camera.
+_ANGLES: Final = (
+    *("pose_world", "poses", "pose", "root_orient pose_body", "global_orient body_pose", "fullpose"),
+    "smpl_poses",
+)
+_PLACES: Final = ("trans_world", "trans", "transl", "translation", "Th", "smpl_trans")
 
 
 def looks_like(document: Any) -> bool:
@@ -64,6 +68,7 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
         raise refusal(path, keys[0], got, expected, "correct the file")
     poses = np.concatenate(parts, axis=1)
     place = np.asarray(document[next(name for name in _PLACES if name in document)], dtype=np.float64)
+    place = place / document.get("smpl_scaling", 1.0)  # AIST++: units of the place in a metre
     if place.shape != (len(poses), 3) or not len(poses):
         raise refusal(path, "trans", f"shape {place.shape}", f"({len(poses)}, 3)", "correct the file")
     used = poses[:, : 3 * count].reshape(len(poses), count, 3)

@@ -28,6 +28,13 @@ _OF_POINT: Final = re.compile(
 )
 #: Cells that hold no value, in lower case.
 MISSING: Final = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"})
+#: Names of columns of times, and their unit in seconds; None for any unit, which the steps tell.
+TIMES: Final = {
+    **{"time": 1.0, "times": 1.0, "t": 1.0, "time_s": 1.0, "timestamp_s": 1.0, "timestamp": None},
+    **{"timestamps": None, "time_ms": 1e-3, "timestamp_ms": 1e-3, "time_us": 1e-6, "timestamp_us": 1e-6},
+}
+#: Largest step between the frames of a film, seconds.
+LARGEST_STEP: Final = 2.0
 
 
 class Table:
@@ -212,6 +219,15 @@ def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[
     points = np.full((len(found), count, values.shape[1]), np.nan)
     points[row.reshape(-1), point] = values
     return found, first, points
+
+
+def seconds(name: str, time: Array) -> Array:
+    """Return times (T,) in seconds by the name of their column; steps of over 2 s have the unit ms, µs or ns."""
+    unit = TIMES[name.casefold()]
+    if unit is None:
+        step = float(np.nanmedian(np.abs(np.diff(time)))) if np.isfinite(time).sum() > 1 else 0.0
+        unit = 1e-3 ** np.ceil(np.log10(max(step / LARGEST_STEP, 1.0)) / 3)
+    return np.asarray(time * unit)
 
 
 def columns_of_rows(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
