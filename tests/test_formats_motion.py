@@ -840,7 +840,8 @@ TWICE = np.sort(np.r_[EVEN[:23], EVEN[7]])
         ({"fps": 30.0, "clip": np.repeat([0, 1, 2], 8)}, None, np.tile(EVEN[:8], 3), ""),
         ({"time": np.tile(EVEN[:8], 3), "clip": np.repeat([0, 1, 2], 8)}, None, np.tile(EVEN[:8], 3), ""),
         *(({"time": np.round(EVEN, digits)}, None, EVEN, "rounded to") for digits in (2, 3)),
-        ({"time": np.round(EVEN, 4)}, None, np.round(EVEN, 4), ""),
+        *(({"time": np.round(EVEN, digits)}, None, EVEN, "") for digits in (4, 5, 6)),
+        ({"time": np.round(EVEN, 7)}, None, np.round(EVEN, 7), ""),
         ({"time": np.round(np.arange(24) / 29.97, 3), "fps": 29.97}, None, np.arange(24) / 29.97, "1/29.97 s"),
         ({"time": np.arange(24) / 25}, None, np.arange(24) / 25, ""),
         ({"time": np.round(EVEN, 3) + 0.002 * (EVEN == EVEN[9])}, None, None, ""),
@@ -1016,3 +1017,26 @@ def test_matrices_of_cameras_are_no_points(tmp_path: Path) -> None:
     np.savez(tmp_path / "cameras.npz", cam_poses=np.tile(np.eye(4), (30, 1, 1)))
     with pytest.raises(posekit.InputError, match='got the entries "cam_poses"'):
         posekit.open(tmp_path / "cameras.npz")
+
+
+@pytest.mark.parametrize("head", ["time,{}", "{}"])
+def test_joints_without_a_root_are_read_for_a_stated_robot(tmp_path: Path, head: str) -> None:
+    names = posekit.load_robot("panda", bodies="none").configuration_names[7:10]
+    q = np.random.default_rng(5).uniform(-1, 1, (4, 3)).round(6)
+    times = [f"{k / 20}," if "time" in head else "" for k in range(4)]
+    rows = [time + ",".join(map(str, row)) for time, row in zip(times, q.tolist(), strict=True)]
+    (tmp_path / "joints.csv").write_text("\n".join([head.format(",".join(names)), *rows]) + "\n")
+    with pytest.raises(posekit.InputError, match="got the entries"):
+        posekit.open(tmp_path / "joints.csv")
+    found = posekit.open(tmp_path / "joints.csv", urdf="panda")
+    assert (
+        found.robot == "panda" and found.q_names == tuple(names) and found.rate in (None, pytest.approx(20))
+    )
+    np.testing.assert_array_equal(found.q, q)
+
+
+def test_several_recordings_in_a_pickle_are_counted(tmp_path: Path) -> None:
+    one = {"root_pos": np.zeros((3, 3)), "dof_pos": np.zeros((3, 29))}
+    (tmp_path / "two.pkl").write_bytes(pickle.dumps({"walk": one, "run": one}))
+    with pytest.raises(posekit.InputError, match=r'got 2 recordings, "walk", "run"; .* a file of its own'):
+        posekit.open(tmp_path / "two.pkl")

@@ -22,6 +22,8 @@ UNIT_WORDS: Final = {
     **{"meters": "m", "metres": "m", "meter": "m", "centimeters": "cm", "centimetres": "cm"},
     **{"millimeters": "mm", "millimetres": "mm", "inches": "in", "inch": "in"},
 }
+#: Words for axes that point up, in lower case.
+UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
 
 #: Lengths as shares of stature: Drillis & Contini 1966, in Winter 2009, *Biomechanics and Motor Control of Human
 #: Movement*, fig. 4.1.
@@ -48,6 +50,8 @@ CLEAR_RATIO: Final = 2.0
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
 #: Share by which a stated rate and the times must differ to be a contradiction.
 RATE_DISAGREES: Final = 0.1
+#: Rounding of times that is noted, seconds.
+NOTED_SECONDS: Final = 1e-4
 #: Share by which limbs of both sides may differ in length in an order of points that fits.
 SIDES_SHARE: Final = 0.25
 #: Distance of a stated middle from the middle of its two joints, share of a leg's length, in an order that fits.
@@ -452,15 +456,15 @@ def times(
 
 
 def _unrounded(time: Array, stated: float | None, options: Options) -> Array:
-    """Return even times (T,) if only rounding to at most 3 decimals makes a file's uneven: 0.017, 0.033, 0.05."""
-    digits = next((d for d in range(4) if np.array_equal(np.round(time, d), time)), None)
+    """Return even times (T,) if only rounding to at most 6 decimals makes a file's uneven: 0.017, 0.033, 0.05."""
+    digits = next((d for d in range(7) if np.array_equal(np.round(time, d), time)), None)
     if digits is None or len(time) < 3 or not time[-1] > time[0]:
         return time
     whole = (len(time) - 1) / (time[-1] - time[0])
     for rate in (stated or whole, float(round(whole)), whole):
         even = time[0] + np.arange(len(time)) / (rate or np.nan)
         if np.abs(even - time).max() <= 0.51 * 10.0**-digits:
-            if np.abs(even - time).max() > 1e-9:
+            if np.abs(even - time).max() > NOTED_SECONDS:
                 options.note(f"times are rounded to {digits} decimals: even steps of 1/{rate:g} s are used")
             return np.asarray(even)
     return time

@@ -220,17 +220,14 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
     """Make a motion of a BVH file: points are its joints and the End Sites that have a length."""
     absolute = positions_are_absolute(document)
     points = world_points(document, absolute=absolute)
-    frames = len(document.values)
-    counted = f"Frames is {document.frames}, but the file has {frames}: it may be cut off"
     held = zip(document.parents, document.channels, strict=True)
     if absolute and any(parent >= 0 and not all(turns for turns, _ in own) for parent, own in held):
         options.note("position channels stand in place of the offsets")
-    if frames != document.frames:
-        options.warn(counted)
-    if options.unit:
-        unit, metres = options.unit, METRES.get(options.unit)
-    else:
-        unit, metres = _unit(document, points, path, options)
+    if (frames := len(document.values)) != document.frames:
+        options.warn(f"Frames is {document.frames}, but the file has {frames}: it may be cut off")
+    unit, metres = (
+        (options.unit, METRES[options.unit]) if options.unit else _unit(document, points, path, options)
+    )
     kept = [k for k, site in enumerate(document.sites) if not site or document.offsets[k].any()]
     return points_motion(
         points[:, kept],
@@ -337,7 +334,7 @@ def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[
     if not CHAIN_BOUNDS[0] <= metres <= CHAIN_BOUNDS[1]:
         got = f"a skeleton whose longest chain of bones has {length:.4g} units"
         raise refusal(source, "unit", got, f"{CHAIN_METRES:g} m in {', '.join(UNITS)}", "state it (--unit)")
-    words = "CMU's unit (an inch over 0.45)" if unit == "0.45 in" else unit
+    words = {"in": "inches", "0.45 in": "CMU's unit (an inch over 0.45)"}.get(unit, unit)
     options.note(f"lengths are in {words}: the longest chain of bones has {length:.4g} units, {metres:.2f} m")
     return unit, UNITS[unit]
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal, shown
 from posekit.files import write_bytes
-from posekit.formats.body_checks import UNIT_WORDS, points_motion
+from posekit.formats.body_checks import UNIT_WORDS, UP_WORDS, points_motion
 from posekit.formats.options import Options
 from posekit.formats.trc import even_step, one_recording
-from posekit.geometry import UP_AXES, Array
+from posekit.geometry import Array
 
 if TYPE_CHECKING:
     from posekit.motion import Motion
@@ -195,8 +195,6 @@ def read(document: C3d, path: str, options: Options) -> Motion:
     unit = UNIT_WORDS.get(word.casefold(), "")
     if word and not unit:
         options.note(f"POINT:UNITS {shown(word)} is not known")
-    up = next(iter(document.texts("Y_SCREEN")), "").casefold()
-    up = f"+{up}" if f"+{up}" in UP_AXES else up
     return points_motion(
         document.points,
         names,
@@ -204,7 +202,7 @@ def read(document: C3d, path: str, options: Options) -> Motion:
         options,
         rate=document.rate,
         unit=unit,
-        up=up if up in UP_AXES else "",
+        up=UP_WORDS.get(next(iter(document.texts("Y_SCREEN")), "").casefold(), ""),
         partial=True,
     )
 

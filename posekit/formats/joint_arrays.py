@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from posekit.errors import refusal, shown
 from posekit.files import write_bytes
-from posekit.formats.body_checks import UNIT_WORDS, points_motion
+from posekit.formats.body_checks import UNIT_WORDS, UP_WORDS, points_motion
 from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options
 from posekit.formats.robot_tables import time_and_rate
 from posekit.formats.tables import TIMES, Table, by_row, columns_of_points, csv_text, seconds
-from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Ints
+from posekit.geometry import FARTHEST_COORDINATE, Array, Ints
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ POINTS: Final = (
     *("new_joints", "xyz", "arr_0", ""),
 )
 NAMES: Final = ("joint_names", "names", "keypoint_names", "point_names", "marker_names", "labels")
-UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
 #: Columns of caliscope's triangulated points, of which 0 to 32 are MediaPipe's (mprib/caliscope).
 CALISCOPE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
 #: Columns of the recording or person of a row.

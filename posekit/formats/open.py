@@ -155,17 +155,21 @@ def open(  # the door's name, as in `gzip.open`
 
         return load_robot(Path(path))
     container, document = parsed(path)
-    for module in READERS[container]:
-        if container in ONE_CONTENT or named(f"{module}:looks_like")(document):
-            with undamaged(Path(path), f"the parts of {container} that {module} reads"):
-                found = named(f"{module}:read")(document, str(path), options)
-            if type(found).__name__ == "Motion" and not len(found):
-                raise refusal(path, "", "no frames", "at least one", "write or copy it again")
-            return found
+    readers = READERS[container]
+    known = (one for one in readers if container in ONE_CONTENT or named(f"{one}:looks_like")(document))
+    joints_alone = urdf and container in ("table", "parquet")  # of a robot whose base is fixed
+    if module := next(known, "robot_tables" if joints_alone else ""):
+        with undamaged(Path(path), f"the parts of {container} that {module} reads"):
+            found = named(f"{module}:read")(document, str(path), options)
+        if type(found).__name__ == "Motion" and not len(found):
+            raise refusal(path, "", "no frames", "at least one", "write or copy it again")
+        return found
     names = [str(one) for one in (document if isinstance(document, dict) else getattr(document, "names", ()))]
     listed = ", ".join(shown(name) for name in names[:8] if name)
     held = f"the entries {listed}" if listed else f"nothing that is known in a {container} file"
     remedy = "say which name is which joint in a TOML file, and give it with --layout"
-    if isinstance(document, dict) and {"images", "annotations"} <= document.keys():
+    if container == "arrays" and all(isinstance(one, dict) for one in document.values()):
+        held, remedy = f"{len(names)} recordings, {listed}", "write each into a file of its own"
+    elif isinstance(document, dict) and {"images", "annotations"} <= document.keys():
         held, remedy = "a COCO file without keypoints", "give the file of its person keypoints"
     raise refusal(path, "", held, "motion, key points, a view, cameras, a result or a report", remedy)

@@ -25,9 +25,9 @@ ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
 COUNTS: Final = ("frame", "index", "frame#", "")
 #: Layouts of files in the order in which they are tried: a simulator's file may have arrays of the root, too.
-KINDS: Final = "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
-LAYOUTS: Final = tuple(f"robot_{kind}" for kind in KINDS)
-SPELT: Final = {"xyzw": "x, y, z, w", "wxyz": "w, x, y, z"}
+LAYOUTS: Final = tuple(
+    f"robot_{kind}" for kind in "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
+)
 
 #: Difference of the median lean by which one order of a quaternion lets the robot stand and the other does not.
 LEAN_DEGREES: Final = 20.0
@@ -78,7 +78,7 @@ def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
 def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
     """Return the arrays or columns that a part of a layout names; empty if they are not all there."""
     if "arrays" in part:  # the first of several names
-        return [name for name in part["arrays"] if _is_array(columns.get(name))][:1]
+        return [name for name in part["arrays"] if getattr(columns.get(name), "ndim", 0) > 1][:1]
     if "each" in part:  # one a coordinate
         return list(part["each"]) if set(part["each"]) <= set(columns) else []
     by_axis: dict[str, str] = {}
@@ -86,10 +86,6 @@ def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
         if match := re.fullmatch(part["pattern"], name, re.IGNORECASE):
             by_axis.setdefault(match[1].lower(), name)
     return [by_axis[axis] for axis in part["axes"]] if set(part["axes"]) <= set(by_axis) else []
-
-
-def _is_array(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.ndim > 1 and value.dtype.kind in "iuf"
 
 
 def _labels(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> tuple[str, ...]:
@@ -119,6 +115,8 @@ def read(document: Any, path: str, options: Options) -> Motion:
     columns = _columns(document)
     if isinstance(document, Table) and "" in columns:
         columns = _without_counter(columns[""], options)
+    if options.urdf and isinstance(document, Table) and _layout_of(columns) is None:
+        columns = _joints_alone(document)
     about = document.about if isinstance(document, Table) else columns
     layout, order = _stated_layout(columns, path, options)
     time, rate = time_and_rate(columns)
@@ -169,6 +167,14 @@ def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> t
     return own, options.layout if stated is not None and stated is not own else ""
 
 
+def _joints_alone(table: Table) -> dict[str, Any]:
+    """Return the columns of a robot on a fixed base: its joints q (T, K), their names, and the times."""
+    times = {name: table for name in table.names if name.lower() in TIMES}
+    joints = [name for name in table.names if name.lower() not in (*TIMES, *COUNTS)]
+    q = np.stack([table.checked(name) for name in joints], axis=1) if joints else table.numbers
+    return {"q": q, "q_names": [_joint_name(name) for name in joints], **times}
+
+
 def _without_counter(values: Array, options: Options) -> dict[str, Array]:
     """Return rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
     first, whole = values[:, 0], values[np.isfinite(values).all(axis=1)]
@@ -191,7 +197,7 @@ def _of_whole(
     values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
     if labels[:root] == ROOT_NAMES:
         labels = labels[root:]
-    elif "" not in parts["whole"]["arrays"] and "q" in columns:
+    elif values.shape[1] <= root or ("" not in parts["whole"]["arrays"] and "q" in columns):
         return values[:, :0], values[:, :0], values, labels
     return values[:, :3], values[:, 3:root], values[:, root:], labels
 
@@ -383,13 +389,13 @@ def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
     reading = "the root's quaternion is read as"
     if lean[second] - lean[first] <= LEAN_DEGREES and off[other] - off[ahead] > HEADING_DEGREES:
         (options.note if ahead == first else options.warn)(
-            f"{reading} {SPELT[ahead]}: the robot stands by both; it heads {off[ahead]:.0f} degrees from its way "
+            f"{reading} {', '.join(ahead)}: the robot stands by both; it heads {off[ahead]:.0f} degrees from its way "
             f"by this, {off[other]:.0f} by the other"
         )
         return ahead
     if lean[second] - lean[first] > SAME_LEAN_DEGREES:
         by = f"the robot leans {lean[first]:.0f} degrees by this order, {lean[second]:.0f} by the other"
-        options.note(f"{reading} {SPELT[first]}: {by}")
+        options.note(f"{reading} {', '.join(first)}: {by}")
         return first
     options.note(f"{reading} x, y, z, w, by convention: the robot stands upright with both orders")
     return "xyzw"

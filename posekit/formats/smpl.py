@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 N_JOINTS: Final = 22
 #: Names of the angles and of the root's place; WHAM's are in the world and, without this word, in the camera.
 _ANGLES: Final = (
-    *("pose_world", "poses", "pose", "root_orient pose_body", "global_orient body_pose", "fullpose"),
-    "smpl_poses",
+    "pose_world poses pose root_orient+pose_body global_orient+body_pose fullpose smpl_poses".split()
 )
 _PLACES: Final = ("trans_world", "trans", "transl", "translation", "Th", "smpl_trans")
 
@@ -45,7 +44,7 @@ def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
     inner = document.values() if isinstance(document, Mapping) else ()
     for arrays in (document, *inner):
         if isinstance(arrays, Mapping) and any(name in arrays for name in _PLACES):
-            for keys in map(str.split, _ANGLES):
+            for keys in (names.split("+") for names in _ANGLES):
                 if all(isinstance(arrays.get(k), np.ndarray) and arrays[k].ndim in (2, 3) for k in keys):
                     return arrays, tuple(keys)
     return {}, ()

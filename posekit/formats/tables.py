@@ -81,7 +81,7 @@ class Table:
         rows: list[list[str]] = []
         for line in self.lines[:MAX_HEAD_ROWS]:
             cells = self.parted(line)
-            if any(_is_number(cell) for cell in cells):
+            if any(not np.isnan(_number(cell)) or cell.casefold() == "nan" for cell in cells):
                 break
             rows.append(cells)
         return rows
@@ -177,10 +177,6 @@ def _number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return float(cell.replace(",", ".")) if _DECIMAL_COMMA.fullmatch(cell) else np.nan
-
-
-def _is_number(cell: str) -> bool:
-    return not np.isnan(_number(cell)) or cell.casefold() == "nan"
 
 
 def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
