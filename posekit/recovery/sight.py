@@ -271,14 +271,13 @@ def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: 
         raise errors[0]
     frame, scale = np.array(rows, dtype=np.intp), np.array(scales)
     confidence = np.clip(np.nan_to_num(view.confidence[frame, : len(JOINTS)], nan=1.0), LEAST_CONFIDENCE, 1.0)
-    image = view.image[frame]
     off = point_offsets(square[frame], scale)
     root = np.zeros((len(frame), 3))
     root[:, :2] = square[frame, 0] / scale[:, None]
     return Sight(
         camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect),
         frame=frame,
-        image=image,
+        image=view.image[frame],
         deviation=np.hypot(pixels, scale[:, None] * off) / np.sqrt(confidence),
         root=root,
         given=np.zeros(len(frame), dtype=np.bool_),

@@ -48,15 +48,14 @@ def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
     constraints = all(name in CONSTRAINT_KINDS for name, _, _ in parts)
     try:
         weights = {name: float(value or 1) for name, _, value in parts} if constraints else {}
-        number = 1.0 if constraints else float(text.removeprefix("stature:"))
+        number = 0.0 if constraints else float(text.removeprefix("stature:"))
     except ValueError:
-        number = math.nan
-    if not all(math.isfinite(value) and value > 0 for value in (number, *weights.values())):
+        weights, number = {}, math.nan
+    if not all(math.isfinite(value) and value > 0 for value in weights.values() or (number,)):
         expected = f"min, likely, a positive number, stature:PX, or some of {', '.join(CONSTRAINT_KINDS)}"
         raise refusal("", "scale", shown(text), expected, "correct it")
-    if constraints:
-        return "constraints", 0.0, weights
-    return "stature" if text.startswith("stature:") else "value", number, {}
+    how = "constraints" if constraints else "stature" if text.startswith("stature:") else "value"
+    return how, number, weights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -223,10 +222,7 @@ def recover_object(
 
 
 def _scales(
-    family: LinkageFamily,
-    scale: str | float | None,
-    hand: NDArray[np.int8],
-    given: Tolerance | None,
+    family: LinkageFamily, scale: str | float | None, hand: NDArray[np.int8], given: Tolerance | None
 ) -> tuple[dict[str, Any], Array]:
     """Find the scales (K,) of one frame, and describe them for the result."""
     linkage = family.linkage
