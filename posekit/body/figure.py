@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple
@@ -137,6 +137,11 @@ class Figure(Robot):
         _ = self.limits, self.capsules
         self._check_layout()
         check_lengths(self.lengths)
+
+    @cached_property  # type: ignore[misc]
+    def urdf(self) -> str:
+        """The URDF as it was given; that of a figure from `scaled` is written when it is read for the first time."""
+        return str(vars(self)["_writer"]())
 
     @cached_property
     def neutral_points(self) -> Array:
@@ -275,13 +280,14 @@ class Figure(Robot):
         side = was_behind if behind is None else behind
         neutral = self._neutral_of(closed, head, behind=side)
         capsules = grown(self.capsules, self.neutral_points, neutral)
-        text = rewrite(self.urdf, capsules, closed, head, behind=side)
         unchanged = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
         # The new text differs from the checked one in checked lengths only, so that it is not checked again.
         figure = object.__new__(Figure)
-        figure.__dict__.update({one.name: getattr(self, one.name) for one in fields(self)})
         figure.__dict__.update(
-            urdf=text,
+            {one.name: getattr(self, one.name) for one in fields(self) if one.name != "urdf"}
+        )
+        figure.__dict__.update(
+            _writer=partial(rewrite, self.urdf, capsules, closed, head, behind=side),
             side_known=behind is not None or (same and self.side_known),
             moved_lengths=MappingProxyType({**unchanged, **moved}),
             # Known without building the model.

@@ -44,8 +44,10 @@ HALVINGS: Final = 7
 MOST_CONTINUED: Final = 3
 #: Metres that a degree counts as: about the way of a limb's end.
 METRES_A_DEGREE: Final = 0.3 * np.pi / 180
-#: Distance inside its bounds to which a posture is pushed, metres or radians: rounding in a file does not reject it.
-INSIDE_METRES: Final = 5e-6
+#: Distance inside its bounds to which a posture is pushed, metres: files keep frames that move by less than 5e-6.
+INSIDE_METRES: Final = 2e-5
+#: Distance inside its limits to which a joint of a robot is brought, metres or radians: a file rounds.
+INSIDE_LIMITS: Final = 5e-6
 #: Distance by which bodies of robots are moved apart beyond their margin, metres: depths of meshes are known to 1e-5.
 DEPTH_METRES: Final = 5e-5
 
@@ -435,7 +437,7 @@ class RobotClip(Clip):
         The root stays, and so do joints that the motion never moves: a file may lack them.
         """
         robot, model = self.robot, self.robot.model
-        lower, upper = robot.lower + INSIDE_METRES, robot.upper - INSIDE_METRES
+        lower, upper = robot.lower + INSIDE_LIMITS, robot.upper - INSIDE_LIMITS
         settings = self.validator.settings
         made_up = MADE_UP_METRES if robot.bodies == "capsules" and not settings.strict else 0.0
         margin = settings.contact_margin - made_up
