@@ -436,8 +436,7 @@ class Validator:
         except (TypeError, ValueError):
             values = np.empty(())
         if not values.ndim:
-            got, remedy = shown(type(given).__name__), "give an array of real numbers"
-            raise refusal("postures", "", got, expected, remedy)
+            raise refusal("postures", "", shown(type(given).__name__), expected, "give real numbers")
         if values.ndim == 1 or values.shape in ((len(JOINTS), 3), (len(POINTS), 3)):
             values = values[None]
         still: dict[str, Any] = {"frame": np.zeros(len(values), dtype=np.intp)} if len(values) > 1 else {}
@@ -472,8 +471,7 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
     if isinstance(urdf, Robot):
         return urdf
     if not isinstance(urdf, str | Path):
-        expected = "a name, the path of a URDF, or a posekit.Robot"
-        raise refusal("", "urdf", shown(type(urdf).__name__), expected, "load it with posekit.load_robot")
+        raise refusal("", "urdf", shown(type(urdf).__name__), "a name, a path or a Robot", "name a URDF")
     name = str(urdf)
     if name in ("figure", "stick_figure"):
         return load_figure()

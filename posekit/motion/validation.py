@@ -146,9 +146,8 @@ class Judge:
         else:
             if unit is not None and np.ndim(given) == 3:
                 given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
-            validator = self.validator("")
-            motion = validator.motion(given)
-            if rate and validator.figure is None and motion.q is not None:
+            motion = self.validator("").motion(given)
+            if rate and motion.q is not None and motion.robot != "figure":
                 up = up or "+z"  # of URDFs (REP-103)
             frame = np.arange(len(motion))
         changes: dict[str, Any] = {"up": up} if up else {}
