@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from importlib.resources import files
 from types import SimpleNamespace
 
@@ -92,11 +93,10 @@ def test_engines_take_the_same_steps(kind, parts):
     problem = observed(**PROBLEMS[kind])
     frame, x = starts(problem)
     limit = np.full(len(frame), np.inf)
-    numbers = problem.records, problem.limits
     for steps in (1, 4):
         mine, chi2, _ = engine.descend(problem, frame, x, parts, most=steps)
         first = np.full(len(frame), reference.FIRST_DAMPING)
-        other, value, _ = reference.descend(*numbers, frame, x, parts, steps, limit, first)
+        other, value, _ = reference.descend(problem, frame, x, parts, steps, limit, first)
         np.testing.assert_allclose(mine, other, atol=1e-9 * 10 ** (2 * (steps > 1)))
         np.testing.assert_allclose(chi2, value, rtol=1e-7, atol=1e-9)
 
@@ -116,7 +116,7 @@ def test_engines_find_the_same_modes(monkeypatch):
         off(slow.joints[slow.frame == f], j).min() for f, j in zip(fast.frame, fast.joints, strict=True)
     ]
     assert max(nearest) < 1e-6
-    H = reference.information(problem.records, problem.limits, fast.frame, fast.x, KNOWN)
+    H = reference.information(problem, fast.frame, fast.x, KNOWN)
     np.testing.assert_allclose(fast.log_evidence, -fast.chi2 / 2 - np.linalg.slogdet(H)[1] / 2, atol=1e-3)
 
 
@@ -124,13 +124,11 @@ def test_engines_find_the_same_modes(monkeypatch):
 def test_gradient_is_that_of_chi2(kind):
     problem = observed(**PROBLEMS[kind])
     frame, x = starts(problem, 1)
-    here = reference.evaluate(problem.records[frame], problem.limits, x, 31)
+    here = reference.evaluate(problem, frame, x, 31)
     assert np.isfinite(here.chi2).all()
     for step in 1e-6 * np.random.default_rng(4).normal(size=(8, 43)):
         step[42] *= problem.sized[0]
-        up, down = (
-            reference.evaluate(problem.records[frame], problem.limits, x + s * step, 31).chi2 for s in (1, -1)
-        )
+        up, down = (reference.evaluate(problem, frame, x + s * step, 31).chi2 for s in (1, -1))
         slope = (up - down) / 4e-6  # half of the derivative, as the normal equations have it
         np.testing.assert_allclose(
             here.gradient @ step / 1e-6, slope, atol=2e-3 * np.abs(here.gradient).max()
@@ -143,7 +141,7 @@ def test_every_mode_is_a_minimum_that_fits():
     rng = np.random.default_rng(2)
     for _ in range(20):
         moved = modes.x + rng.normal(0, 1e-3, modes.x.shape)
-        there = reference.evaluate(problem.records[modes.frame], problem.limits, moved, 31)
+        there = reference.evaluate(problem, modes.frame, moved, 31)
         assert (there.chi2 > modes.chi2 - 0.02).all()
     residuals = modes.residuals()
     assert all((value < 6).all() for value in residuals.values())
@@ -387,7 +385,7 @@ def test_limits_pull_exactly_where_the_check_finds_something():
     frame = np.arange(len(joints)) % len(TRUTH)
     x = np.hstack([joints.reshape(-1, 42), np.zeros((len(joints), 1))])
     with_limits, without = (
-        reference.evaluate(problem.records[frame], limits, x, 31).chi2 for limits in (LIMITS, None)
+        reference.evaluate(replace(problem, limits=limits), frame, x, 31).chi2 for limits in (LIMITS, None)
     )
     np.testing.assert_array_equal(with_limits - without < 1e-6, inside)
     assert inside.any()

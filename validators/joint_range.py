@@ -17,23 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import ClosedForm, Figure, load_figure
-from posekit.body.frames import torso_frame
+from posekit.body.angles import ball_branch, limb_branch
+from posekit.body.frames import torso_frame, trunk_frames
 from posekit.geometry import Array, cross, dot, unit
+from posekit.geometry.rotations import relative_rotation
 from posekit.skeleton import DOFS, HEAD_POINTS, HIPS, JOINT, JOINTS, TORSO
 from posekit.solver import Limits, engine
-from posekit.solver.limits import (
-    ENDS,
-    KINDS,
-    LIMBS,
-    MIDDLES,
-    PELVIS_SIGNS,
-    STARTS,
-    hips_axes,
-    limb_angles,
-    limb_directions,
-    pelvis_angles,
-    torso_axes,
-)
+from posekit.solver.limits import ENDS, KINDS, LIMBS, MIDDLES, PELVIS_SIGNS, STARTS, limb_directions
 from posekit.tree.steps import LIMB, PELVIS, Step, step
 from posekit.validators.body import Body, hips_share
 from posekit.validators.check import Judgement
@@ -165,9 +155,9 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     if engine.compiled and not in_time:
         found = engine.compiled.stated(limits.numbers, limb, joints, tolerance, straight)
         return Judgement(places, *found[..., keep])
-    parent = torso_axes(joints) if limb < 2 else hips_axes(joints, bool(limits.numbers["between_hips"]))
+    parent = trunk_frames(joints, bool(limits.numbers["between_hips"]))[limb // 2]
     upper_segment, lower_segment = limb_directions(joints, limb)
-    rotations = limb_angles(parent, upper_segment, lower_segment)
+    rotations = limb_branch(parent, upper_segment, lower_segment)
     least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
 
     def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array, Array]:
@@ -251,8 +241,8 @@ def _places(limits: Limits, limb: int) -> tuple[list[str], list[int]]:
 
 def _pelvis(limits: Limits, body: Body) -> Judgement:
     joints, numbers = body.joints, limits.numbers
-    hips = hips_axes(joints, bool(numbers["between_hips"]))
-    value = np.degrees(pelvis_angles(torso_axes(joints), hips) * PELVIS_SIGNS)
+    frames = trunk_frames(joints, bool(numbers["between_hips"]))
+    value = np.degrees(ball_branch(relative_rotation(*frames)) * PELVIS_SIGNS)
     lower, upper = np.degrees(numbers["pelvis"]).T
     reads = ((JOINT["neck"], JOINT["pelvis"]), (JOINT["pelvis"], JOINT["right_hip"]))
     return Judgement(DOFS[3:6], value, lower, upper, body.angle_tolerance(*reads))

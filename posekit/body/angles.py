@@ -16,10 +16,10 @@ from typing import Final
 
 import numpy as np
 
-from posekit.body.frames import hips_frame, torso_frame
+from posekit.body.frames import trunk_frames
 from posekit.geometry import Array, Flags, cross, fit_rotation, unit
 from posekit.geometry.rotations import coordinate_rotation, relative_rotation, rotate_back, turned_near
-from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
+from posekit.skeleton import DOFS, HEAD, JOINT, SIDES
 
 #: Sine below which an angle is free: the limb is straight, or points along the abduction axis.
 #:
@@ -134,9 +134,7 @@ class ClosedForm:
         array (N, 22)
             Radians, in the order of `posekit.skeleton.DOFS`; NaN if the points that determine an angle are unknown.
         """
-        R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
-        hips_joints = (*HIPS, "neck")[: 4 if self.middle_pelvis else 3]
-        R_hips = hips_frame(*(points[:, JOINT[joint]] for joint in hips_joints))
+        R_torso, R_hips = trunk_frames(points, self.middle_pelvis)
         angles = np.empty((len(points), len(DOFS)))
         angles[:, :3] = self.neck(R_torso, points[:, 0], points[:, HEAD])
         angles[:, 3:6] = self.pelvis(R_torso, R_hips)
@@ -218,14 +216,30 @@ def ball_angles(R: Array, limits: Limits) -> Array:
 
     Both Euler branches are tried; the one that violates the limits less is returned.
     """
-    branches = direction_branches(-R[:, :, 2])
-    candidates = []
-    for k in range(2):
-        alpha, beta = branches[k, :, 0], branches[k, :, 1]
-        # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
-        rest = into_ball(R[:, :, 0], alpha, beta)
-        candidates.append(np.stack([alpha, beta, np.arctan2(rest[:, 1], rest[:, 0])], axis=-1))
-    return _least_violating(np.stack(candidates) * limits.sign, limits)
+    return _least_violating(np.stack([ball_branch(R, k) for k in range(2)]) * limits.sign, limits)
+
+
+def ball_branch(R: Array, branch: int = 0) -> Array:
+    """Return the three angles (N, 3) of rotations (N, 3, 3) in one Euler branch; the first has cos beta >= 0."""
+    alpha, beta = direction_branches(-R[:, :, 2])[branch].T
+    # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
+    x, y, _ = into_ball(R[:, :, 0], alpha, beta).T
+    return np.stack([alpha, beta, np.arctan2(y, x)], axis=-1)
+
+
+def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
+    """Return the four angles (N, 4) of limbs in the branch whose cos beta and epsilon are not negative.
+
+    Parameters
+    ----------
+    R_parent : array (N, 3, 3)
+        R_cam_torso or R_cam_hips.
+    upper, lower : array (N, 3)
+        Unit directions of both segments, camera frame.
+    """
+    alpha, beta = direction_branches(rotate_back(R_parent, upper))[0].T
+    x, y, z = into_ball(rotate_back(R_parent, lower), alpha, beta).T
+    return np.stack([alpha, beta, np.arctan2(-y, -x), np.arctan2(np.sqrt(x * x + y * y), -z)], axis=1)
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:

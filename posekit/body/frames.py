@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from posekit.geometry import Array, cross, perpendicular, unit
+from posekit.skeleton import HIPS, JOINT, TORSO
 
 #: Height of the pelvis over the hips' line, as a fraction of the hips' distance, below which it is between them.
 #:
@@ -62,3 +63,10 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
     left = unit(left_hip - right_hip)
     down = unit(perpendicular(right_hip - pelvis if neck is None else pelvis - neck, left))
     return np.stack([cross(down, left), left, -down], axis=-1)
+
+
+def trunk_frames(points: Array, middle_pelvis: bool = False) -> tuple[Array, Array]:
+    """Return the frames of torso and hips (N, 3, 3) of postures (N, 14 or more, 3); see `hips_frame` for the pelvis."""
+    hips = (*HIPS, "neck") if middle_pelvis else HIPS
+    torso_points, hips_points = ([points[:, JOINT[joint]] for joint in part] for part in (TORSO, hips))
+    return torso_frame(*torso_points), hips_frame(*hips_points)

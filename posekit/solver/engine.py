@@ -38,7 +38,7 @@ def run(name: str, problem: Problem, *arguments: Any) -> Any:
     """Call a function of `posekit.solver.reference`, or its compiled twin, about the frames of a problem."""
     if compiled is None:
         _warn_once()
-        return getattr(reference, name)(problem.records, problem.limits, *arguments)
+        return getattr(reference, name)(problem, *arguments)
     numbers = None if problem.limits is None else problem.limits.numbers
     return getattr(compiled, name)(problem.records, numbers, *arguments)
 
@@ -50,11 +50,10 @@ def descend(
     parts: int,
     *,
     most: int = 40,
-    hopeless: Array | None = None,
-    damping: Array | None = None,
+    hopeless: Array | float = np.inf,
+    damping: Array | float = reference.FIRST_DAMPING,
 ) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts; see `posekit.solver.reference.descend`."""
-    limit = np.full(len(which), np.inf) if hopeless is None else hopeless
-    damped = np.full(len(which), reference.FIRST_DAMPING) if damping is None else damping
-    x, chi2, damped = run("descend", problem, which, start, parts, most, limit, damped)
+    of_starts = (np.broadcast_to(np.float64(one), len(which)) for one in (hopeless, damping))
+    x, chi2, damped = run("descend", problem, which, start, parts, most, *of_starts)
     return x, chi2, damped

@@ -18,8 +18,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.angles import direction_branches, into_ball
-from posekit.body.frames import hips_frame, torso_frame
 from posekit.errors import refusal
 from posekit.geometry import Array, Flags, Ints, unit
 from posekit.skeleton import DOFS, LIMB_JOINTS
@@ -157,7 +155,7 @@ class Limits:
         limb : int
             Of `LIMBS`.
         rotations : array (N, 4)
-            Angles of the closed form (`limb_angles`), radians.
+            Angles of the closed form (`posekit.body.angles.limb_branch`), radians.
         tolerance : float
             Radians that widen the sinus.
         writing : int array (N,), optional
@@ -343,34 +341,7 @@ def arm_readings(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]
     return elevation, plane, twist - (1 - np.cos(elevation)) * from_side
 
 
-def torso_axes(joints: Array) -> Array:
-    """Return forward, left and up of torsos (N, 14, 3) as rows (N, 3, 3)."""
-    return np.swapaxes(torso_frame(*np.moveaxis(joints[:, :4], 1, 0)), 1, 2)
-
-
-def hips_axes(joints: Array, between_hips: bool) -> Array:
-    """Return forward, left and up of hips as rows (N, 3, 3); see `posekit.body.frames.hips_frame`."""
-    points = (joints[:, k] for k in ((3, 4, 5, 0) if between_hips else (3, 4, 5)))
-    return np.swapaxes(hips_frame(*points), 1, 2)
-
-
 def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:
     """Return the unit directions of the upper and lower segment of one limb (N, 3)."""
     start, middle, end = joints[:, STARTS[limb]], joints[:, MIDDLES[limb]], joints[:, ENDS[limb]]
     return unit(middle - start), unit(end - middle)
-
-
-def limb_angles(parent: Array, upper: Array, lower: Array) -> Array:
-    """Return alpha, beta, gamma, epsilon (N, 4) of limbs on their parents; cos beta and epsilon are not negative."""
-    upper, lower = (np.einsum("nki,ni->nk", parent, one) for one in (upper, lower))
-    alpha, beta = direction_branches(upper)[0].T
-    x, y, z = into_ball(lower, alpha, beta).T
-    return np.stack([alpha, beta, np.arctan2(-y, -x), np.arctan2(np.sqrt(x * x + y * y), -z)], axis=1)
-
-
-def pelvis_angles(torso: Array, hips: Array) -> Array:
-    """Return the three angles (N, 3) of the hips' frame in the torso's, rotations in the closed form's order."""
-    forward, _, up = np.einsum("nki,nmi->mnk", torso, hips)
-    alpha, beta = direction_branches(-up)[0].T
-    x, y, _ = into_ball(forward, alpha, beta).T
-    return np.stack([alpha, beta, np.arctan2(y, x)], axis=1)

@@ -8,11 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from posekit.geometry import Array, Flags, Ints, dot
-from posekit.skeleton import SEGMENTS
+from posekit.geometry import Array, Flags, Ints
+from posekit.solver import reference
 from posekit.solver.engine import run
 from posekit.solver.problem import RESIDUAL_NAMES, Problem
-from posekit.solver.reference import limit_rows
 
 #: Modes none of whose joints, relative to the neck, are farther apart are one.
 MERGE_DISTANCE_METRES: Final = 0.01
@@ -98,22 +97,16 @@ class Modes:
 
         Names are ``image right_wrist``, ``length neck-pelvis``, ``root``, ``size`` and ``limit right_elbow.flexion``.
         """
-        frame, x = self.frame[rows], self.x[rows]
-        joints, p = x[:, :42].reshape(-1, 14, 3), self.problem.records[frame]
-        depth = joints[..., 2:] if self.problem.perspective else 1.0
-        image = np.einsum("njab,njb->nja", p["image"], joints[..., :2] / depth - p["ray"])
-        start, end = np.array(SEGMENTS).T
-        line = joints[:, end] - joints[:, start]
-        length = p["length_weight"] * (0.5 * np.log(dot(line, line)) - p["log_length"] - x[:, 42:])
+        x, p, limits = self.x[rows], self.problem.records[self.frame[rows]], self.problem.limits
+        joints = x[:, :42].reshape(-1, 14, 3)
         root = np.einsum("nab,nb->na", p["root_weight"], joints[:, 0] - p["root"])
-        size = np.abs(p["size_weight"] * x[:, 42])
-        single = np.stack([np.sqrt(dot(root, root)), size], axis=1)
-        table = np.concatenate([np.sqrt(dot(image, image)), np.abs(length), single], axis=1)
+        single = [np.linalg.norm(root, axis=1)[:, None], np.abs(p["size_weight"] * x[:, 42])[:, None]]
+        image, length = reference.image_terms(p, joints)[0], reference.length_terms(p, x)[0]
+        table = np.concatenate([np.linalg.norm(image, axis=1), np.abs(length), *single], axis=1)
         out = dict(zip(RESIDUAL_NAMES, table.T, strict=True))
-        if self.problem.limits is not None:
-            beyond, _ = limit_rows(self.problem.limits, joints, 31)
-            off = np.abs(beyond) * p["limit_weight"][:, None]
-            out |= {f"limit {name}": off[:, k] for k, name in enumerate(self.problem.limits.names)}
+        if limits is not None:
+            beyond = p["limit_weight"][:, None] * np.abs(reference.limit_terms(limits, joints, 31)[0])
+            out |= dict(zip([f"limit {name}" for name in limits.names], beyond.T, strict=True))
         return out
 
 

@@ -53,7 +53,7 @@ RESIDUAL_NAMES: Final = (
 #: metres. `image` maps their errors to standard deviations. Both are zero where a joint is hidden. `root` is the neck,
 #: metres, `root_weight` the inverse square root of its covariance, zero if it is unknown. Other weights are one over
 #: standard deviations: of lengths, of the size (0 if the lengths are of the person's own size), of limits (radians).
-#: `robust` is the square of `ROBUST_DEVIATIONS`, or 0 where image points have no gross errors.
+#: `robust` is one over the square of `ROBUST_DEVIATIONS`, or 0 where image points have no gross errors.
 PROBLEM: Final = np.dtype(
     [
         ("ray", "f8", (14, 2)),
@@ -138,7 +138,7 @@ class Problem:
         size = np.broadcast_to(np.asarray(size_deviation, dtype=np.float64), len(out))
         out["size_weight"][size > 0] = 1 / size[size > 0]
         out["limit_weight"] = 0.0 if limits is None else 1 / LIMIT_DEVIATION
-        out["perspective"], out["robust"] = camera.perspective, ROBUST_DEVIATIONS**2 * robust
+        out["perspective"], out["robust"] = camera.perspective, robust / ROBUST_DEVIATIONS**2
         return Problem(records=out, limits=limits)
 
     def __len__(self) -> int:

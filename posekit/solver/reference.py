@@ -13,16 +13,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, Flags, Ints, cross, dot
+from posekit.body.angles import ball_branch, limb_branch
+from posekit.body.frames import trunk_frames
+from posekit.geometry import Array, Flags, Ints, cross, dot, norm, turned_near, unit
+from posekit.geometry.rotations import relative_rotation
 from posekit.skeleton import SEGMENTS
 from posekit.solver import limits as lim
 from posekit.solver.limits import Limits
+from posekit.solver.problem import Problem
 
-#: Records of `posekit.solver.problem.PROBLEM`, one a frame.
-Records = NDArray[np.void]
-
+#: Index of the size among the unknowns.
 SIZE: Final = 42
-WIDTH: Final = 43
+
 #: Added to every diagonal element, one over square metres: a joint that is not seen has none of its own.
 FLOOR: Final = 1e-6
 
@@ -56,231 +58,209 @@ PRECISION: Final = 1e-2
 SEGMENT_STARTS, SEGMENT_ENDS = np.sort(SEGMENTS, axis=1).T
 INCIDENCE: Final = np.eye(14)[SEGMENT_ENDS] - np.eye(14)[SEGMENT_STARTS]
 
-#: Limits in their order: three of the pelvis and four a limb, then the turn of four limbs about straight joints.
-ROWS: Final = 19
-
 #: Residuals (N, K), standard deviations, of postures (N, 14, 3): zero where nothing pulls.
 Pull = Callable[[Array], Array]
 
 
-def free_joints(parts: int) -> Flags:
-    """Return which joints (14,) the parts free."""
-    free = np.zeros(14, dtype=np.bool_)
-    free[:6] = bool(parts & 1)
-    for limb in range(4):
-        free[[lim.MIDDLES[limb], lim.ENDS[limb]]] = bool(parts >> (limb + 1) & 1)
-    return free
-
-
 class Normal:
-    """Normal equations of N postures.
+    """Normal equations of N postures along C unknowns: the coordinates of F free joints, then the size.
 
-    chi2 (N,), matrices (N, 43, 43) and gradients (N, 43), and limits beyond their ends: residuals (N, 19), zero within,
-    with derivatives (N, 19, 43).
+    chi2 (N,), matrix (N, C, C), gradient (N, C), and the residuals of joint limits (N, K), zero within the limits, with
+    their derivatives (N, K, C).
     """
 
-    def __init__(self, count: int) -> None:
-        self.chi2 = np.zeros(count)
-        self.matrix, self.gradient = np.zeros((count, WIDTH, WIDTH)), np.zeros((count, WIDTH))
-        self.beyond, self.slopes = np.zeros((count, ROWS)), np.zeros((count, ROWS, WIDTH))
+    def __init__(self, count: int, width: int) -> None:
+        self.chi2, self.gradient, self.beyond = (
+            np.zeros(count),
+            np.zeros((count, width)),
+            np.zeros((count, 0)),
+        )
+        self.matrix, self.slopes = np.zeros((count, width, width)), np.zeros((count, 0, width))
 
-    def add(self, r: Array, d: Array, columns: slice = slice(None)) -> None:
-        """Add residuals (N, K) with derivatives (N, K, C) along some unknowns."""
+    def add(self, r: Array, along: Array, on_size: Array | float = 0.0) -> Array:
+        """Add residuals (N, K) and return their derivatives (N, K, C).
+
+        `along` (N, L, 3F) has the derivatives along the free joints, then L - K rows of curvature without a residual;
+        `on_size` (N, K) the derivatives along the size.
+        """
+        count, d = r.shape[1], np.zeros((*along.shape[:2], self.gradient.shape[1]))
+        d[..., : along.shape[2]], d[:, :count, -1] = along, on_size
         self.chi2 += dot(r, r)
-        self.gradient[:, columns] += np.einsum("nkc,nk->nc", d, r)
-        self.matrix[:, columns, columns] += d.transpose(0, 2, 1) @ d
-
-    def put(self, rows: Ints, other: Normal, of: Flags | Ints | slice = slice(None)) -> None:
-        """Overwrite the postures `rows` with the postures `of` of another instance."""
-        for name, own in vars(self).items():
-            own[rows] = getattr(other, name)[of]
+        self.gradient += (r[:, None] @ d[:, :count])[:, 0]
+        self.matrix += np.swapaxes(d, 1, 2) @ d
+        return d[:, :count]
 
 
-def evaluate(
-    problems: Records, limits: Limits | None, x: Array, parts: int, pull: Pull | None = None
-) -> Normal:
-    """Return the normal equations at x (N, 43); chi2 is infinite where it is not defined."""
-    joints, free, out = x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts), Normal(len(x))
-    for j in np.flatnonzero(free).tolist():
-        _image_terms(out, problems, joints[:, j], j)
-    if parts & 1:
-        weight = problems["root_weight"]
-        out.add(np.einsum("nki,ni->nk", weight, joints[:, 0] - problems["root"]), weight, slice(0, 3))
-        w = problems["size_weight"]
-        out.add((w * x[:, SIZE])[:, None], w[:, None, None], slice(SIZE, WIDTH))
-    _length_terms(out, problems, x, free, np.where(parts & 1, problems["size_weight"] > 0, False))
+def free_joints(parts: int) -> Ints:
+    """Return the indices (F,) of the joints that the parts free, ascending."""
+    limbs = [k for k in range(4) if parts >> (k + 1) & 1]
+    return np.sort(
+        [*range(6 * (parts & 1)), *(joints[k] for joints in (lim.MIDDLES, lim.ENDS) for k in limbs)]
+    )
+
+
+def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | None = None) -> Normal:
+    """Return the normal equations of frames `which` (N,) at x (N, 43); chi2 is infinite where it is not defined."""
+    records = problem.records[which]
+    joints, free, trunk = x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts), parts & 1
+    out = Normal(len(x), 3 * len(free) + 1)
+    r, d, behind = image_terms(records, joints)
+    # Robust (Geman & McClure): e / (1 + e / c^2), whose weight in the normal equations is the square of the factor.
+    error = (r * r).sum(axis=1)
+    keep = 1 / (1 + records["robust"][:, None] * error)
+    r, d = keep[:, None] * r, keep[:, None, :, None] * d
+    out.add(r[..., free].reshape(len(x), -1), _along(d[:, :, free], np.eye(len(free))))
+    out.chi2 += ((1 - keep) * keep * error)[:, free].sum(axis=1)
+    weight = trunk * records["root_weight"]
+    out.add(np.einsum("nki,ni->nk", weight, joints[:, 0] - records["root"]), weight)
     # A size that is not varied keeps a unit on the diagonal.
-    out.matrix[:, SIZE, SIZE] += problems["size_weight"] == 0
-    if limits is not None:
-        r, d = (one * problems["limit_weight"][0] for one in limit_rows(limits, joints, parts))
-        out.beyond, out.slopes = r[:, :ROWS], d[:, :ROWS]
-        out.add(r, d)
+    w = trunk * records["size_weight"][:, None]
+    out.add(w * x[:, SIZE:], np.zeros((len(x), 1, 0)), np.where(w > 0, w, 1.0))
+    some = np.isin(SEGMENT_ENDS, free)
+    r, d = length_terms(records, x, some)
+    on_size = np.where(w > 0, -records["length_weight"][:, some], 0.0)
+    out.add(r, _along(d, INCIDENCE[some][:, free]), on_size)
+    if problem.limits is not None:
+        terms = limit_terms(problem.limits, joints, parts)
+        out.beyond, d = (records["limit_weight"][0] * one for one in terms)
+        out.slopes = out.add(out.beyond, d[:, :, free].reshape(*d.shape[:2], -1))
     if pull is not None:
         r = pull(joints)
-        moved = np.repeat(x[:, None, :SIZE], SIZE, axis=1) + PULL_STEP * np.eye(SIZE)
-        slopes = (pull(moved.reshape(-1, 14, 3)).reshape(len(x), SIZE, -1) - r[:, None]) / PULL_STEP
-        out.add(r, np.where(r[:, None] != 0, slopes, 0.0).transpose(0, 2, 1), slice(0, SIZE))
-    out.chi2[np.isnan(out.chi2)] = np.inf
+        moved = joints[:, None] + PULL_STEP * np.eye(SIZE).reshape(-1, 14, 3)
+        d = (pull(moved.reshape(-1, 14, 3)).reshape(len(x), SIZE, -1) - r[:, None]) / PULL_STEP
+        out.add(r, np.where(r[:, None] != 0, d, 0.0).transpose(0, 2, 1))
+    out.chi2[behind[:, free].any(axis=1) | np.isnan(out.chi2)] = np.inf
     return out
 
 
-def _image_terms(out: Normal, problems: Records, joint: Array, j: int) -> None:
-    """Add the image point of one joint (N, 3); chi2 is infinite if it is behind the camera."""
-    weight, perspective = problems["image"][:, j], problems["perspective"] > 0
-    seen = (weight[:, 0, 0] != 0) | (weight[:, 1, 1] != 0)
-    z = np.where(perspective, joint[:, 2], 1.0)
-    inverse = 1 / np.where(z > 0, z, 1.0)
-    place = joint[:, :2] * inverse[:, None]
-    r = np.einsum("nik,nk->ni", weight, place - problems["ray"][:, j])
-    d = np.empty((len(r), 2, 3))
-    d[..., :2] = weight * inverse[:, None, None]
-    d[..., 2] = -np.where(perspective, inverse, 0.0)[:, None] * np.einsum("nik,nk->ni", weight, place)
-    # Robust (Geman & McClure): e / (1 + e / c^2), whose weight in the normal equations is the square of the factor.
-    square = problems["robust"]
-    keep = np.where(square > 0, square / np.where(square > 0, square + dot(r, r), 1.0), 1.0)
-    out.chi2 += (keep - keep * keep) * dot(r, r) + np.where(seen & ~(z > 0), np.inf, 0.0)
-    out.add(keep[:, None] * r, keep[:, None, None] * d, slice(3 * j, 3 * j + 3))
+def _along(d: Array, to_points: Array) -> Array:
+    """Return derivatives (N, RP, 3F) along joints from derivatives (N, R, P, 3) along points.
+
+    Points are `to_points` (P, F) times joints.
+    """
+    laid = d[..., None, :] * to_points[:, :, None]
+    return np.asarray(laid.reshape(len(d), d.shape[1] * len(to_points), -1))
 
 
-def _length_terms(out: Normal, problems: Records, x: Array, free: Flags, sized: Flags) -> None:
-    """Add the 17 log-lengths; the curvature of a segment that turns is kept where it is positive."""
-    some = free[SEGMENT_ENDS]
+def image_terms(records: NDArray[np.void], joints: Array) -> tuple[Array, Array, Flags]:
+    """Return residuals (N, 2, 14) of image points, derivatives (N, 2, 14, 3), and seen joints behind the camera."""
+    weight, perspective = np.swapaxes(records["image"], 1, 2), bool(records["perspective"].any())
+    depth = joints[..., 2:] if perspective else np.ones((len(joints), 14, 1))
+    inverse = 1 / np.where(depth > 0, depth, 1.0)
+    place = joints[..., :2] * inverse
+    r = np.einsum("nijk,njk->nij", weight, place - records["ray"])
+    on_depth = -perspective * np.einsum("nijk,njk->nij", weight, place)
+    d = np.concatenate([weight, on_depth[..., None]], axis=3) * inverse[:, None]
+    return r, d, (weight != 0).any(axis=(1, 3)) & ~(depth[..., 0] > 0)
+
+
+def length_terms(
+    records: NDArray[np.void], x: Array, some: Flags | slice = slice(None)
+) -> tuple[Array, Array]:
+    """Return residuals (N, S) of log-lengths of some segments, and derivatives (N, 4, S, 3) along these.
+
+    The last three rows are the curvature of a segment that turns, kept where it is positive.
+    """
     line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
-    q, w = dot(line, line), problems["length_weight"][:, some]
-    r = w * (0.5 * np.log(q) - problems["log_length"][:, some] - x[:, SIZE:])
-    bend = np.sqrt(np.maximum(w * r, 0.0) / q)[..., None, None]
-    across = np.eye(3) - line[..., None] * line[..., None, :] / q[..., None, None]
-    # For each segment: its own derivative, and its turns in three directions.
-    rows = np.concatenate([(w / q)[..., None, None] * line[..., None, :], bend * across], axis=2)
-    d = np.zeros((*rows.shape[:3], WIDTH))
-    d[..., :SIZE] = np.einsum("sj,nski->nskji", INCIDENCE[some] * free, rows).reshape(*rows.shape[:3], SIZE)
-    d[:, :, 0, SIZE] = -np.where(sized[:, None], w, 0.0)
-    residual = np.zeros(rows.shape[:3])
-    residual[..., 0] = r
-    out.add(residual.reshape(len(x), -1), d.reshape(len(x), -1, WIDTH))
+    square, w = dot(line, line), records["length_weight"][:, some]
+    r = w * (0.5 * np.log(square) - records["log_length"][:, some] - x[:, SIZE:])
+    bend = np.sqrt(np.maximum(w * r, 0.0) / square)[:, None, :, None]
+    across = np.eye(3)[:, None] - np.moveaxis(line, -1, 1)[..., None] * (line / square[..., None])[:, None]
+    return r, np.concatenate([((w / square)[..., None] * line)[:, None], bend * across], axis=1)
 
 
-def _pull(way: Array, other: Array, w: Array) -> tuple[Array, Array]:
-    """Return how a part's turn, weighted with w (M, 3), changes with its first axis and the other direction."""
-    length = np.sqrt(dot(way, way))
-    first = way / length[:, None]
-    lean = dot(first, other)
-    off = other - lean[:, None] * first
-    across = np.sqrt(dot(off, off))
-    normal = cross(first, off / across[:, None])
-    along = dot(w, first)
-    on_first = (cross(w, first) - (along * lean / across)[:, None] * normal) / length[:, None]
-    return on_first, (along / across)[:, None] * normal
+def limit_terms(limits: Limits, joints: Array, parts: int) -> tuple[Array, Array]:
+    """Return limits beyond their ends, radians, of the pelvis's three angles and four of each limb, as far as free.
 
-
-def _put_turn(out: Array, joints: Array, torso: bool, between: bool, w: Array) -> None:
-    """Add the derivative (M, 14, 3) of a part's turn, weighted with w, to `out`."""
-    down, left, hips = (0, 3), (1, 2), (4, 5)
-    first, other = (down, left) if torso else (hips, down if between else (3, 4))
-    ways = [joints[:, b] - joints[:, a] for a, b in (first, other)]
-    pulls = _pull(ways[0], ways[1], w)
-    for (a, b), pull in zip((first, other), pulls, strict=True):
-        out[:, b] += pull
-        out[:, a] -= pull
-
-
-def limit_rows(limits: Limits, joints: Array, parts: int) -> tuple[Array, Array]:
-    """Return limits beyond their ends: radians (N, 23), zero within, and derivatives (N, 23, 43); see `ROWS`."""
-    between = bool(limits.numbers["between_hips"])
-    torso, hips = lim.torso_axes(joints), lim.hips_axes(joints, between)
-    r, d = np.zeros((len(joints), ROWS + 4)), np.zeros((len(joints), ROWS + 4, WIDTH))
+    Residuals (N, K) are zero within. Derivatives are (N, L, 14, 3); the last L - K rows are the turn of each limb about
+    a joint that is almost straight and bent beyond its end: how far it is bent grows on all sides, as the length of a
+    segment that turns.
+    """
+    torso, hips = trunk_frames(joints, bool(limits.numbers["between_hips"]))
+    residuals, slopes, turns = [np.zeros((len(joints), 0))], [np.zeros((len(joints), 0, 14, 3))], []
     if parts & 1:
-        angles = lim.pelvis_angles(torso, hips) * lim.PELVIS_SIGNS
         low, high = limits.numbers["pelvis"].T
-        angles -= 2 * np.pi * np.round((angles - (low + high) / 2) / (2 * np.pi))
-        r[:, :3] = angles - np.clip(angles, low, high)
-        row = np.flatnonzero((r[:, :3] != 0).any(axis=1))
-        if len(row):
-            d[row, :3, :SIZE] = _pelvis_slopes(
-                joints[row], torso[row], hips[row, 2], r[row, :3] != 0, between
-            )
+        angles = turned_near(ball_branch(relative_rotation(torso, hips)) * lim.PELVIS_SIGNS, (low + high) / 2)
+        residuals.append(angles - np.clip(angles, low, high))
+        slopes.append(_pelvis_slopes(limits, joints, torso, hips, residuals[-1] != 0))
     for limb in range(4):
-        if not parts >> (limb + 1) & 1:
-            continue
-        frame, own = torso if limb < 2 else hips, slice(3 + 4 * limb, 7 + 4 * limb)
-        angles = lim.limb_angles(frame, *lim.limb_directions(joints, limb))
-        r[:, own], writing = limits.residual(limb, angles)
-        row = np.flatnonzero((r[:, own] != 0).any(axis=1))
-        if len(row):
-            slopes = np.empty((len(row), 4, 4))
-            for k in range(4):
-                moved = angles[row].copy()
-                moved[:, k] += ANGLE_STEP
-                slopes[:, :, k] = (limits.residual(limb, moved, writing[row])[0] - r[row, own]) / ANGLE_STEP
-            slopes[r[row, own] == 0] = 0.0
-            bent = np.maximum(r[row, own][:, 3] * slopes[:, 3, 3], 0.0)
-            found = _limb_slopes(
-                joints[row], frame[row], limb, angles[row], slopes, bent, bool(parts & 1), between
-            )
-            d[row, own, :SIZE], d[row, ROWS + limb, :SIZE] = found[:, :4], found[:, 4]
-    return r, d
+        if parts >> (limb + 1) & 1:
+            frame = torso if limb < 2 else hips
+            angles = limb_branch(frame, *lim.limb_directions(joints, limb))
+            r, writing = limits.residual(limb, angles)
+            d, row = np.zeros((len(joints), 5, 14, 3)), np.flatnonzero(r.any(axis=1))
+            if len(row):
+                steps = (angles[row, None] + ANGLE_STEP * np.eye(4)).reshape(-1, 4)
+                moved, _ = limits.residual(limb, steps, np.repeat(writing[row], 4))
+                along = (moved.reshape(-1, 4, 4) - r[row, None]) / ANGLE_STEP
+                along = np.where(r[row, :, None] != 0, np.swapaxes(along, 1, 2), 0.0)
+                d[row] = _limb_slopes(limits, joints[row], frame[row], limb, angles[row], along, r[row, 3])
+            residuals.append(r)
+            slopes.append(d[:, :4])
+            turns.append(d[:, 4:])
+    return np.concatenate(residuals, axis=1), np.concatenate([*slopes, *turns], axis=1)
 
 
-def _pelvis_slopes(joints: Array, torso: Array, up: Array, beyond: Flags, between: bool) -> Array:
-    """Return derivatives (M, 3, 42) of those of the pelvis's angles that are beyond their ends (M, 3)."""
+def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
+    """Add the derivative of the turn of torso or hips, weighted with w (M, K, 3), to `d` (M, K, 14, 3)."""
+    forward, left, up = (R[:, None, :, k] for k in range(3))
+    between = bool(limits.numbers["between_hips"])
+    (a, b), (s, t) = ((0, 3), (1, 2)) if torso else ((4, 5), (0, 3) if between else (3, 4))
+    first, second, normal = (-up, left, forward) if torso else (left, -up, -forward)
+    line, other = (joints[:, None, end] - joints[:, None, start] for start, end in ((a, b), (s, t)))
+    on_other = (dot(w, first) / dot(other, second))[..., None] * normal
+    on_first = (cross(w, first) - dot(other, first)[..., None] * on_other) / dot(line, first)[..., None]
+    for start, end, pull in ((a, b, on_first), (s, t, on_other)):
+        d[:, :, end] += pull
+        d[:, :, start] -= pull
+
+
+def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, some: Flags) -> Array:
+    """Return derivatives (N, 3, 14, 3) of some (N, 3) of the pelvis's angles along the joints, zero elsewhere."""
+    left, up = torso[:, :, 1], hips[:, :, 2]
+    lean = dot(left, up)[:, None]
+    square = np.maximum(1 - lean * lean, LEAST_COSINE**2)
+    axes = ((left - lean * up) / square, unit(cross(left, up)), (up - lean * left) / square)
+    w = np.where(some[..., None], lim.PELVIS_SIGNS[:, None] * np.stack(axes, axis=1), 0.0)
     d = np.zeros((len(joints), 3, 14, 3))
-    x, y, z = -np.einsum("nki,ni->kn", torso, up)
-    h = np.sqrt(x * x + z * z)
-    safe = np.where(h > 0, h, 1.0)
-    axis = np.where(h > 0, -z / safe, 1.0)[:, None] * torso[:, 0] + (x / safe)[:, None] * torso[:, 2]
-    square = np.maximum(h, LEAST_COSINE)[:, None] ** 2
-    along = ((torso[:, 1] + y[:, None] * up) / square, axis, (up + y[:, None] * torso[:, 1]) / square)
-    for k in range(3):
-        w = np.where(beyond[:, k, None], lim.PELVIS_SIGNS[k] * along[k], 0.0)
-        _put_turn(d[:, k], joints, False, between, w)
-        _put_turn(d[:, k], joints, True, between, -w)
-    return d.reshape(-1, 3, SIZE)
+    _put_turn(d, limits, joints, hips, False, w)
+    _put_turn(d, limits, joints, torso, True, -w)
+    return d
 
 
 def _limb_slopes(
-    joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array, trunk: bool, mid: bool
+    limits: Limits, joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array
 ) -> Array:
-    """Turn slopes (M, 4, 4) along a limb's four angles into derivatives (M, 5, 42) along joints.
+    """Turn slopes (M, 4, 4) along a limb's four angles into derivatives (M, 5, 14, 3) along the joints.
 
-    The last one is the limb's turn about a joint that is almost straight and `bent` beyond its end: how far it is bent
-    grows on all sides, as the length of a segment that turns.
+    The last row is the limb's turn about a joint that is almost straight and `bent` (M,) radians beyond its end.
     """
-    d = np.zeros((len(joints), 5, 14, 3))
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
-    upper, lower = joints[:, middle] - joints[:, start], joints[:, end] - joints[:, middle]
-    u, _ = lim.limb_directions(joints, limb)
-    (ca, cg, ce), (sa, sg, se) = (f(angles[:, [0, 2, 3]]).T for f in (np.cos, np.sin))
-    y = dot(frame[:, 1], u)
-    cb = np.sqrt(np.maximum(1 - y * y, 0.0))
-    a = sa[:, None] * frame[:, 2] - ca[:, None] * frame[:, 0]
-    b = (sa * y)[:, None] * frame[:, 0] + cb[:, None] * frame[:, 1] + (ca * y)[:, None] * frame[:, 2]
-    f = -sg[:, None] * a - cg[:, None] * b
-    e = (ce * cg)[:, None] * a - (ce * sg)[:, None] * b - se[:, None] * u
-    for k in range(4):
-        s = slopes[:, k]
-        on_c, on_e = s[:, 2] / np.maximum(se, LEAST_SINE), s[:, 3]
-        on_a = (s[:, 0] + on_c * (cb * ce * sg + y * se) - on_e * cb * cg) / np.maximum(cb, LEAST_SINE)
-        on_b = s[:, 1] + on_c * ce * cg + on_e * sg
-        du = (on_a[:, None] * a + on_b[:, None] * b) / np.sqrt(dot(upper, upper))[:, None]
-        dl = (on_c[:, None] * f + on_e[:, None] * e) / np.sqrt(dot(lower, lower))[:, None]
-        d[:, k, middle] += du - dl
-        d[:, k, end] += dl
-        if trunk:
-            d[:, k, start] -= du
-            w = on_b[:, None] * a - on_a[:, None] * b + on_e[:, None] * f - on_c[:, None] * e
-            _put_turn(d[:, k], joints, limb < 2, mid, w)
-    turn = np.sqrt(np.maximum(bent * ce, 0.0) / np.maximum(se, LEAST_SINE))[:, None] * f
-    du, dl = (turn / np.sqrt(dot(one, one))[:, None] for one in (upper, lower))
-    d[:, 4, middle] -= du + dl
-    d[:, 4, end] += dl
-    if trunk:
-        d[:, 4, start] += du
-    return d.reshape(-1, 5, SIZE)
+    upper, lower = (one[:, None] for one in lim.limb_directions(joints, limb))
+    lengths = norm(joints[:, [middle, end]] - joints[:, [start, middle]])[:, :, None, None]
+    trig = (np.moveaxis(f(angles), 1, 0)[..., None, None] for f in (np.cos, np.sin))
+    (ca, cb, cg, ce), (sa, sb, sg, se) = trig
+    # Directions in which the ends of both segments move with the angles.
+    a = sa * frame[:, None, :, 2] - ca * frame[:, None, :, 0]
+    b = cross(upper, a)
+    f = -sg * a - cg * b
+    e = cross(lower, f)
+    on_a, on_b, on_f, on_e = np.moveaxis(slopes, 2, 0)[..., None]
+    on_f = on_f / np.maximum(se, LEAST_SINE)
+    on_a = (on_a + on_f * (cb * ce * sg + sb * se) - on_e * cb * cg) / np.maximum(cb, LEAST_SINE)
+    on_b = on_b + on_f * ce * cg + on_e * sg
+    bent = np.maximum((bent * slopes[:, 3, 3])[:, None, None] * ce, 0.0)
+    turn = np.sqrt(bent / np.maximum(se, LEAST_SINE)) * f
+    du = np.concatenate([on_a * a + on_b * b, -turn], axis=1) / lengths[:, 0]
+    dl = np.concatenate([on_f * f + on_e * e, turn], axis=1) / lengths[:, 1]
+    d = np.zeros((len(joints), 5, 14, 3))
+    d[:, :, start], d[:, :, middle], d[:, :, end] = -du, du - dl, dl
+    _put_turn(d[:, :4], limits, joints, frame, limb < 2, on_b * a - on_a * b + on_e * f - on_f * e)
+    return d
 
 
 def descend(
-    problems: Records,
-    limits: Limits | None,
+    problem: Problem,
     which: Ints,
     start: Array,
     parts: int,
@@ -296,10 +276,8 @@ def descend(
 
     Parameters
     ----------
-    problems : records (F,) of `posekit.solver.problem.PROBLEM`
+    problem : Problem
         The frames.
-    limits : Limits, optional
-        Joint ranges.
     which : int array (N,)
         The frame of each start.
     start : array (N, 43)
@@ -320,95 +298,85 @@ def descend(
     x, chi2, damping : array (N, 43), (N,), (N,)
         Damping is infinite where a start has arrived or is given up.
     """
-    free = free_joints(parts)
-    column = np.flatnonzero(np.append(np.repeat(free, 3), bool(parts & 1)))
+    column = np.append((3 * free_joints(parts)[:, None] + np.arange(3)).ravel(), SIZE)
     x, damping = np.array(start, dtype=np.float64), np.array(damping, dtype=np.float64)
     refused = np.zeros(len(x), dtype=np.bool_)
-    here = evaluate(problems[which], limits, x, parts, pull)
+    here = evaluate(problem, which, x, parts, pull)
     # The model of the next step: what is here, and limits that a refused step has met.
     matrix, gradient = here.matrix.copy(), here.gradient.copy()
     live = np.flatnonzero(np.isfinite(here.chi2 + damping))
     for _ in range(most):
-        slope, chi2 = gradient[live][:, column], here.chi2[live]
-        damped = matrix[live][:, column[:, None], column] + (damping[live, None, None] + FLOOR) * np.eye(
-            len(column)
-        )
+        slope, chi2, held = gradient[live], here.chi2[live], (damping[live] + FLOOR)[:, None]
+        damped = matrix[live] + held[..., None] * np.eye(len(column))
         step = np.asarray(-np.linalg.solve(damped, slope[..., None])[..., 0], dtype=np.float64)
-        gain = dot(step, (damping[live, None] + FLOOR) * step - slope)
+        gain = dot(step, held * step - slope)
         arrived = (gain <= PRECISION) & (damping[live] <= ARRIVED_DAMPING)
         stop = arrived | (damping[live] > MOST_DAMPING) | ((chi2 > hopeless[live]) & (gain < 0.5 * chi2))
         damping[live[stop]] = np.inf
         live, step, gain, chi2 = live[~stop], step[~stop], gain[~stop], chi2[~stop]
         if not len(live):
             break
-        moved = np.zeros((len(live), WIDTH))
-        moved[:, column] = step
-        there = evaluate(problems[which[live]], limits, x[live] + moved, parts, pull)
+        moved = x[live]
+        moved[:, column] += step
+        there = evaluate(problem, which[live], moved, parts, pull)
         better = there.chi2 <= chi2
         good, bad = live[better], live[~better]
         ratio = (chi2 - there.chi2)[better] / gain[better]
         factor = np.where(ratio > 0.75, 0.2, np.where(ratio < 0.25, 4.0, 1.0))
         damping[good] = np.maximum(damping[good] * factor, LEAST_DAMPING)
-        x[good] += moved[better]
-        here.put(good, there, better)
+        x[good] = moved[better]
+        for name, own in vars(here).items():
+            own[good] = vars(there)[name][better]
+        matrix[live], gradient[live] = here.matrix[live], here.gradient[live]
         r, d = there.beyond[~better], there.slopes[~better]
         met = (r != 0) & (here.beyond[bad] == 0) & np.isfinite(there.chi2[~better])[:, None]
-        before = r - np.einsum("nkc,nc->nk", d, moved[~better])
+        before = r - (d @ step[~better, :, None])[..., 0]
         before, d = np.where(before * r > 0, 0.0, before), np.where(met[..., None], d, 0.0)
-        matrix[live], gradient[live] = here.matrix[live], here.gradient[live]
-        matrix[bad] += d.transpose(0, 2, 1) @ d
-        gradient[bad] += np.einsum("nkc,nk->nc", d, before)
+        matrix[bad] += np.swapaxes(d, 1, 2) @ d
+        gradient[bad] += (before[:, None] @ d)[:, 0]
         damping[bad] *= np.where(refused[bad] | ~met.any(axis=1), 16.0, 1.0)
         refused[live] = ~better
     return x, here.chi2, damping
 
 
-def information(
-    problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array, parts: int = 31
-) -> Array:
-    """Return the information (N, 43, 43) on the unknowns: the matrix, and what is `known` besides the residuals.
+def information(problem: Problem, which: Ints, x: Array, known: Array, parts: int = 31) -> Array:
+    """Return the information (N, C, C) on the unknowns: the matrix of `evaluate` and prior knowledge.
 
     `known` (3,) has three numbers: the information on the place of any joint, and of a hidden joint, both in 1/m^2; and
     the factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
     """
-    H = evaluate(problems[which], limits, x, parts).matrix
-    p, joints, index = problems[which], x[:, :SIZE].reshape(-1, 14, 3), np.arange(SIZE)
-    seen = (p["image"] != 0).any(axis=(2, 3))
-    H[:, index, index] += np.repeat(np.where(seen, known[0], known[1]), 3, axis=1)
-    limbs = [k for k in range(4) if parts >> (k + 1) & 1]
-    segments = [pair for k in limbs for pair in pairwise((lim.STARTS[k], lim.MIDDLES[k], lim.ENDS[k]))]
-    perspective = p["perspective"] > 0
-    for start, end in segments:
-        line = joints[:, end] - joints[:, start]
-        square = dot(line, line)
-        ray = np.where(perspective[:, None], joints[:, end], [0.0, 0.0, 1.0])
-        turn = ray - (dot(ray, line) / square)[:, None] * line
-        size = np.sqrt(dot(turn, turn))
-        depth = np.where(perspective, np.abs(joints[:, end, 2]), 1.0)
-        weight = np.sqrt((p["image"][:, end] ** 2).sum(axis=(1, 2)) / 2 / square)
-        info = known[2] * weight * size / np.sqrt(dot(ray, ray)) / depth
-        turn = turn / np.where(size > 0, size, 1.0)[:, None]
-        block = info[:, None, None] * turn[:, :, None] * turn[:, None, :]
-        for a, b, sign in ((start, start, 1), (end, end, 1), (start, end, -1), (end, start, -1)):
-            H[:, 3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign * block
+    p, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
+    H = evaluate(problem, which, x, parts).matrix
+    place = np.where((p["image"][:, free] != 0).any(axis=(2, 3)), known[0], known[1])
+    H[:, :-1, :-1] += np.repeat(place, 3, axis=1)[:, None] * np.eye(3 * len(free))
+    some = np.isin(SEGMENT_ENDS, free[free >= 6])
+    line, ends = INCIDENCE[some] @ joints, joints[:, SEGMENT_ENDS[some]]
+    weight = p["image"][:, SEGMENT_ENDS[some]]
+    ray = ends if problem.perspective else np.broadcast_to([0.0, 0.0, 1.0], ends.shape)
+    turn = ray - (dot(ray, line) / dot(line, line))[..., None] * line
+    depth = np.abs(ends[..., 2]) if problem.perspective else 1.0
+    noise = np.sqrt((weight**2).sum(axis=(2, 3)) / 2 / dot(line, line))
+    size = norm(turn)
+    info = known[2] * noise / norm(ray) / depth / np.where(size > 0, size, 1.0)
+    d = _along((np.sqrt(info)[..., None] * turn)[:, None], INCIDENCE[some][:, free])
+    H[:, :-1, :-1] += np.swapaxes(d, 1, 2) @ d
     return H
 
 
-def covariance(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
+def covariance(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
     """Return the covariances of the joints (N, 42, 42)."""
-    H = information(problems, limits, which, x, known) + FLOOR * np.eye(WIDTH)
+    H = information(problem, which, x, known) + FLOOR * np.eye(SIZE + 1)
     return np.asarray(np.linalg.inv(H)[:, :SIZE, :SIZE])
 
 
-def log_determinants(problems: Records, limits: Limits | None, which: Ints, x: Array, known: Array) -> Array:
+def log_determinants(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
     """Return the logarithms of the determinants of the information (N,)."""
-    H = information(problems, limits, which, x, known) + FLOOR * np.eye(WIDTH)
+    H = information(problem, which, x, known) + FLOOR * np.eye(SIZE + 1)
     return np.asarray(np.linalg.slogdet(H)[1])
 
 
 def distinct(
-    problems: Records,
-    limits: Limits | None,
+    problem: Problem,
     group: Ints,
     which: Ints,
     x: Array,
@@ -424,10 +392,12 @@ def distinct(
     farther than `reach`, and :math:`d^T H d` of their difference is below `level`.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
+    free = free_joints(parts)
     joints = x[:, :SIZE].reshape(-1, 14, 3)
-    joints = (joints - joints[:, :1])[:, free_joints(parts)]
+    joints = (joints - joints[:, :1])[:, free]
+    column = np.append((3 * free[:, None] + np.arange(3)).ravel(), SIZE)
     edges = np.flatnonzero(np.diff(group, prepend=-1, append=-1))
-    every = information(problems, limits, which, x, known, parts) if reach else np.empty(0)
+    every = information(problem, which, x, known, parts) if reach else np.empty(0)
     for a, b in pairwise(edges.tolist()):
         kept: list[int] = []
         for k in range(a, b):
@@ -436,7 +406,7 @@ def distinct(
             near = np.array(kept, dtype=np.intp)[far < reach]
             same = bool((far < within[k]).any())
             if not same and near.size:
-                d = x[k] - x[near]
+                d = (x[k] - x[near])[:, column]
                 same = bool((np.einsum("ni,nij,nj->n", d, every[near], d) < level).any())
             if not same:
                 kept.append(k)

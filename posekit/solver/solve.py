@@ -11,7 +11,7 @@ from posekit.solver import reference
 from posekit.solver.engine import descend
 from posekit.solver.limits import ENDS, MIDDLES
 from posekit.solver.modes import MERGE_DISTANCE_METRES, Modes, distinct, merged
-from posekit.solver.problem import Problem
+from posekit.solver.problem import ROBUST_DEVIATIONS, Problem
 from posekit.solver.reference import Pull
 from posekit.solver.starts import limb_starts, trunk_starts
 
@@ -82,7 +82,9 @@ def solve(
         from scipy.special import gammainccinv
 
         passing = 2 * gammainccinv(np.maximum(problem.freedom, LEAST_FREEDOM) / 2, REJECTION_PROBABILITY)
-        passing = passing + problem.records["robust"]  # one gross error of a detector
+        passing = passing + ROBUST_DEVIATIONS**2 * (
+            problem.records["robust"] > 0
+        )  # one gross error of a detector
     else:
         passing = np.full(len(problem), float(max_chi2))
     found = [
@@ -105,9 +107,7 @@ def _solved(whole: Problem, frames: Ints, passing: Array, pull: Pull | None) -> 
         near = chi2 <= passing[frame]
         frame, hopeless = frame[near], HOPELESS * passing[frame[near]]
         damping = np.full(len(frame), reference.FIRST_DAMPING)
-        x, chi2, _ = reference.descend(
-            problem.records, problem.limits, frame, x[near], WHOLE, PULL_STEPS, hopeless, damping, pull
-        )
+        x, chi2, _ = reference.descend(problem, frame, x[near], WHOLE, PULL_STEPS, hopeless, damping, pull)
     order = np.lexsort((chi2, frame))
     order = order[chi2[order] <= passing[frame[order]]]
     modes = merged(Modes(problem=problem, frame=frame[order], x=x[order], chi2=chi2[order]))
@@ -119,7 +119,7 @@ def _trunks(problem: Problem, passing: Array) -> tuple[Ints, Array, Array]:
     frame, trunk = trunk_starts(problem)
     x = np.zeros((len(frame), 43))
     x[:, :18] = trunk.reshape(-1, 18)
-    damping = None
+    damping = np.full(len(frame), reference.FIRST_DAMPING)
     for steps, level in ((FIRST_STEPS, np.inf), (40, 1.0)):
         hopeless = HOPELESS_TRUNK * passing[frame]
         x, chi2, damping = descend(problem, frame, x, 1, most=steps, hopeless=hopeless, damping=damping)

@@ -182,13 +182,15 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
       if (!(x[j][2] > 0)) return INFINITY;
       iz = 1 / x[j][2], u *= iz, v *= iz;
     }
-    double du = u - p.ray[j][0], dv = v - p.ray[j][1], r[2], d[2][3], e = 0, g = 1;
+    double du = u - p.ray[j][0], dv = v - p.ray[j][1], r[2], d[2][3], e = 0;
     for (int i = 0; i < 2; ++i) {
       r[i] = w[i][0] * du + w[i][1] * dv, e += r[i] * r[i];
       d[i][0] = w[i][0] * iz, d[i][1] = w[i][1] * iz;
       d[i][2] = p.perspective > 0 ? -(w[i][0] * u + w[i][1] * v) * iz : 0.0;
     }
-    if (p.robust > 0) g = p.robust / (p.robust + e), e *= g, g *= g;
+    const double keep = 1 / (1 + p.robust * e);
+    const double g = keep * keep;
+    e *= keep;
     chi2 += e;
     if (n)
       for (int i = 0; i < 3; ++i) {
