@@ -179,15 +179,27 @@ def test_a_file_at_another_height_has_the_same_doubts(level: float) -> None:
         assert "about 60 Hz would fit" in warning
 
 
-@pytest.mark.parametrize("up", ["+z", "-z", "+x", "-x", "+y", "-y"])
-def test_a_person_who_bends_stands_on_the_plane_through_the_origin(up: str) -> None:
-    joints = standing() + np.array([3.0, 2.0, 0.0])
+def bent(degrees: float) -> np.ndarray:
+    """Return a person on straight legs whose trunk bends forward about the hips."""
+    joints = standing()
     upper = [k for k, name in enumerate(JOINTS) if not name.endswith(("hip", "knee", "ankle"))]
     hips = joints[:, HIPS].mean(axis=1, keepdims=True)
-    cos, sin = np.cos(np.radians(70)), np.sin(np.radians(70))
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     joints[:, upper] = hips + (joints[:, upper] - hips) @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
-    report = judged(joints, checks=["orientation"], up=up)
+    return joints
+
+
+@pytest.mark.parametrize("up", ["+z", "-z", "+x", "-x", "+y", "-y"])
+def test_a_person_who_bends_stands_on_the_plane_through_the_origin(up: str) -> None:
+    report = judged(bent(70.0) + np.array([3.0, 2.0, 0.0]), checks=["orientation"], up=up)
     assert report.invalid.any() == (up != "+z")
+
+
+def test_a_trunk_without_legs_has_any_height() -> None:
+    joints = np.repeat(bent(45.0)[:1], N, axis=0)
+    joints[:, [k for k, name in enumerate(JOINTS) if name.endswith(("knee", "ankle"))]] = np.nan
+    joints[..., 0] += 0.05 - np.nanmin(joints[..., 0])
+    assert not judged(joints, checks=["orientation"]).invalid.any()
 
 
 def test_upside_down_is_measured_from_up() -> None:

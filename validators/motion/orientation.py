@@ -48,8 +48,8 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     A body is upside down if neck, pelvis and ankles are one above the other in the wrong order, and hands do not carry
     it. Another axis than the stated one points up in two cases. First, trunk and legs are straight along that axis, as
     people stand, while the body travels or its lowest joint rises and sinks, unlike a body that lies. Second, the body
-    does not stand upright along the stated axis, and its lowest joint stays on the plane through the origin that is
-    perpendicular to the other axis, not on the one perpendicular to the stated axis.
+    does not stand upright along the stated axis, and its lowest knee or ankle stays on the plane through the origin
+    that is perpendicular to the other axis, not on the one perpendicular to the stated axis.
 
     The value is the angle between up and the trunk, or between up and the other axis.
 
@@ -94,14 +94,15 @@ def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | 
         if travel > TRAVEL_METRES or level > LEVEL_METRES:
             return axis
     upright = np.median((cosine > UPRIGHT_COSINE) & (legs @ up > UPRIGHT_COSINE)) > 0
-    if upright or _rests_on_origin(body, up):
+    if upright or np.isnan(legs).all() or _on_origin(body.height):
         return None
     lower = [one for one in axes if one @ up < LYING_COSINE and np.nanmedian(trunk @ one) > 0]
-    return next((one for one in lower if _rests_on_origin(body, one)), None)
+    # Knees and ankles are the last joints; the knees of a body that sits away from the ground are not on the plane.
+    parts = body.joints, body.joints[:, JOINT["right_knee"] :]
+    return next((one for one in lower if all(_on_origin(part @ one) for part in parts)), None)
 
 
-def _rests_on_origin(body: Body, up: Array) -> bool:
-    """Return whether the lowest joint along a direction (3,) mostly stays on the plane through the origin."""
-    lowest = np.fmin.reduce(body.joints @ up, axis=1)
-    low, middle, high = np.nanpercentile(lowest, STEADY_PERCENTILES)
+def _on_origin(height: Array) -> bool:
+    """Return whether the lowest joint of heights (T, J), metres, mostly stays on the plane through the origin."""
+    low, middle, high = np.nanpercentile(np.fmin.reduce(height, axis=1), STEADY_PERCENTILES)
     return bool(SOLE_METRES[0] < middle < SOLE_METRES[1] and high - low < STEADY_METRES)
