@@ -13,6 +13,7 @@ from posekit.formats import body_checks
 from posekit.ranking import standing
 from posekit.recovery.scales import ANNOTATION_SIGMAS
 from posekit.skeleton import JOINTS, POINTS
+from posekit.synthesis import Walker
 from posekit.validators.motion import ground
 
 COCO = {
@@ -76,3 +77,42 @@ def test_trunks_turn_as_stiffly_as_uniform_cylinders() -> None:
         mass, _, moments = parts[link]
         x, y, z = long**2 / 12, wide**2 / 16, deep**2 / 16
         assert moments / mass == pytest.approx([x + y, x + z, y + z], rel=0.5)
+
+
+@pytest.mark.parametrize("velocity", [0.55, 0.9, 1.3])
+def test_the_pelvis_moves_as_boulic_says(velocity: float) -> None:
+    """Boulic et al. 1990, leg lengths: a cycle is 1.346 sqrt(v) long, its support lasts 0.752 of it less 0.143 s."""
+    walker = Walker(velocity=velocity)
+    cycle = 1.346 * np.sqrt(velocity) / velocity
+    assert walker.cycle_duration == pytest.approx(cycle)
+    time = np.linspace(0, cycle, 33)
+    t = time / cycle
+    q = walker.configurations(walker.phase(time))
+    q[:, :3] += walker.travel(time)
+    pelvis = walker.figure.points(q)[:, JOINTS.index("pelvis")] / walker.leg_length
+
+    def wave(phase: np.ndarray) -> np.ndarray:
+        return np.asarray(np.sin(2 * np.pi * phase))
+
+    early = 0.625 - (0.752 * cycle - 0.143) / cycle
+    forward = velocity * time - 0.021 * wave(2 * (t + early))
+    up, left = 0.015 * velocity * wave(2 * t - 0.35), -0.032 * wave(t - 0.1)
+    expected = np.stack([forward, up, -left], axis=1)
+    np.testing.assert_allclose(pelvis - pelvis[0], expected - expected[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("velocity", [0.55, 1.3])
+def test_limbs_swing_as_boulic_says(velocity: float) -> None:
+    u, walker = (velocity - 0.5) / 0.8, Walker(velocity=velocity)
+    swing = {
+        name: np.degrees(values) for name, values in walker.flexion(np.array([0.05, 0.25, 0.5, 0.9])).items()
+    }
+    shoulder = 3 - 4.94 * velocity - 9.88 * velocity * np.cos(2 * np.pi * np.array([0.05, 0.25, 0.5, 0.9]))
+    assert swing["shoulder"][:, 0] == pytest.approx(shoulder)
+    assert swing["elbow"][[0, 3], 0] == pytest.approx([6 + 8 * u, 8 + 9 * u])
+    assert np.degrees(walker.flexion(np.array([0.5 + 0.01 * u]))["elbow"][0, 0]) == pytest.approx(20 + 24 * u)
+    q = walker.configurations(np.array([0.0, 0.5]))
+    joints = walker.figure.points(q)
+    across = joints[:, JOINTS.index("right_hip")] - joints[:, JOINTS.index("left_hip")]
+    turned = np.degrees(np.arctan2(across[:, 0], across[:, 2]))  # the hip of the leading leg leads
+    assert turned == pytest.approx([4 * velocity, -4 * velocity], abs=1e-6)
