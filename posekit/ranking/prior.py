@@ -81,17 +81,16 @@ class StudentMixture(Record):
             Number of leading coordinates.
         """
         known = np.isfinite(x[:, :count])
-        found = np.zeros(len(x))
-        code = known @ (1 << np.arange(count))
-        for pattern in set(code.tolist()):
+        if known.all():
+            # Exact postures of a frame share limbs: equal coordinates are evaluated once.
+            _, first, which = np.unique(x[:, :count] @ UNEVEN[:count], return_index=True, return_inverse=True)
+            return np.asarray((self._log_sum(x[first], count) - self._usual(count))[which])
+        found, code = np.zeros(len(x)), known @ (1 << np.arange(count))
+        for pattern in set(code.tolist()) - {0}:
             rows = np.flatnonzero(code == pattern)
             columns = np.flatnonzero(known[rows[0]])
-            if len(columns):
-                part, width = self if len(columns) == count else self.part(columns), len(columns)
-                some = x[np.ix_(rows, columns)]
-                # Exact postures of a frame share limbs: equal coordinates are evaluated once.
-                _, first, which = np.unique(some @ UNEVEN[:width], return_index=True, return_inverse=True)
-                found[rows] = (part._log_sum(some[first], width) - part._usual(width))[which]
+            part = self if len(columns) == count else self.part(columns)
+            found[rows] = part.excess(x[np.ix_(rows, columns)], len(columns))
         return found
 
     def _usual(self, count: int) -> float:
@@ -113,12 +112,13 @@ class StudentMixture(Record):
         # 1 + |p - m|^2 / nu, as one product of matrices.
         left = np.column_stack([points, dot(points, points), np.ones(len(points))])
         right = np.column_stack([-2 * middles, np.ones(len(middles)), self.dof + dot(middles, middles)])
-        base = left @ right.T / self.dof
         power = (self.dof + count) / 2
-        # Relative to the nearest component no power underflows.
-        nearest = base.min(axis=1)
-        each = np.exp(power * np.log(nearest[:, None] / base))  # faster than a power
-        return np.asarray(np.log(each @ self.share) - power * np.log(nearest))
+        # In place: new arrays of this size take longer than the arithmetic.
+        log = np.log(left @ (right.T / self.dof))
+        log *= -power
+        nearest = log.max(axis=1)
+        log -= nearest[:, None]  # relative to the nearest component no power underflows
+        return np.asarray(np.log(np.exp(log, out=log) @ self.share) + nearest)
 
 
 def digamma(x: float) -> float:

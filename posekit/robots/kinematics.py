@@ -57,7 +57,7 @@ class Kinematics:
         self._at, self._special = np.zeros((2, model.njoints), dtype=np.intp), set[int]()
         slides, turns = np.zeros((2, model.njoints), dtype=np.bool_)
         frames, self._mix = np.tile(np.eye(3), (model.njoints, 1, 1)), np.zeros((model.njoints, 4, 3))
-        for joint in range(1, model.njoints):
+        for joint in sorted(needed)[1:]:
             data, first, count = model.joints[joint].createData(), model.idx_vs[joint], model.nvs[joint]
             model.joints[joint].calc(data, pin.neutral(model))
             moved = np.asarray(data.S).reshape(2, 3, -1)
