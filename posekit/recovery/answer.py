@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.body import lay
-from posekit.geometry import Array, Flags, Ints, dot
+from posekit.geometry import Array, Flags, Ints, dot, norm
 from posekit.skeleton import PARENTS, TREE_SEGMENTS
 
 #: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
@@ -108,10 +108,10 @@ def answers_of(
         laid = shape[starts + survivor]
     else:
         a, b = np.array(TREE_SEGMENTS).T
-        sizes = np.log(np.linalg.norm(shape[:, a] - shape[:, b], axis=2) / lengths[: len(a)])
+        sizes = np.log(norm(shape[:, a] - shape[:, b]) / lengths[: len(a)])
         size = np.add.reduceat(weight * np.nan_to_num(sizes).mean(axis=1), starts)
         laid = lay(np.add.reduceat(weight[:, None, None] * shape, starts), np.exp(size)[:, None] * lengths)
-        away = np.nan_to_num(np.linalg.norm(shape - laid[frame], axis=2)).mean(axis=1)
+        away = np.nan_to_num(norm(shape - laid[frame])).mean(axis=1)
         survivor = np.lexsort((away, frame))[starts] - starts
     inside, sides = np.empty(len(shape)), np.empty((len(shape), 2, len(PARENTS) - 1))
     step = len(shape) if covariance is None else SAMPLED_AT_ONCE
@@ -119,7 +119,7 @@ def answers_of(
         draws = shape[own, None]
         if covariance is not None:
             draws = draws + _drawn(covariance[own], relative[frame[own]])
-        away = np.linalg.norm(draws - laid[frame[own], None], axis=3)
+        away = norm(draws - laid[frame[own], None])
         inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not beyond
         gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
         sides[own] = np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2)
