@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import posekit
 from posekit.errors import InputError
 from posekit.robots import Robot, load_robot, robot_names
 from posekit.settings import ValidateSettings
@@ -335,6 +336,17 @@ def test_an_arm_is_no_humanoid() -> None:
     arm = load_robot("panda", bodies="none", fixed_base=True)
     with pytest.raises(InputError, match="joint map"):
         arm.points(arm.neutral)
+
+
+def test_a_file_of_an_arm_is_judged_like_its_array(tmp_path: Path) -> None:
+    validator = Validator("panda")
+    q = np.repeat(validator.robot.neutral[None], 20, axis=0)
+    q[:, 7:] += 0.005 * np.arange(20)[:, None]
+    path = tmp_path / "arm.csv"
+    np.savetxt(path, q, delimiter=",", header=",".join(validator.configuration_names), comments="")
+    report = posekit.validate(path, urdf="panda")
+    assert report.invalid.tolist() == validator.check(q).invalid.tolist() and report.invalid.any()
+    assert report.not_asked["sliding"] == "no joint positions are known"
 
 
 def test_velocities_are_differences() -> None:

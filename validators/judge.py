@@ -245,6 +245,7 @@ def validate_motion(
         )
     # The points of configurations cost as much as all checks except collision.
     placed = motion.in_time or any("joints" in check.reads for check in checks)
+    placed = placed and (robot is None or robot.humanoid)
     reports = []
     for name, recording in motion.recordings():
         part, used, residual = recording, robot, None
@@ -253,7 +254,7 @@ def validate_motion(
         body = Body.of(
             part, asked, base=figure, robot=used, tolerance=tolerance, residual=residual, placed=placed
         )
-        if used is not None and body.q is not None and body.motion and not np.isfinite(body.feet).any():
+        if used is not None and placed and body.motion and not np.isfinite(body.feet).any():
             body = replace(body, feet=sole_points(used, body.q))
         reports.append(_report(body, checks, part, name))
     return reports[0] if len(reports) == 1 else joined(reports)

@@ -10,7 +10,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.bodies import build_bodies, first_link, link_of
 from posekit.skeleton import PARTS
@@ -43,10 +42,9 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
                 frame = model.getFrameId(link.get("name", ""), pin.FrameType.BODY)
                 meshed.add(model.frames[frame].parentJoint)
     geometry = build_bodies(model, plain, (), robot.source, "collision")
-    try:
-        data, place = _neutral(robot)
-    except InputError:  # no humanoid: nothing is known of its shape
+    if not robot.humanoid:  # nothing is known of its shape
         return geometry
+    data, place = _neutral(robot)
     only = meshed if meshed or geometry.ngeoms else range(model.njoints)
     shapes = _proportions(figure)
     for part, joints in PARTS.items():

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from posekit.errors import cut, one_line, refusal, shown
+from posekit.errors import InputError, cut, one_line, refusal, shown
 from posekit.files import read_bytes, text
 from posekit.geometry import Array, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
@@ -196,6 +196,14 @@ class Robot(Record):
         if self.joint_map_file:
             return load_joint_map(self.joint_map_file, self.model)
         return find_joint_map(self.model, self.source)
+
+    @cached_property
+    def humanoid(self) -> bool:
+        """Whether the robot has a joint map: the given map, or a map that fits its joints."""
+        try:
+            return bool(self.joint_map_file or self.joint_map)
+        except InputError:
+            return False
 
     @cached_property
     def kinematics(self) -> Kinematics:

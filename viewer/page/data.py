@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, load_figure
 from posekit.body.capsules import CAPSULE_AXES
 from posekit.cameras import ScaledOrthographicCamera, View
-from posekit.errors import InputError, refusal
+from posekit.errors import refusal
 from posekit.geometry import Array
 from posekit.motion import Motion
 from posekit.recovery import Recovery
@@ -99,17 +99,7 @@ def _judged(motion: Motion, urdf: str) -> Report:
     robot, q = drawn.configured(motion, urdf)
     if isinstance(robot, Figure):
         return Validator().check(motion)
-    if not _is_humanoid(robot):
-        return Validator(robot).check(q)
     return Validator(robot).check(replace(motion, q=q, q_names=robot.configuration_names))
-
-
-def _is_humanoid(robot: Robot) -> bool:
-    """Return whether a robot has a joint map."""
-    try:
-        return bool(len(robot.joint_map))
-    except InputError:
-        return False
 
 
 def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str) -> Json:
@@ -180,7 +170,7 @@ def _points(motion: Motion, robot: Robot, q: Array) -> Array:
 
 def _joints(robot: Robot, q: Array) -> Array:
     """Return the joints of a body as points (T, 19, 3); head points and missing joints are NaN."""
-    known = np.isfinite(q).all(axis=1) & _is_humanoid(robot)
+    known = np.isfinite(q).all(axis=1) & robot.humanoid
     joints = np.full((len(q), len(JOINTS), 3), np.nan)
     joints[known] = robot.points(q[known])[:, : len(JOINTS)]
     return _with_head(joints)
