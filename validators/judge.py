@@ -254,7 +254,8 @@ def validate_motion(
         body = Body.of(
             part, asked, base=figure, robot=used, tolerance=tolerance, residual=residual, placed=placed
         )
-        if used is not None and placed and body.motion and not np.isfinite(body.feet).any():
+        legs = placed and body.motion and not np.isfinite(body.feet).any()
+        if legs and used is not None and body.q is not None:
             body = replace(body, feet=sole_points(used, body.q))
         reports.append(_report(body, checks, part, name))
     return reports[0] if len(reports) == 1 else joined(reports)
