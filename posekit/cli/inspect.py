@@ -12,6 +12,8 @@ from posekit.cli.command import command, reading, say
 
 #: Names that the table lists.
 MOST_NAMES: Final = 40
+#: Detections of a file whose people are told apart and listed: it takes some time.
+MOST_TRACKED: Final = 2000
 
 
 @command("inspect", "posekit inspect jump.bvh", "posekit inspect keypoints/")
@@ -47,9 +49,13 @@ def _of_detections(found: Any) -> list[tuple[str, str]]:
     numbers = np.asarray(found.frame)
     pictures = len(found.pictures) or (int(numbers.max()) + 1 if len(numbers) else 0)
     film = "a film" if found.film else "unrelated photographs"
+    several = found.film and len(np.unique(numbers)) < len(found) <= MOST_TRACKED
+    who, counts = np.unique(found.people(), return_counts=True) if several else ((), ())
+    listed = _listed(f"{number} in {count}" for number, count in zip(who, counts, strict=True))
     return [
         ("pictures", f"{pictures}, {film}"),
         ("people", f"{len(found)} in {len(np.unique(numbers))} pictures"),
+        ("numbers", f"{listed} pictures" if several else ""),
         ("size", f"{found.size[0]} x {found.size[1]} px" if found.size else "not known"),
         ("rate", f"{found.rate:g} a second" if found.rate else ""),
         ("points", f"{len(found.names)}: {_listed(found.names)}"),

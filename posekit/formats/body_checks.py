@@ -50,6 +50,8 @@ CLEAR_RATIO: Final = 2.0
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
 #: Share by which a stated rate and the times must differ to be a contradiction.
 RATE_DISAGREES: Final = 0.1
+#: Distance of a root from the origin that float32 and rounding leave.
+ROUNDING_METRES: Final = 1e-4
 #: Rounding of times that is noted, seconds.
 NOTED_SECONDS: Final = 1e-4
 #: Share by which limbs of both sides may differ in length in an order of points that fits.
@@ -405,15 +407,10 @@ def _rise(body: Array, clip: Ints | None, up: str) -> float:
 
 
 def _is_rooted(body: Array) -> bool:
-    """Tell whether the hips (their middle, or the pelvis) are at the origin in every frame of several."""
-    if len(body) < 2:
-        return False
+    """Return whether the middle of the hips, or the pelvis, is at the origin in every frame of several."""
     middle = (body[:, JOINT["right_hip"]] + body[:, JOINT["left_hip"]]) / 2
-    for root in (middle, body[:, JOINT["pelvis"]]):
-        known = root[np.isfinite(root).all(axis=-1)]
-        if len(known) > 1 and np.abs(known).max() < 1e-4:  # 0.1 mm: what is left of float32 and of rounding
-            return True
-    return False
+    known = (root[np.isfinite(root).all(axis=-1)] for root in (middle, body[:, JOINT["pelvis"]]))
+    return any(len(root) > 1 and np.abs(root).max() < ROUNDING_METRES for root in known)
 
 
 def times(

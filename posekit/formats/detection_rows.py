@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -27,10 +26,6 @@ MOST_SPREAD: Final = 20
 FILM_MOTION: Final = 0.5
 #: Pictures in which the motion is measured.
 MOST_COMPARED: Final = 200
-#: Detections of a file whose people are listed: telling them apart takes some time.
-MOST_TRACKED: Final = 2000
-#: People that a note lists.
-MOST_LISTED: Final = 20
 #: A picture whose size is not known.
 UNKNOWN: Final = (math.nan, math.nan)
 #: Size of nose, eyes and ears against the whole body that stands for a layout without them, as Human3.6M's: where the
@@ -154,7 +149,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
         pictures[index], stamps[index] = label, rows.pictures[label][0]
     time = _times(stamps, film, options)
     options.note(f"{len(placed)} detections in {len(place)} pictures, {rows.kind}, {layout.name}")
-    found = Detections(
+    return Detections(
         points=placed[order],
         confidence=confidence[order],
         names=names,
@@ -172,11 +167,6 @@ def detections_of(rows: Rows, options: Options) -> Detections:
         warnings=tuple(options.warnings),
         derived=derived,
     )
-    if film and len(np.unique(found.frame)) < len(found) <= MOST_TRACKED:
-        numbers, counts = np.unique(found.people(), return_counts=True)
-        listed = ", ".join(f"{who} in {n}" for who, n in zip(numbers[:MOST_LISTED], counts, strict=False))
-        found = replace(found, notes=(f"people by number, and their pictures: {listed}", *options.notes))
-    return found
 
 
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:

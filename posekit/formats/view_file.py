@@ -13,7 +13,7 @@ from posekit.cameras.lee_chen import image_from_paper
 from posekit.cameras.view import HEAD_NAMES, is_head_name, own_names
 from posekit.errors import CameraError, InputError, nearest, shown
 from posekit.formats import json_file
-from posekit.formats.node import Node, known_points, points_by_name, schema_of
+from posekit.formats.node import MISSING, Node, known_points, points_by_name, schema_of
 from posekit.formats.options import Options
 from posekit.geometry import PER_METRE, Array, from_metres, to_metres
 from posekit.settings import MAX_LENGTH_DEVIATION
@@ -55,14 +55,9 @@ def read(document: Any, path: str | Path, options: Options) -> View:
     InputError
         If a field is missing, unknown or wrong.
     """
-    root = Node(document, path)
-    check_schema(root, VIEW_SCHEMA)
-    root.object(FIELDS)
-    unit = root.at("unit").text(PER_METRE)
-    camera = camera_from(root.at("camera"), unit)
+    root, unit, camera, frames = _parts(document, path, MISSING)
     figure = root.at("figure", {})
     figure.object(FIGURE_FIELDS)
-    frames = list(root.at("frames").list(1))
     for frame in frames:
         frame.object(FRAME_FIELDS)
     images = [frame.at("image") for frame in frames]
@@ -106,6 +101,15 @@ def read(document: Any, path: str | Path, options: Options) -> View:
         source=str(path),
         pictures=pictures if len(pictures) == len(frames) else (),
     )
+
+
+def _parts(document: Any, path: str | Path, unit: Any) -> tuple[Node, str, CameraModel, list[Node]]:
+    """Return the root of a view's document, its unit (`unit` if it states none), its camera and its frames."""
+    root = Node(document, path)
+    check_schema(root, VIEW_SCHEMA)
+    root.object(FIELDS)
+    stated = root.at("unit", unit).text(PER_METRE)
+    return root, stated, camera_from(root.at("camera"), stated), list(root.at("frames").list(1))
 
 
 def check_schema(root: Node, *schemas: str) -> str:
@@ -258,15 +262,10 @@ def read_object(document: Any, path: str | Path, points: Sequence[str]) -> dict[
     InputError
         If a field is missing or wrong, or a point is not the object's.
     """
-    root = Node(document, path)
-    check_schema(root, VIEW_SCHEMA)
-    root.object(FIELDS)
-    unit = root.at("unit").text(PER_METRE) if root.has("unit") else "m"
-    camera = camera_from(root.at("camera"), unit)
+    root, unit, camera, frames = _parts(document, path, "m")
     if not isinstance(camera, ScaledOrthographicCamera):
         remedy = "another object than a person is recovered from uncalibrated views"
         raise root.at("camera").at("model").refused('"scaled-orthographic"', remedy)
-    frames = list(root.at("frames").list(1))
     truth = points_by_name([frame.at("truth", {}) for frame in frames], points, 3, "point of the object")
     return {
         "image": points_by_name([frame.at("image") for frame in frames], points, 2, "point of the object"),
