@@ -304,6 +304,36 @@ def test_bodies_of_glb_are_closed_capsules_on_the_links(tmp_path: Path) -> None:
     assert sorted(ends) == sorted(capsules)
 
 
+@pytest.mark.parametrize(("processor", "scale"), [(84, -1.0), (86, -1.0), (84, 0.1), (85, 0.1), (86, 0.1)])
+def test_a_repaired_c3d_keeps_its_other_points_and_its_analogue_values(
+    tmp_path: Path, processor: int, scale: float
+) -> None:
+    """Only the points of the body move, only where the whole body jumped; every other byte stays."""
+    names, count = list(FIGURE.configuration_names), 60
+    q = np.tile(FIGURE.neutral, (count, 1))
+    for name, middle, size in (("right_shoulder_flexion", 0.6, 0.5), ("left_elbow_flexion", 0.9, 0.4)):
+        q[:, names.index(name)] = middle + size * np.sin(np.arange(count) / 8)
+    q[:, 2] = 1.4
+    joints = FIGURE.points(q)
+    joints[40] += [0.3, 0.0, 0.0]
+    sword = np.full((count, 1, 3), 0.12)
+    points = 1000 * np.concatenate([joints[:, :7], sword, joints[:, 7:]], axis=1)
+    labels = [*JOINTS[:7], "sword", *JOINTS[7:]]
+    about = {"RATE": 30.0, "UNITS": ["mm"], "X_SCREEN": ["+Y"], "Y_SCREEN": ["+Z"]}
+    given = c3d(points, labels, processor=processor, scale=scale, analogues=5, point=about)
+    (tmp_path / "given.c3d").write_bytes(given)
+    assert not posekit.validate(tmp_path / "given.c3d").ok.all()
+    posekit.repair(tmp_path / "given.c3d", tmp_path / "repaired.c3d")
+    assert posekit.validate(tmp_path / "repaired.c3d").ok.all()
+    made = (tmp_path / "repaired.c3d").read_bytes()
+    row = (4 * len(labels) + 5) * (4 if scale < 0 else 2)
+    start = len(given) - count * row
+    changed = np.flatnonzero(np.frombuffer(given, np.uint8) != np.frombuffer(made, np.uint8))
+    number = (changed - start) % row // (4 if scale < 0 else 2)
+    assert len(made) == len(given) and set((changed - start) // row) == {40}
+    assert set(number // 4) == set(range(15)) - {7}
+
+
 @pytest.mark.parametrize("ending", [".glb", ".bvh", ".trc", ".c3d"])
 def test_alternative_postures_are_refused_by_formats_of_one_recording(tmp_path: Path, ending: str) -> None:
     alternatives = posekit.recover(posekit.builtin_view("seq1")).motion("all")

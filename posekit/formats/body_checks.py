@@ -299,13 +299,12 @@ def _check_depth(body: Array, source: str) -> None:
 
 def stature(body: Array) -> float:
     """Return the stature of joints (T, 14, 3) by the median limb's share of it, in their unit; NaN without a limb."""
-    found = []
-    for (start, end), share in LIMB_SHARES.items():
-        for side in SIDES:
-            length = _apart(body[:, JOINT[f"{side}_{start}"]], body[:, JOINT[f"{side}_{end}"]])
-            if np.isfinite(length):
-                found.append(length / share)
-    return float(np.median(found)) if found else float("nan")
+    statures = [
+        _apart(body[:, JOINT[f"{side}_{start}"]], body[:, JOINT[f"{side}_{end}"]]) / share
+        for (start, end), share in LIMB_SHARES.items()
+        for side in SIDES
+    ]
+    return float(np.nanmedian(statures)) if np.isfinite(statures).any() else float("nan")
 
 
 def body_unit(body: Array, stated: str, options: Options) -> tuple[str, float]:

@@ -40,11 +40,31 @@ _REMEDY: Final = "the file is cut off or damaged: export it again"
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class C3d:
-    """Points (T, P, 3) of a C3D file in its unit, NaN where not seen; its rate; parameters by ``GROUP:NAME``."""
+    """Contents of a C3D file.
+
+    Attributes
+    ----------
+    points : array (T, P, 3)
+        In the file's unit, NaN where a point was not seen.
+    rate : float
+        Frames a second; NaN if the file states none.
+    parameters : dict
+        Lists of text and arrays of numbers by ``GROUP:NAME``.
+    kind : str
+        NumPy's name of the type of the frames' numbers; empty for floats of DEC.
+    scale : float
+        Units in a whole number; 1 for floats.
+    start, width : int
+        First byte of the frames, and numbers a frame: four a point, then the analogue values.
+    """
 
     points: Array
     rate: float
     parameters: dict[str, Any]
+    kind: str
+    scale: float
+    start: int
+    width: int
 
     def texts(self, name: str) -> list[str]:
         """Return the texts of a parameter of the group POINT; empty if there are none."""
@@ -89,13 +109,17 @@ def parse(data: bytes, source: str) -> C3d:
         raise damaged("", got, f"{frames * width:,} for {frames:,} frames of {count:,} points")
     body = data[start : start + frames * width]
     values: NDArray[Any] = _floats(body, processor) if scale < 0 else np.frombuffer(body, f"{order}i2")
-    values = values.reshape(frames, -1)[:, : 4 * count].reshape(frames, count, 4)
+    values = values.reshape(frames, -1)
+    placed = values[:, : 4 * count].reshape(frames, count, 4)
     with np.errstate(invalid="ignore"):  # a NaN of the file is a missing point
-        points = values[..., :3].astype(np.float64)
-        points[~(values[..., 3] >= 0)] = np.nan
+        points = placed[..., :3].astype(np.float64)
+        points[~(placed[..., 3] >= 0)] = np.nan
     rates = (*_numbers(parameters, "POINT:RATE")[:1], rate)
     rate = next((one for one in rates if math.isfinite(one) and one > 0), math.nan)
-    return C3d(points=points * scale if scale > 0 else points, rate=rate, parameters=parameters)
+    kind = f"{order}i2" if scale > 0 else "" if processor == 85 else f"{order}f4"
+    scale = max(scale, 0.0) or 1.0
+    shape: dict[str, Any] = {"kind": kind, "scale": scale, "start": start, "width": values.shape[1]}
+    return C3d(points=points * scale, rate=rate, parameters=parameters, **shape)
 
 
 def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
@@ -205,6 +229,27 @@ def read(document: C3d, path: str, options: Options) -> Motion:
         up=UP_WORDS.get(next(iter(document.texts("Y_SCREEN")), "").casefold(), ""),
         partial=True,
     )
+
+
+def with_points(data: bytes, document: C3d, points: Array) -> bytes:
+    """Return the bytes of a file with other points (T, P, 3) in its unit; everything else stays byte for byte.
+
+    Unknown points keep their numbers. The result is empty for floats of DEC.
+    """
+    if not document.kind:
+        return b""
+    frames, count = points.shape[:2]
+    values = np.frombuffer(data, document.kind, frames * document.width, document.start).copy()
+    placed = values.reshape(frames, -1)[:, : 4 * count].reshape(frames, count, 4)
+    moved = np.isfinite(points).all(axis=-1) & (points != document.points).any(axis=-1)
+    numbers = points[moved] / document.scale
+    whole = document.kind.endswith(
+        "i2"
+    )  # posekit reads the file again, and says what a clipped number breaks
+    placed[moved, :3] = np.clip(np.round(numbers), -32768, 32767) if whole else numbers
+    placed[moved, 3] = np.maximum(placed[moved, 3], 0)  # a point that was not seen is known now
+    values.reshape(frames, -1)[:, : 4 * count] = placed.reshape(frames, -1)
+    return data[: document.start] + values.tobytes() + data[document.start + values.nbytes :]
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:

@@ -33,17 +33,21 @@ LEAST_POINTS: Final = 4
 
 
 def looks_like(table: Table) -> bool:
-    """Tell whether a table holds key points in pictures; points in space have a z and no confidence."""
+    """Return whether a table holds key points in pictures."""
+    return _reader(table) is not None
+
+
+def _reader(table: Table) -> Callable[[Table, Rows], None] | None:
+    """Return the function that reads a table; None for points in space, which have a z and no confidence."""
     if table.head and table.head[0][:1] == ["scorer"]:
-        return True
+        return _deeplabcut
     if set(CALISCOPE) <= set(table.names):
-        return True
+        return _caliscope
     points = _in_pictures(table.names)
-    if any(name.endswith("_ncams") for name in table.names):
-        return False  # Anipose's points in space have a score, too
     deep = any("z" in parts for parts in columns_of_points(table.names).values())
     sure = any("sure" in parts for parts in points.values())
-    return len(points) >= LEAST_POINTS and (sure or not deep)
+    in_space = any(name.endswith("_ncams") for name in table.names)  # Anipose's points have a score, too
+    return _row_a_picture if len(points) >= LEAST_POINTS and (sure or not deep) and not in_space else None
 
 
 def _in_pictures(names: Sequence[str]) -> dict[str, dict[str, str]]:
@@ -63,12 +67,7 @@ def read(table: Table, path: str | Path, options: Options) -> Detections:
         If a cell is not a number, or the names of the points fit no layout.
     """
     rows = Rows(source=str(path))
-    if table.head and table.head[0][:1] == ["scorer"]:
-        _deeplabcut(table, rows)
-    elif set(CALISCOPE) <= set(table.names):
-        _caliscope(table, rows)
-    else:
-        _row_a_picture(table, rows)
+    (_reader(table) or _row_a_picture)(table, rows)
     return detections_of(rows, options)
 
 

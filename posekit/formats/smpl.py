@@ -60,17 +60,16 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
     """
     outer, (document, keys) = document, _angles(document)
     parts = [np.asarray(document[key], dtype=np.float64).reshape(len(document[key]), -1) for key in keys]
-    count = N_JOINTS
-    if len({len(part) for part in parts}) > 1 or sum(part.shape[1] for part in parts) < 3 * count:
+    if len({len(part) for part in parts}) > 1 or sum(part.shape[1] for part in parts) < 3 * N_JOINTS:
         got = f"{' and '.join(keys)} of shapes {', '.join(str(part.shape) for part in parts)}"
-        expected = f"{3 * count} numbers a frame or more: rotation vectors of {count} joints"
+        expected = f"{3 * N_JOINTS} numbers a frame or more: rotation vectors of {N_JOINTS} joints"
         raise refusal(path, keys[0], got, expected, "correct the file")
     poses = np.concatenate(parts, axis=1)
     place = np.asarray(document[next(name for name in _PLACES if name in document)], dtype=np.float64)
     place = place / document.get("smpl_scaling", 1.0)  # AIST++: units of the place in a metre
     if place.shape != (len(poses), 3) or not len(poses):
         raise refusal(path, "trans", f"shape {place.shape}", f"({len(poses)}, 3)", "correct the file")
-    used = poses[:, : 3 * count].reshape(len(poses), count, 3)
+    used = poses[:, : 3 * N_JOINTS].reshape(len(poses), N_JOINTS, 3)
     if not (np.abs(used) < FARTHEST_COORDINATE).all() or not (np.abs(place) < FARTHEST_COORDINATE).all():
         raise refusal(path, keys[0], "a number that is not finite", "finite numbers", "correct the file")
     rest = _rest(document, options)

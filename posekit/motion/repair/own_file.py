@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from posekit.files import read_bytes, text
+from posekit.formats.c3d import with_points
 from posekit.formats.layout import load_layout
 from posekit.formats.npz_file import unpickled
 from posekit.formats.open import parsed
@@ -98,6 +99,8 @@ def in_own_file(
         written = _in_lines(text(data, str(path)), document, len(before), rows, change)
     elif container == "arrays":
         written = _in_arrays(data, str(path), change_array)
+    elif container == "c3d" and len(rows) == len(before):
+        written = with_points(data, document, change_array("", document.points))
     else:
         return b"", []
     following = f"left as they were, although they may follow from q: {', '.join(stale)}"
@@ -174,8 +177,7 @@ def _turned(before: Motion, after: Motion, rows: NDArray[np.intp]) -> Array:
         for one in (before, after)
     )
     step = turned_near(new - old[rows], 0.0, half_turn=180.0 if degrees else np.pi)
-    signs = np.array(turn.get("signs", (1.0, 1.0, 1.0)))
-    return np.asarray(np.where(np.abs(step) > TINY, step, 0.0) * signs)
+    return np.asarray(np.where(np.abs(step) > TINY, step, 0.0) * turn.get("signs", 1.0))
 
 
 def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], change: Change) -> bytes:
