@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,12 +27,14 @@ def opened(source: Source, layout: str = "", **facts: Any) -> Any:
     """Return the content of a path, or an array of joints or configurations as motion; other objects unchanged."""
     from posekit.formats import open as open_file
     from posekit.formats.options import facts_of
+    from posekit.motion import Motion
     from posekit.motion.validation import Judge
 
     if isinstance(source, str | PathLike):
         return open_file(source, layout, **facts)
     if isinstance(source, list | tuple | np.ndarray):
-        return Judge(None, facts.get("urdf", ""), {}).motion(source, facts_of(layout=layout, **facts))
+        read: Any = Judge(None, facts.get("urdf", ""), {}).motion(source, facts_of(layout=layout, **facts))
+        return replace(read, frame=None) if isinstance(read, Motion) else read  # rows are frames in order
     return source
 
 

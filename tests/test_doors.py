@@ -296,6 +296,8 @@ def test_configurations_are_converted_and_drawn(tmp_path: Path) -> None:
     robot = posekit.Validator("g1").robot
     q = np.tile(robot.neutral, (3, 1))
     posekit.convert(q, tmp_path / "g1.csv", urdf="g1", rate=50)
+    posekit.render(q, tmp_path / "g1.html", urdf="g1")
+    assert '"number":2' in (tmp_path / "g1.html").read_text()
     again = posekit.open(tmp_path / "g1.csv", urdf="g1")
     np.testing.assert_allclose(again.q, q, atol=1e-9)
     assert again.rate == pytest.approx(50)
