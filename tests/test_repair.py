@@ -236,6 +236,40 @@ def test_a_lifted_span_is_put_back_and_all_other_lines_stay(clean_bvh: Path, tmp
     assert {k for k, (a, b) in enumerate(pairs) if a != b} == set(range(SPAN.start, SPAN.stop))
 
 
+def saved(motion: posekit.Motion, path: Path) -> None:
+    """Save a motion; arrays and pickles, which posekit only reads, as people write them."""
+    if path.suffix == ".npy":
+        np.save(path, np.asarray(motion.joints, dtype=np.float32))
+    elif path.suffix == ".pkl":
+        held = {"joints": np.asarray(motion.joints), "joint_names": list(JOINTS), "fps": RATE, "up": "z"}
+        path.write_bytes(pickle.dumps(held))
+    else:
+        posekit.save(motion, path)
+
+
+@pytest.mark.parametrize(
+    "ending", ["json", "npz", "npy", "pkl", "csv", "tsv", "trc", "bvh", "c3d", "parquet"]
+)
+@pytest.mark.parametrize("fault", ["jump", "lifted"])
+def test_a_repaired_file_passes_from_its_file_and_a_second_repair_copies_it(
+    clean: posekit.Motion, tmp_path: Path, ending: str, fault: str
+) -> None:
+    paths = [tmp_path / f"{name}.{ending}" for name in ("clean", "broken", "copied", "repaired", "again")]
+    given, broken, copied, repaired, again = paths
+    facts = {"rate": RATE, "up": "+z"} if ending == "npy" else {}
+    saved(clean, given)
+    saved(replace(clean, joints=FAULTS[fault](np.asarray(clean.joints))), broken)
+    assert posekit.validate(given, **facts).ok.all()
+    assert not posekit.validate(broken, **facts).ok.all()
+    repair(given, copied, **facts)
+    assert copied.read_bytes() == given.read_bytes()
+    done = repair(broken, repaired, **facts)
+    assert posekit.validate(repaired, **facts).ok.all(), done.notes
+    assert not any("left: " in note for note in done.notes)
+    repair(repaired, again, **facts)
+    assert again.read_bytes() == repaired.read_bytes()
+
+
 def test_a_first_frame_at_rest_becomes_part_of_the_motion(clean: posekit.Motion) -> None:
     joints = np.asarray(clean.joints).copy()
     rest = np.asarray(posekit.load_figure().neutral_points[:14])
@@ -377,6 +411,21 @@ def test_configurations_come_back_inside_limits_and_apart(tmp_path: Path) -> Non
     np.testing.assert_allclose(after[1, 1:], 0.0, atol=1e-6)
     assert not robot.collisions(after).hit.any()
     assert np.linalg.norm(after[2] - q[2]) < 0.8
+
+
+def test_a_table_of_an_arm_is_judged_and_repaired_like_its_configurations(tmp_path: Path) -> None:
+    urdf, path, target = two_links(tmp_path), tmp_path / "arm.csv", tmp_path / "repaired.csv"
+    robot = posekit.load_robot(urdf, fixed_base=True)
+    q = np.column_stack([0.5 * np.sin(np.arange(FRAMES) / RATE), np.full(FRAMES, 0.3), np.full(FRAMES, -0.2)])
+    q[SPAN, 0] = 3.0
+    rows = [f"{k / RATE:.6f},{a:.6f},{b:.6f},{c:.6f}" for k, (a, b, c) in enumerate(q)]
+    path.write_text("\n".join(["time,a,b,c", *rows]) + "\n")
+    by_array, by_file = (posekit.validate(one, urdf=robot, rate=RATE) for one in (q, path))
+    assert by_array.invalid[SPAN].all()
+    np.testing.assert_array_equal(by_file.invalid, by_array.invalid)
+    assert "teleport" in by_file.not_asked
+    done = repair(path, target, urdf=robot, rate=RATE)
+    assert posekit.validate(target, urdf=robot, rate=RATE).ok.all(), done.notes
 
 
 def test_a_robots_table_keeps_its_columns_and_its_other_rows(tmp_path: Path) -> None:

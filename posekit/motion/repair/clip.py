@@ -215,11 +215,10 @@ class Clip:
             return self
         report = self.report(over_time=False)
         bad = np.flatnonzero(report.invalid & self.placed())
+        if not bad.size:
+            return self
         clip = self
-        goals = (
-            [self.pushed(bad, report), *self.good(bad, ~report.invalid & self.placed())] if bad.size else []
-        )
-        for goal in goals:
+        for goal in (self.pushed(bad, report), *self.good(bad, ~report.invalid & self.placed())):
             left = clip.invalid(bad)
             clip = clip.eased(bad[left], goal[left]) if left.any() else clip
         return clip if self.motion.in_time else clip.restored(bad, self.state[bad])

@@ -154,9 +154,8 @@ def _columns_of(
 
 def _apart(values: Array, wanted: Array) -> Array:
     """Return the largest difference over the frames where something is known; infinite where nothing is."""
-    off = np.abs(values - wanted)
-    known = np.isfinite(wanted) | np.zeros(off.shape, dtype=np.bool_)
-    off = np.where(known, np.nan_to_num(off, nan=np.inf), 0.0).max(axis=0, initial=0.0)
+    known, off = np.isfinite(wanted), np.nan_to_num(np.abs(values - wanted), nan=np.inf)
+    off = np.where(known, off, 0.0).max(axis=0, initial=0.0)
     return np.where(known.any(axis=0), off, np.inf)
 
 

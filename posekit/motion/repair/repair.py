@@ -245,7 +245,8 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
             whole = [clip.following(first) for clip, first in zip(clips, whole, strict=True)]
             after = _joined(clips, now)
             data, lost = _in_its_file(now, after, clips, facts)
-            notes = [note for one, clip in zip(given, whole, strict=True) for note in _told(one, clip)]
+            pairs, several = zip(given, whole, strict=True), len(whole) > 1
+            notes = [note for one, clip in pairs for note in _told(one, clip, several=several)]
             refused = f"the columns of {Path(motion.source).name} cannot hold the repair; joints are written"
             held = [(after, b"", [refused] if data else [])]
             if data:
@@ -290,8 +291,8 @@ def _in_its_file(
     return in_own_file(before.source, before, after, np.concatenate(rows))
 
 
-def _told(given: Clip, clip: Clip) -> list[str]:
-    """Say what was changed and what was invented."""
+def _told(given: Clip, clip: Clip, *, several: bool) -> list[str]:
+    """Return one note for each kind of change and of invented frames, with its clip if there are several."""
     rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
     moved = np.nan_to_num(clip.state - given.state[rows])
     changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
@@ -313,7 +314,7 @@ def _told(given: Clip, clip: Clip) -> list[str]:
     if not isinstance(clip, RobotClip) and not clip.mirrored:
         way = np.linalg.norm(moved[:, : len(JOINTS)], axis=-1).max(initial=0.0)
         notes.append(f"joints moved by up to {100 * way:.3g} cm")
-    return [f"{clip.motion.clips[0]}: {note}" for note in notes] if clip.motion.clips else notes
+    return [f"{clip.motion.clips[0]}: {note}" for note in notes] if several else notes
 
 
 def _changed(count: int, frames: int) -> str:
