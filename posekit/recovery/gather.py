@@ -98,9 +98,10 @@ class Gathering:
             Leave frames open in which nothing passes.
         """
         every, joints = columns["frame"], columns["joints"]
-        start, end = np.array(SEGMENTS).T
-        ahead = (joints[:, end, 2] - joints[:, start, 2]) * self.nearer[every]
-        reason = np.where((ahead < -LEVEL_METRES).any(axis=1) & (reason == ""), "nearer/given", reason)
+        if self.nearer.any():
+            start, end = np.array(SEGMENTS).T
+            ahead = (joints[:, end, 2] - joints[:, start, 2]) * self.nearer[every]
+            reason = np.where((ahead < -LEVEL_METRES).any(axis=1) & (reason == ""), "nearer/given", reason)
         for row in np.flatnonzero(reason != "").tolist():
             lost[int(every[row])][str(reason[row])] += 1
         rows = np.flatnonzero(reason == "")
