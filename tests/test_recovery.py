@@ -112,6 +112,20 @@ def test_a_frame_does_not_depend_on_its_neighbours(random_frames, found):
         np.testing.assert_allclose(alone.answer, found[k].answer, atol=1e-9)
 
 
+def test_an_exact_frame_of_a_long_film_is_recovered_as_alone():
+    view = random_views(600, np.random.default_rng(4))
+    view = replace(view, head_image=np.empty(0), root=view.truth[:, 0])
+    together = recover(view)
+    for k in (0, 255, 256, 511, 512, 599):
+        own, alone = together[k], recover(view.take([k]))[0]
+        assert own.branch.tolist() == alone.branch.tolist() and own.rejected == alone.rejected
+        assert own.levels == alone.levels and own.levels[-1] == len(own)
+        assert len(own) + sum(own.rejected.values()) == 8192
+        np.testing.assert_allclose(own.probability, alone.probability, atol=1e-9)
+        np.testing.assert_allclose(own.answer, alone.answer, atol=1e-9)
+        assert (own.representatives - together.rows(k).start).tolist() == alone.representatives.tolist()
+
+
 def test_noisy_survivors_reproject_within_the_noise(random_frames, found):
     table = found.survivors
     image = random_frames.camera.project(table.joints)

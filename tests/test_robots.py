@@ -21,11 +21,17 @@ LIMIT = '<limit lower="-1" upper="2" effort="10" velocity="10"/>'
 
 
 def joint(
-    name: str, parent: str, child: str, kind: str = "revolute", inside: str = LIMIT, z: float = 0.4
+    name: str,
+    parent: str,
+    child: str,
+    kind: str = "revolute",
+    inside: str = LIMIT,
+    z: float = 0.4,
+    axis: str = "0 1 0",
 ) -> str:
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0.1 0 {z}" rpy="0.1 0.2 0.3"/><axis xyz="0 1 0"/>{inside}</joint>'
+        f'<origin xyz="0.1 0 {z}" rpy="0.1 0.2 0.3"/><axis xyz="{axis}"/>{inside}</joint>'
     )
 
 
@@ -44,9 +50,9 @@ def mimic(of: str) -> str:
 
 ALL_KINDS = text(
     *map(link, "abcdefg"),
-    joint("hinge", "a", "b"),
-    joint("turn_joint", "b", "c", "continuous", ""),
-    joint("slide", "c", "d", "prismatic"),
+    joint("hinge", "a", "b", axis="0.6 0 -0.8"),
+    joint("turn_joint", "b", "c", "continuous", "", axis="0 -0.8 0.6"),
+    joint("slide", "c", "d", "prismatic", axis="0 0 -1"),
     joint("follower", "b", "e", inside=mimic("hinge")),
     joint("second", "e", "f", inside=mimic("follower")),
     joint("plane", "d", "g", "planar", ""),
