@@ -338,10 +338,15 @@ def test_joint_maps_stand_for_a_body(name: str) -> None:
     assert (hips - knees) @ up > 0 and (knees - ankles) @ up > 0 and (neck - hips) @ up > 0
 
 
-def test_an_arm_is_no_humanoid() -> None:
+def test_an_arm_is_no_humanoid(tmp_path: Path) -> None:
     arm = load_robot("panda", bodies="none", fixed_base=True)
+    assert np.isnan(arm.points(arm.neutral)).all()
     with pytest.raises(InputError, match="joint map"):
-        arm.points(arm.neutral)
+        arm.configurations(np.zeros((14, 3)))
+    # Its files are judged by their configurations.
+    np.savez(tmp_path / "arm.npz", q=np.tile(arm.neutral, (20, 1)))
+    report = posekit.validate(tmp_path / "arm.npz", urdf=arm)
+    assert report.ok.all() and "joint-range" in report.checks
 
 
 def test_a_file_of_an_arm_is_judged_like_its_array(tmp_path: Path) -> None:

@@ -245,7 +245,6 @@ def validate_motion(
         )
     # The points of configurations cost as much as all checks except collision.
     placed = motion.in_time or any("joints" in check.reads for check in checks)
-    placed = placed and (robot is None or robot.humanoid)
     reports = []
     for name, recording in motion.recordings():
         part, used, residual = recording, robot, None

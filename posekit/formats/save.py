@@ -88,7 +88,7 @@ def with_points(motion: Motion) -> Motion:
     Raises
     ------
     InputError
-        If it is not known which robot it is, or the robot has other joints.
+        If it is not known which robot it is, or the robot is not a humanoid or has other joints.
     """
     if not motion.robot or motion.q is None:
         remedy = "give it with --urdf" + (
@@ -98,6 +98,9 @@ def with_points(motion: Motion) -> Motion:
     from posekit.robots import load_robot
 
     robot = load_robot(motion.robot, bodies="none")
+    if not robot.joint_map:
+        remedy = "give a robot with limbs, or write .npz"
+        raise refusal(motion.source, "robot", f"{robot.name} without joints of a body", "a humanoid", remedy)
     q = motion.q
     if motion.q_names and tuple(motion.q_names) != tuple(robot.configuration_names):
         q, _ = robot.q_from_columns(motion.q_names, q)

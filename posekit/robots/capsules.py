@@ -30,7 +30,8 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     Parameters
     ----------
     robot : Robot
-        Its own primitive shapes stay. A humanoid without any body gets a capsule for every part.
+        Its own primitive shapes stay. A humanoid without any body gets a capsule for every part. A robot that is not
+        a humanoid gets none, as nothing is known of its shape.
     figure : Robot
         The stick figure, whose capsules are laid along the limbs in the same proportions.
     """
@@ -42,8 +43,6 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
                 frame = model.getFrameId(link.get("name", ""), pin.FrameType.BODY)
                 meshed.add(model.frames[frame].parentJoint)
     geometry = build_bodies(model, plain, (), robot.source, "collision")
-    if not robot.humanoid:  # nothing is known of its shape
-        return geometry
     data, place = _neutral(robot)
     only = meshed if meshed or geometry.ngeoms else range(model.njoints)
     shapes = _proportions(figure)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import refusal
 from posekit.geometry import Array, Ints, align, mean_known
+from posekit.robots.urdf import need
 from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, POINTS
 
 if TYPE_CHECKING:
@@ -157,6 +158,8 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     given = given[None] if given.ndim == 2 else given
     if given.ndim != 3 or given.shape[1:] != (len(JOINTS), 3):
         raise refusal("", "joints", f"shape {given.shape}", f"(N, {len(JOINTS)}, 3)", "order them as JOINTS")
+    lacking = "no joints whose names stand for shoulders, elbows, hips and knees of both sides"
+    need(robot.source, robot.joint_map, "", lacking, "a humanoid", "give a joint map (posekit.joint_map/1)")
     problem = _Problem(robot, given)
     first = problem.laid(robot.neutral) if start is None else problem.inside(robot.checked(start, "start"))
     q, cost = _descend(problem, first, first, np.arange(len(given)))

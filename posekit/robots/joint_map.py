@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from posekit.errors import nearest, refusal, shown
+from posekit.errors import nearest, shown
 from posekit.files import read_table
 from posekit.robots.kinematics import Site
 from posekit.robots.urdf import need
@@ -45,26 +45,16 @@ def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
     return {point: found[point] for point in POINTS if point in found}
 
 
-def find_joint_map(model: pin.Model, source: str = "") -> JointMap:
-    """Choose the built-in map whose frames a model has, or derive one from the names of its joints.
-
-    Raises
-    ------
-    InputError
-        If neither is possible.
-    """
+def find_joint_map(model: pin.Model) -> JointMap:
+    """Return the first built-in map whose frames a model has, or a map from its joints' names; empty if none fits."""
     for name in BUILT_IN:
         if all(model.existFrame(frame) for frame, _ in _places(name).values()):
             return load_joint_map(name, model)
-    if (derived := _derived(model)) is not None:
-        return derived
-    got = "no joints whose names stand for shoulders, elbows, hips and knees of both sides"
-    remedy = f"write a joint map ({SCHEMA}) that names the model's frames"
-    raise refusal(source or model.name, "", got, "a humanoid", remedy)
+    return _derived(model)
 
 
-def _derived(model: pin.Model) -> JointMap | None:
-    """Derive a map from the names of the moving joints; None if an elbow, a knee, a shoulder or a hip is missing.
+def _derived(model: pin.Model) -> JointMap:
+    """Derive a map from the names of the moving joints; empty if an elbow, a knee, a shoulder or a hip is missing.
 
     If a shoulder or a hip has several joints, the middle one is used, near which all axes pass; elsewhere the first
     joint with such a name is used. The neck is the middle between the shoulders on the body that carries the arms, the
@@ -80,7 +70,7 @@ def _derived(model: pin.Model) -> JointMap | None:
         if side and part and model.nvs[joint] == 1:
             chains.setdefault(f"{side}_{part}", []).append(joint)
     if not all(f"{side}_{part}" in chains for side in SIDES for part in ("shoulder", "elbow", "hip", "knee")):
-        return None
+        return {}
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     points = {

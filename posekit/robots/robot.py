@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from posekit.errors import InputError, cut, one_line, refusal, shown
+from posekit.errors import cut, one_line, refusal, shown
 from posekit.files import read_bytes, text
 from posekit.geometry import Array, Record, read_only
 from posekit.robots.bodies import build_bodies, link_of
@@ -188,22 +188,16 @@ class Robot(Record):
     def joint_map(self) -> JointMap:
         """The frames that stand for the 14 joints: a built-in or a given map, or one from the names of the joints.
 
+        It is empty if the robot is not a humanoid.
+
         Raises
         ------
         InputError
-            If the robot is not a humanoid, or the given map does not fit.
+            If the given map does not fit.
         """
         if self.joint_map_file:
             return load_joint_map(self.joint_map_file, self.model)
-        return find_joint_map(self.model, self.source)
-
-    @cached_property
-    def humanoid(self) -> bool:
-        """Whether the robot has a joint map: the given map, or a map that fits its joints."""
-        try:
-            return bool(self.joint_map_file or self.joint_map)
-        except InputError:
-            return False
+        return find_joint_map(self.model)
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -300,7 +294,7 @@ class Robot(Record):
         Raises
         ------
         InputError
-            If the robot has no joint map, or q is not as `checked` requires.
+            If the given joint map does not fit, or q is not as `checked` requires.
         """
         out = np.full((len(q := self.checked(q)), len(POINTS), 3), np.nan)
         out[:, [POINTS.index(name) for name in self.joint_map]] = self.kinematics.positions(q)

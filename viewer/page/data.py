@@ -170,7 +170,7 @@ def _points(motion: Motion, robot: Robot, q: Array) -> Array:
 
 def _joints(robot: Robot, q: Array) -> Array:
     """Return the joints of a body as points (T, 19, 3); head points and missing joints are NaN."""
-    known = np.isfinite(q).all(axis=1) & robot.humanoid
+    known = np.isfinite(q).all(axis=1)
     joints = np.full((len(q), len(JOINTS), 3), np.nan)
     joints[known] = robot.points(q[known])[:, : len(JOINTS)]
     return _with_head(joints)
