@@ -1,10 +1,11 @@
-"""How many planted defects are found, named rightly and in the right frames.
+"""Share of planted defects that the right check finds in the right frames.
 
     python -m benchmarks.defects [--data DIR] [--clips 25] [--seed 0] [--only KIND,KIND] [--half 1] [--missed]
 
-Each kind of defect is put into a span of each clip. It is found if a check that names it rejects frames
-whose first and last are at most three from those of the span. Feet that slide, float or sink are put into
-spans in which a foot stands. `--half 0` takes the clips with even numbers, `--half 1` those with odd ones.
+The benchmark plants each kind of defect into a span of each clip. A defect counts as found if the first and
+the last frame that the right check rejects are at most three frames from the ends of the span. Sliding,
+floating and sinking feet are planted into spans in which a foot stands. `--half 0` uses the clips with even
+numbers, `--half 1` the clips with odd numbers. `--missed` lists the defects that are not found.
 """
 
 from __future__ import annotations
@@ -33,7 +34,11 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of defect: what names it, and how it is planted: (points, span, up, step, generator) to points."""
+    """A kind of defect.
+
+    `checks` are the right checks, or `warning` a word of the right warning. `plant` returns points with the
+    defect by points, span, up, seconds a frame and a generator; `frames` bounds the length of the span at 30 Hz.
+    """
 
     checks: tuple[str, ...]
     plant: Callable[..., Any]
@@ -186,14 +191,14 @@ KINDS = {
 
 
 def named(report: Report, kind: Kind) -> Span | None:
-    """Return first and last frame that the right checks reject."""
+    """Return the first and the last frame that the right checks reject; None if there are none."""
     which = [k for k, name in enumerate(report.checks) if name in kind.checks]
     rows = report.findings["row"][np.isin(report.findings["check"], which)]
     return (int(rows.min()), int(rows.max())) if len(rows) else None
 
 
 def standing(motion: Motion, points: Array, up: Array) -> NDArray[np.bool_]:
-    """Return in which frames a toe, or an ankle without toes, is near the ground and slower than 0.1 m/s."""
+    """Return whether a toe (or an ankle, if toes are unknown) stands in each frame: near the ground, below 0.1 m/s."""
     toes = [NAMES.index(f"{side}_toe") for side in ("right", "left")]
     feet = points[:, toes]
     if np.isnan(feet).all():
@@ -204,7 +209,7 @@ def standing(motion: Motion, points: Array, up: Array) -> NDArray[np.bool_]:
 
 
 def spans_of(kind: Kind, stands: NDArray[np.bool_], rate: float, rng: np.random.Generator) -> Span | None:
-    """Draw a span that fits the kind, eight frames or more from the ends; None if there is none."""
+    """Return a random span for the kind, eight frames or more from the ends; None if none fits."""
     count = len(stands)
     least, most = (max(1, round(one * rate / 30)) if one > 1 else one for one in kind.frames)
     if not most:
@@ -223,7 +228,7 @@ def spans_of(kind: Kind, stands: NDArray[np.bool_], rate: float, rng: np.random.
 
 
 def try_kind(name: str, motion: Motion, rng: np.random.Generator) -> tuple[bool, str] | None:
-    """Plant one defect: whether it is found, and what was named; None if it does not fit the clip."""
+    """Plant one defect; return whether it is found, and the findings. Return None if it does not fit the clip."""
     kind, points, up = KINDS[name], motion.points(NAMES), motion.up_vector
     assert up is not None  # clips without an up axis are left out
     rate, count = motion.rate or 30.0, len(motion)
@@ -249,7 +254,7 @@ def try_kind(name: str, motion: Motion, rng: np.random.Generator) -> tuple[bool,
     told = f"planted {span}, named {found}, all {said}"
     if found is None:
         return False, told
-    if "slow" in name:  # from where the body is off by more than is allowed, to the end
+    if "slow" in name:  # findings start where the height exceeds its bound, and last to the end
         return found[1] >= count - 1 - SPAN_TOLERANCE and abs(found[0] - span[0]) < 0.6 * length, told
     return all(abs(a - b) <= SPAN_TOLERANCE for a, b in zip(found, span, strict=True)), told
 

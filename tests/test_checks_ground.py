@@ -202,6 +202,12 @@ def test_a_trunk_without_legs_has_any_height() -> None:
     assert not judged(joints, checks=["orientation"]).invalid.any()
 
 
+def test_a_body_without_a_trunk_has_no_orientation() -> None:
+    joints = standing()
+    joints[:, JOINT["neck"]] = np.nan
+    assert judged(joints).not_asked["orientation"] == "it needs neck and pelvis in one frame"
+
+
 def test_upside_down_is_measured_from_up() -> None:
     joints = standing() * [1.0, -1.0, -1.0] + (np.arange(N) / RATE)[:, None, None] * [0.3, 0.0, 0.0]
     rows = rows_of(judged(joints, checks=["orientation"]), "orientation")

@@ -61,6 +61,8 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     if not body.motion or len(body) < FEWEST_FRAMES:
         raise NotAskedError(f"it needs {FEWEST_FRAMES} frames of motion")
     trunk = unit(body.joints[:, JOINT["neck"]] - body.joints[:, JOINT["pelvis"]])
+    if np.isnan(trunk).all():
+        raise NotAskedError("it needs neck and pelvis in one frame")
     cosine = dot(trunk, up_of(body))
     inverted = _inverted(body, cosine, upside_down)
     axis = None if inverted else _other_up(body, trunk, cosine, aligned)
