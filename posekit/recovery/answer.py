@@ -13,13 +13,13 @@ from posekit.skeleton import PARENTS, TREE_SEGMENTS
 #: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
 WITHIN_METRES: Final = 0.05
 
-#: Probability that representatives stand for together.
+#: Total probability of the postures for which representatives stand.
 REPRESENTED: Final = 0.95
 
-#: Samples of each mode: `sure` is then known to 0.06 where one mode holds everything, better where several do.
+#: Samples of each mode. The standard error of `sure` is 0.06 if one mode has all the probability, less otherwise.
 N_SAMPLES: Final = 64
 
-#: Postures of a frame that are compared each with each; of more, the likeliest stand for the rest.
+#: Largest number of postures of a frame that are compared with each other, the likeliest first.
 MAX_COMPARED: Final = 600
 
 #: Modes that are sampled at once: they stay in the processor's cache.
@@ -28,16 +28,16 @@ SAMPLED_AT_ONCE: Final = 64
 #: Probabilities that differ by less are equal.
 ROUNDED_PROBABILITY: Final = 1e-9
 
-#: Degrees of freedom of the distribution within a mode, t, as of other misfits: a few lengths are far off, spines bend.
+#: Degrees of freedom of the t distribution within a mode: its tails stand for lengths that are far off and bent spines.
 TAIL_DEGREES_OF_FREEDOM: Final = 4
 
-#: Its scale over the deviation: the 97.5 % quantiles of the normal and of that t distribution, so that the radius that
-#: holds 95 % is the same.
+#: Scale of that t distribution relative to the standard deviation: the ratio of the 97.5 % quantiles of the normal and
+#: the t distribution, so that 95 % lies within the same radius.
 TAIL_SCALE: Final = 1.960 / 2.776
 
 
 def _tailed_draws() -> Array:
-    """Draw t distributed numbers, the same for every mode; with their opposites, so that means are exact."""
+    """Return fixed t distributed numbers (64, 42), each row with its negative, so that their mean is zero."""
     rng = np.random.default_rng(1985)
     normal = rng.normal(size=(N_SAMPLES // 2, 42))
     spread = np.sqrt(TAIL_DEGREES_OF_FREEDOM / rng.chisquare(TAIL_DEGREES_OF_FREEDOM, len(normal)))
@@ -47,8 +47,8 @@ def _tailed_draws() -> Array:
 
 DRAWS: Final = _tailed_draws()
 
-#: Variance (square metres, and relative to the trace) added to every covariance: a given neck has none, and rounding
-#: may leave a little less.
+#: Variance (square metres, and relative to the trace) added to every covariance, which may be singular: a given neck
+#: has no variance.
 ROUNDING: Final = 1e-8
 
 #: 95 % quantile of the standard normal distribution.
@@ -91,7 +91,7 @@ def answers_of(
     Returns
     -------
     dict
-        Columns of `posekit.recovery.Answer`; rows of survivors are counted from the first of each frame.
+        Columns of `posekit.recovery.Answer`; survivors are numbered from the first one of each frame.
     """
     starts = np.flatnonzero(np.diff(frame, prepend=-1))
     weight = probability / np.add.reduceat(probability, starts)[frame]
@@ -103,7 +103,7 @@ def answers_of(
     )
     rows, held = zip(*(representatives(*part) for part in parts), strict=True)
     if covariance is None:
-        # Between exact postures there is none: the answer is the one that stands for the most probability.
+        # A mean of exact postures is no posture: the answer is the first representative.
         survivor = np.array([one[0] for one in rows])
         laid = shape[starts + survivor]
     else:
@@ -139,7 +139,7 @@ def answers_of(
 
 
 def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Array]:
-    """Choose few postures of a frame: those within 5 cm of them in every joint have a given probability.
+    """Choose few postures of a frame so that postures within 5 cm of them have a given total probability.
 
     Parameters
     ----------
@@ -148,14 +148,14 @@ def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Arr
     weight : array (N,)
         Their probabilities; they sum to one.
     hold : float
-        Probability that is to be held.
+        Total probability to reach.
 
     Returns
     -------
     rows : int array (R,)
-        Representatives. The one that stands for the most probability comes first.
+        Representatives; the one that stands for the most probability comes first.
     held : array (R,)
-        Probability of each and of the postures for which it newly stands.
+        Probability of each representative and of the postures near it that no earlier one stands for.
     """
     near, rest = _near(shape[:MAX_COMPARED]).astype(np.float64), weight[:MAX_COMPARED]
     found: list[tuple[float, int]] = []
@@ -183,10 +183,10 @@ def _near(places: Array) -> Flags:
 
 
 def joint_radius(covariance: Array) -> Array:
-    r"""Return the radius that holds a joint with 95 % probability, of covariances (..., 3, 3), metres.
+    r"""Return the radii (...) in metres within which joints with covariances (..., 3, 3) lie with 95 % probability.
 
-    The squared distance is a weighted sum of three chi-square variables; a gamma distribution with its mean and
-    variance stands for it (Satterthwaite 1946), by the cube root that is nearly normal (Wilson & Hilferty 1931).
+    The squared distance is a weighted sum of three chi-square variables. It is approximated by a gamma distribution of
+    equal mean and variance (Satterthwaite 1946), whose cube root is nearly normal (Wilson & Hilferty 1931).
     """
     mean = np.einsum("...ii->...", covariance)
     variance = 2 * np.einsum("...ij,...ij->...", covariance, covariance)
@@ -198,7 +198,7 @@ def joint_radius(covariance: Array) -> Array:
 
 
 def _drawn(covariance: Array, relative: Flags) -> Array:
-    """Draw the errors of modes (N, S, 14, 3), relative to the neck where this is asked."""
+    """Return samples of the errors of modes (N, S, 14, 3), metres; relative to the neck if `relative` (N,)."""
     floor = ROUNDING * (1.0 + np.einsum("nii->n", covariance))
     symmetric = (covariance + covariance.transpose(0, 2, 1)) / 2
     root = np.linalg.cholesky(symmetric + floor[:, None, None] * np.eye(covariance.shape[1]))

@@ -1,4 +1,4 @@
-"""Certification: every survivor passes the checks of postures, with the tolerance that its noise leaves."""
+"""Certification: checks of postures, with tolerances that allow for the noise of the view."""
 
 from __future__ import annotations
 
@@ -23,22 +23,23 @@ ALLOWED_DEVIATIONS: Final = 3.0
 #: Standard deviation with which joint limits pull under noise, degrees.
 LIMIT_DEGREES: Final = 2.0
 
-#: Overlap of bodies that depths under noise explain, with ALLOWED_DEVIATIONS of a forearm's length beside it, as it is
-#: before other parts most often; overlap before an uncalibrated camera, whose joints are off by 3 to 5 cm; metres.
+#: Overlap of bodies (metres) that errors of depth explain; the length (metres) of a forearm, which overlaps other parts
+#: most often and whose own error is added; and the overlap (metres) before an uncalibrated camera, where joints are off
+#: by 3 to 5 cm.
 CONTACT_METRES, FOREARM_METRES, PHOTOGRAPH_CONTACT_METRES = 0.03, 0.24, 0.06
 
 
 def certified(
     judge: PostureJudge, checks: Iterable[Check], points: Array
 ) -> tuple[NDArray[np.str_], dict[str, Array]]:
-    """Judge postures (N, 19, 3); head points are NaN where not known.
+    """Judge postures (N, 19, 3); unknown head points are NaN.
 
     Returns
     -------
     reason : str array (N,)
-        ``check/place`` of the worst violation of each; empty if it passes.
+        ``check/place`` of the worst violation of each posture; empty if the posture passes.
     margins : dict of str to array (N,)
-        Worst margin of each check, in its unit; NaN where it decided nothing.
+        Worst margin of each posture by check, in the check's unit; NaN if the check decided nothing.
     """
     rows, worst, reason = np.arange(len(points)), np.zeros(len(points)), [""] * len(points)
     margins: dict[str, Array] = {}
@@ -77,7 +78,7 @@ def noisy_judge(
 
 
 def solver_limits(figure: Figure, checks: Iterable[Check], ranges: str) -> Limits | None:
-    """Return the joint ranges that pull at the solver's postures; None if no check asks for them."""
+    """Return the joint ranges that the solver uses as soft limits; None if joint ranges are not checked."""
     table = load_ranges(ranges)
     asked = "joint-range" in [check.name for check in checks]
     return limits_of(figure, table) if asked and (table is None or table["kind"] == "anatomical") else None

@@ -38,17 +38,17 @@ VERSIONED: Final = {"posekit": posekit, "pin": pinocchio, "numpy": np}
 #: enough to keep memory small. The result does not depend on them.
 GROWN_AT_ONCE, SOLVED_AT_ONCE = 256, 64
 
-#: Modes of a frame that are certified and ranked, by chi2: frames with more are rare, and the rest improbable.
+#: Largest number of modes of a frame that are certified and ranked, those of least chi2; few frames have more.
 MANY: Final = 3000
 
-#: Largest chi2 of the best mode of exact points, with `SHARP_PIXELS`: noise of a pixel leaves some 30.
+#: Largest chi2 of the best mode of exact points under `SHARP_PIXELS`; noise of 1 pixel causes about 30.
 EXACT_CHI2: Final = 0.05
 
-#: Factor on the deviations of image points, relative deviation added to lengths, and largest chi2 of the solve that
-#: finds why a frame is empty.
+#: Factor on the deviations of image points, relative deviation added to lengths, and largest chi2 of the solution that
+#: explains why a frame is empty.
 LOOSE_TIMES, LOOSE_LENGTHS, LOOSE_CHI2 = 20.0, 0.1, 1e3
 
-#: Standard deviations from which a residual explains an empty frame, and residuals that are named.
+#: Least size (standard deviations) of a residual that explains an empty frame, and largest number of named residuals.
 NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
 
 
@@ -67,7 +67,7 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
     Raises
     ------
     InputError
-        If a setting has no meaning for such a view, or the view contradicts itself.
+        If a setting does not apply to such a view, or the view contradicts itself.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
 
 
 class _Conductor:
-    """Facts that all frames of a view share: person, noise, checks, and the way up."""
+    """Facts that all frames of a view share: person, noise, checks, and the direction up."""
 
     def __init__(self, view: View, settings: RecoverSettings, figure: Figure | None) -> None:
         person = figure_of_view(view, settings, figure)
@@ -135,7 +135,7 @@ class _Conductor:
         yield partial(self._solve, sharp=False), SOLVED_AT_ONCE
 
     def _grow(self, part: Ints) -> None:
-        """Grow the exact trees of some frames; frames whose points cannot be exact are left open."""
+        """Grow the exact trees of frames `part`; frames whose points cannot be exact stay open."""
         whole = np.isfinite(self.sight.root).all(axis=1) & np.isfinite(self.sight.image).all(axis=(1, 2))
         sight = self.sight.take(np.flatnonzero(whole & np.isin(self.sight.frame, part)))
         if not len(sight.frame):
@@ -170,7 +170,7 @@ class _Conductor:
         }
         deviation = deviation_of_tolerance(tolerance.rigid)
         terms = log_terms(joints, deviation=deviation, lengths=lengths, length_residual=short, up=self.up)
-        # The tree asked checks about the points that they name; what has parts has named all that it reads.
+        # The tree has judged checks with parts completely, and other checks only by the points that they name.
         late = [check for check in self.checks if not hasattr(check, "parts")]
         reason = np.full(len(joints), "")
         if late:
@@ -180,7 +180,7 @@ class _Conductor:
             self.found.frames["levels"][k] = levels[k].tolist()
 
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
-        """Return the frames in which a branch closes torso and hips exactly, which only exact image points do."""
+        """Return the frames with exact image points: in them a branch closes torso and hips exactly."""
         start, end = np.array(RIGID_SEGMENTS).T
         apart = np.linalg.norm(joints[:, start] - joints[:, end], axis=2)
         off = np.abs(apart - self.found.lengths[-len(RIGID_SEGMENTS) :])
@@ -192,7 +192,7 @@ class _Conductor:
         return closing
 
     def _solve(self, part: Ints, *, sharp: bool) -> None:
-        """Solve some frames under noise; `sharp` treats points and lengths as exact, and leaves empty frames open."""
+        """Solve frames `part` under noise; if `sharp`, points and lengths are exact and empty frames stay open."""
         sight = self.sight.take(np.flatnonzero(np.isin(self.sight.frame, part)))
         problem = self._problem(sight, sharp=sharp)
         pulling = [check.residuals for check in self.checks if hasattr(check, "residuals")]
@@ -224,12 +224,12 @@ class _Conductor:
     def _covariance(self, modes: Modes, rows: Ints) -> Array:
         """Return the covariances of the joints of some modes (N, 42, 42), square metres."""
         found = modes.covariance(rows)
-        # Before an uncalibrated camera a larger person farther away gives the same picture.
+        # In an uncalibrated picture a larger person farther away looks the same: the size adds its own covariance.
         x = self.lengths.common * modes.x[rows, :-1] if self.photograph else np.zeros((len(rows), 1))
         return found + x[:, :, None] * x[:, None]
 
     def _diagnose(self, sight: Sight, problem: Problem, empty: list[int]) -> None:
-        """Say why no posture fits some frames, by the nearest posture of loose points and lengths."""
+        """State why frames `empty` have no posture: the largest residuals of a solution with larger deviations."""
         some = np.flatnonzero(np.isin(sight.frame, empty))
         if not len(some):
             return
@@ -238,7 +238,7 @@ class _Conductor:
         records["length_weight"] = 1 / (1 / records["length_weight"] + LOOSE_LENGTHS)
         records["image"] /= LOOSE_TIMES
         loose = replace(strict, records=records)
-        # The nearest posture is measured with the stated deviations.
+        # Residuals of the nearest posture are in units of the stated deviations.
         nearest = replace(solve(loose, max_chi2=LOOSE_CHI2, most=1), problem=strict)
         owner = sight.frame[some][nearest.frame]
         for k in empty:
@@ -246,7 +246,7 @@ class _Conductor:
             self.found.close(k, judged="noisy", reason=why, rejected={"noise/no_mode": 1})
 
     def _problem(self, sight: Sight, *, sharp: bool) -> Problem:
-        """Lay the problem of some rows out for the solver."""
+        """Return the solver's problem for some rows; if `sharp`, points and lengths are exact."""
         problem = Problem.seen(
             sight.camera,
             sight.image,
@@ -272,7 +272,7 @@ class _Conductor:
         return found
 
     def about(self) -> dict[str, Any]:
-        """Return settings and tolerances as a result states them: everything that decided it."""
+        """Return the settings and tolerances that decided the result, as JSON values."""
         tolerances: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
         if "noisy" in vars(self):
             tolerances["noisy"] = {
@@ -297,7 +297,7 @@ class _Conductor:
 
 
 def _why(nearest: Modes) -> str:
-    """Say why a frame has no posture: the residuals of the nearest one that are over three deviations."""
+    """Return why a frame has no posture: the residuals over three deviations of the nearest posture."""
     if not len(nearest):
         return "no posture is near the image points: the camera, the lengths or left and right may be wrong"
     size = {name: float(value[0]) for name, value in nearest.residuals().items()}
@@ -309,7 +309,7 @@ def _why(nearest: Modes) -> str:
 
 
 def _up_of(view: View) -> Up:
-    """Return the direction against gravity: as the calibration states it, else as if the camera were level."""
+    """Return the direction up: that of the calibration, else that of a level camera."""
     camera = view.camera
     if isinstance(camera, PinholeCamera) and camera.R is not None and camera.up:
         return Up(direction=camera.R @ up_vector(camera.up), source=f"{camera.up}, as the calibration source")

@@ -1,4 +1,4 @@
-"""From postures to a `Recovery`: which are listed, how probable they are, and the answers."""
+"""From postures to a `Recovery`: list them, compute their probabilities, and answer."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from posekit.recovery.sight import Sight
 from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS
 
-#: Rejected leaves of a frame in which nothing is grown.
+#: Rejected leaves of a frame for which no tree is grown.
 LOST: Final = {"root/not_known": 8192}
 
-#: Difference in depth below which neither end of a segment is nearer.
+#: Difference in depth (metres) below which neither end of a segment is nearer.
 LEVEL_METRES: Final = 1e-6
 
 
 class Gathering:
-    """The frames of a view: those in which postures are still sought, and what was found behind the others.
+    """The frames of a view: open ones, whose postures are still to be found, and the results of the others.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Gathering:
     settings : RecoverSettings
     nearer : int array (F, 17)
         Flips given by hand: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer, 0 if
-        neither was given.
+        nothing is given.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Gathering:
         self.survivors: list[Survivors] = []
 
     def close(self, *frames: int, **about: Any) -> None:
-        """State what is known of frames, by columns of `Frames`; nothing more is sought in them."""
+        """Set columns of `Frames` for some frames, and take these frames off the open ones."""
         for k in frames:
             for name, value in about.items():
                 self.frames[name][k] = value
@@ -77,25 +77,25 @@ class Gathering:
         *,
         leave: bool = False,
     ) -> None:
-        """List the postures of some frames that pass, the likeliest first, and answer.
+        """List the postures that pass, by frame and falling probability, and answer their frames.
 
         Parameters
         ----------
         judged : str
-            As in `Frames`.
+            The way the frames were judged, as in `Frames.judged`.
         lost : dict of int to Counter
-            Branches of each of the frames that were rejected before, by reason.
+            For each frame, the number of branches rejected earlier, by reason.
         columns : dict of str to array
             Columns of `Survivors`, by frame.
         terms : mapping of str to array (N,)
-            Logarithms whose sum is that of the unnormalised probability of each posture.
+            Log terms; their sum is the logarithm of the unnormalised probability of each posture.
         reason : str array (N,)
-            Why each does not pass; empty if it does.
+            Reason why each posture fails; empty if it passes.
         covariance : callable, optional
-            Returns those of the joints of some rows under noise (n, 42, 42): as many postures are listed as hold the
-            coverage.
+            Maps rows (n,) of postures under noise to the covariances of their joints (n, 42, 42). Only the likeliest
+            postures, up to the coverage, are then listed.
         leave : bool
-            Leave frames open in which nothing passes.
+            Whether frames without a passing posture stay open.
         """
         every, joints = columns["frame"], columns["joints"]
         if self.nearer.any():
@@ -128,7 +128,7 @@ class Gathering:
             self._keep(found, table, None if covariance is None else covariance(rows), improbable[found])
 
     def _keep(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
-        """Keep the survivors of some frames (K,), by frame; frames under noise are answered at once."""
+        """Keep the survivors of frames `found` (K,); frames under noise are answered at once, exact ones when read."""
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
@@ -139,7 +139,7 @@ class Gathering:
             if perspective:
                 relative = ~self.sight.given[found]
             else:
-                # There is no place in space: radii are about the middle of the joints.
+                # The position in space is unknown: radii are relative to the mean of the joints.
                 block = block - block.mean(axis=1, keepdims=True)
                 block = block - block.mean(axis=3, keepdims=True)
             table["radius"] = joint_radius(np.einsum("njajb->njab", block))
@@ -162,7 +162,7 @@ class Gathering:
         self.answers.append((found, answers if covariance is None else partial(dict, answers())))
 
     def answer(self, starts: Ints) -> Answer:
-        """Return the answers; `starts` (F,) are the first survivors of the frames."""
+        """Return the answers; `starts` (F,) are the rows of the first survivors of the frames."""
         nothing = Answer(joints=np.full((len(starts), len(JOINTS), 3), np.nan))
         columns: dict[str, Any] = {name: list(values) for name, values in nothing.columns().items()}
         for found, answers in self.answers:
@@ -175,12 +175,12 @@ class Gathering:
     def recovery(
         self, margins: Callable[[Array, Flags], Mapping[str, Array]], **about: Mapping[str, Any]
     ) -> Recovery:
-        """Put the frames together.
+        """Return the result of all frames.
 
         Parameters
         ----------
         margins : callable
-            Returns those of postures (N, 19, 3) that were found under noise, or exactly.
+            Maps postures (N, 19, 3) and whether each was found under noise (N,) to their margins by check.
         **about
             ``settings`` and ``tolerances`` of the result.
         """
@@ -218,7 +218,7 @@ def frozen(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def group_of(joints: Array, within: float) -> Ints:
-    """Group postures (N, 14, 3), the likeliest first: each joins the first leader no joint of which is farther away."""
+    """Return the groups of postures (N, 14, 3), likeliest first: all joints are `within` metres of the likeliest's."""
     group = np.full(len(joints), -1, dtype=np.intp)
     for k, leader in enumerate(joints):
         if group[k] < 0:

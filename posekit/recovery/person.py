@@ -17,12 +17,12 @@ from posekit.files import DATA
 from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
-#: Shares of stature by segments without sides, and the deviations of people's.
+#: Lengths of segments as shares of the stature, for either side, and their relative deviations between people.
 PROPORTIONS: Final = tomllib.loads((DATA / "priors" / "proportions.toml").read_text(encoding="utf-8"))
 
 
 def _by_segment(table: Mapping[str, float]) -> dict[str, float]:
-    """Return the entries of a table of segments without sides, for both sides."""
+    """Expand a table of segments without sides: the left and the right segment have the same value."""
     sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
     return {name: table[bare] for name, bare in sideless.items() if bare in table}
 
@@ -39,7 +39,7 @@ def figure_of_view(view: View, settings: RecoverSettings, figure: Figure | None)
     lengths = dict(view.lengths)
     people, taylor = PROPORTIONS["people"], PROPORTIONS["taylor"]
     if _of_people(view, settings) and figure is None:
-        # Another body than the figure's lies between a detector's points, and in a stranger's photograph.
+        # Key points of a detector, and photographs of strangers, have the mean proportions of people.
         size = stature or people["stature"]
         lengths = {name: share * size for name, share in _by_segment(people["shares"]).items()}
         stature = None
@@ -50,7 +50,7 @@ def figure_of_view(view: View, settings: RecoverSettings, figure: Figure | None)
 
 
 def _of_people(view: View, settings: RecoverSettings) -> bool:
-    """Tell whether the person has the proportions of people: those of key points, and of photographs by default."""
+    """Return whether mean proportions of people are used: by default for key points and photographs."""
     if settings.proportions != "auto":
         return settings.proportions == "people"
     unscaled = isinstance(view.camera, ScaledOrthographicCamera) and view.camera.scale is None
@@ -65,7 +65,7 @@ def _person(
     shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
-    """Make the figure of a person: shards of one person follow each other."""
+    """Return the figure of a person; it is kept, because the frames of one person often come in several views."""
     if stature is None and not lengths and not shoulders and not head_points:
         return figure
     behind = None if shoulders is None else shoulders == "behind"
@@ -74,12 +74,12 @@ def _person(
 
 @lru_cache(maxsize=32)
 def sided(figure: Figure, lengths: LengthUncertainty) -> Figure:
-    """Return the figure as far as its lengths are known: the side of the shoulders may be open."""
+    """Return the figure with the side of its shoulders undecided if the uncertainty of the lengths allows both."""
     return figure.with_side_within(lengths)
 
 
 def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -> LengthUncertainty:
-    """Return how well lengths are known: as stated, else as their origin tells (view, stature, or none)."""
+    """Return the uncertainty of lengths: as stated, or usual for their source (view, stature or neither)."""
     stated = view.length_deviation if settings.length_deviation is None else settings.length_deviation
     if stated is not None:
         return LengthUncertainty.uniform(stated)

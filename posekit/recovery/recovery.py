@@ -1,4 +1,4 @@
-"""`Recovery`: every survivor of every frame, the rejected branches and why, and the answer."""
+"""`Recovery`: every survivor of every frame, the rejected branches by reason, and the answers."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
 
 def column(*shape: int, fill: Any = np.nan) -> Any:
-    """Declare a column of a table: the shape of a row, and the value of all rows where it is not given."""
+    """Declare a column of a table: the shape of a row, and the value that fills a column that is not given."""
     return field(default=None, metadata={"shape": shape, "fill": fill})
 
 
 def listed(fill: Any) -> Any:
-    """Declare a sequence with an entry a row, and the entry of all rows where it is not given."""
+    """Declare a sequence with one entry a row, and the entry that fills a sequence that is not given."""
     return field(default=(), metadata={"entry": fill})
 
 
 class Table(Record):
-    """Base of tables with one row a survivor or a frame, read-only; the first column is always given."""
+    """Base of read-only tables, whose rows are survivors or frames; the first column is always given."""
 
     def __post_init__(self) -> None:
         rows = len(self)
@@ -60,7 +60,7 @@ class Table(Record):
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
     def columns(self) -> dict[str, Any]:
-        """Return the columns that are given at once, by name."""
+        """Return all columns except derived ones, by name."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.metadata}  # type: ignore[arg-type]
 
 
@@ -88,29 +88,29 @@ class Survivors(Table):
     Parameters
     ----------
     frame : int array (N,)
-        Frame of each, from 0.
+        Frame of each survivor, counted from 0.
     joints : array (N, 14, 3)
-        Metres, camera frame; NaN where a joint is not known.
+        Joint positions, metres, camera frame; NaN if a joint is unknown.
     head : array (N, 5, 3), optional
-        Head points; NaN where they were not seen.
+        Head points, metres, camera frame; NaN if they are not seen.
     q : array (N, nq)
-        Configuration of each.
+        Configuration of each survivor.
     probability : array (N,), optional
-        Within its frame they sum to one minus `Frames.unlisted_probability`.
+        Probabilities; those of a frame sum to one minus `Frames.unlisted_probability`.
     chi2 : array (N,), optional
-        Misfit to the view; 0 for exact frames.
+        Misfit to the view under noise; 0 in exact frames.
     margins : mapping of str to array (N,)
-        Worst margin of each check, in the check's unit; NaN where it decided nothing.
+        Worst margin of each survivor by check, in the check's unit; NaN if the check decided nothing.
     branch : str array (N,), optional
-        Near-far code of an exact posture, 0 near and 1 far, joints in tree order from the second; empty under noise.
+        Near-far code of an exact posture: 0 (near) or 1 (far) for each joint from the second; empty under noise.
     group : int array (N,), optional
         Group of similar postures within the frame; -1 if no groups were asked for.
     radius : array (N, 14), optional
-        Radius (m) within which each joint lies with 95 % probability if the posture is right; 0 for exact frames.
+        Radius (metres) within which each joint lies with 95 % probability if the posture is right; 0 in exact frames.
     inferred : bool array (N, 14), optional
-        Joints that the image does not show.
+        True for joints that the image does not show.
     scale : array (N,), optional
-        Scale of a scaled orthographic camera, pixels a metre; NaN elsewhere.
+        Scale of a scaled orthographic camera, pixels a metre; NaN for other cameras.
     """
 
     frame: NDArray[np.intp] = column(fill=0)
@@ -140,30 +140,30 @@ class Survivors(Table):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Frames(Table):
-    """F frames: what was seen, what was rejected and why.
+    """F frames: their time and camera, the rejected branches by reason, and why frames are empty.
 
     Parameters
     ----------
     time : array (F,)
-        Seconds; NaN where it is not known.
+        Seconds; NaN if unknown.
     pictures : sequence of F str
         Names of the pictures; empty if there are none.
     camera : sequence of F mappings
         Facts about the camera: ``f``, ``rotation``, ``position``, ``residual``, ``scale``.
     rejected : sequence of F mappings
-        Rejected branches by reason (``check/place``): with the survivors of an exact frame they sum to 8192.
+        Number of rejected branches by reason (``check/place``). In an exact frame they and the survivors sum to 8192.
     levels : sequence of F sequences
-        Branches left after each joint of the tree; empty where no tree was grown.
+        Number of branches left after each joint of the tree; empty if no tree was grown.
     unlisted : int array (F,), optional
-        Postures that are not listed for being too unlikely (`coverage`).
+        Number of postures that are not listed because they are too unlikely (setting `coverage`).
     unlisted_probability : array (F,), optional
-        Their probability together.
+        Total probability of the postures that are not listed.
     reason : sequence of F str
-        Why a frame has no survivors; empty where it has.
+        Reason why a frame has no survivors; empty if it has some.
     root : sequence of F mappings or None
-        Source of the neck's depth: ``method``, ``estimate`` and ``deviation`` in metres.
+        How the neck's depth was found: ``method``, ``estimate`` and ``deviation`` (metres).
     judged : sequence of F str
-        ``exact``, ``tolerated`` or ``noisy``.
+        How a frame was judged: ``exact``, ``tolerated`` or ``noisy``.
     """
 
     time: Array = column()
@@ -191,12 +191,12 @@ class Answer(Table):
     sure_of : sequence of F str
         ``position``, or ``relative to the neck`` where the depth is not known; empty where there is no answer.
     survivor : int array (F,)
-        Row of the survivor nearest to the answer, -1 where there is none.
+        Row of the survivor nearest to the answer; -1 if the frame has no survivor.
     representatives : sequence of F int arrays
-        Rows of few survivors that differ by 5 cm in some joint and stand for 95 % of the probability, the likeliest
-        first.
+        Rows of few survivors: postures within 5 cm of one of them in every joint have 95 % of the probability. The one
+        with the most probability near it comes first.
     represented : sequence of F arrays
-        Probability of each representative and of what it stands for.
+        Probability of each representative and of the postures near it that no earlier one stands for.
     nearer : int array (F, 13)
         For each segment of the tree the most probable of three cases: 1 if its outer end is nearer to the camera by
         more than 5 cm, -1 if it is farther, 0 if neither.
@@ -221,11 +221,11 @@ class Paths(Table):
     Parameters
     ----------
     survivor : int array (P, F)
-        Row of the survivor that the path goes through; -1 where a frame is bridged.
+        Row of the survivor on the path in each frame; -1 if the path skips the frame.
     probability : array (P,)
-        Probability of each path among all.
+        Probability of each path among all paths.
     joints : array (P, F, 14, 3)
-        Smoothed positions, metres, camera frame; NaN where the path does not reach.
+        Smoothed positions, metres, camera frame; NaN before and after the path.
     """
 
     survivor: NDArray[np.intp]
@@ -235,7 +235,7 @@ class Paths(Table):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Frame(Survivors):
-    """The survivors of one frame, with its entries of `Frames` and of `Answer`: see there.
+    """The survivors of one frame, with the frame's entries of `Frames` and `Answer`, which are documented there.
 
     Parameters
     ----------
@@ -281,17 +281,17 @@ class Recovery(Record):
     frames : Frames
     answer : Answer
     path : Paths, optional
-        Paths, if frames were followed.
+        Paths through the frames, if these were followed.
     settings : mapping
-        Everything that decided the result; plain numbers, strings and lists.
+        Settings that decided the result; plain numbers, strings and lists.
     tolerances : mapping
-        Allowed deviations of exact and of tolerated frames, and the noise of others.
+        Tolerances of exact and tolerated frames, and the noise assumed in other frames.
     lengths : mapping of str to float
         Segment lengths of the person, metres.
     joint_names, configuration_names : sequence of str
         Names of the joints of `survivors.joints` and of the entries of `survivors.q`.
     unit : str
-        Unit of length in files; in memory all is metres.
+        Unit of length in files. All arrays are in metres.
     camera : mapping
         Fields of the view's camera, as files have them.
     source : str
@@ -384,7 +384,7 @@ class Recovery(Record):
         if which not in chosen:
             expected = "answer, path, all or first"
             raise refusal(self.source or "result", "which", shown(which), expected, "choose one")
-        # The last row, -1, is of frames without a posture.
+        # Row -1, the last one, stands for frames without a posture.
         points, q = (
             np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[chosen[which]]
             for values in (with_head(table.joints, table.head), table.q)

@@ -1,4 +1,4 @@
-"""The scale of an uncalibrated picture: as stated, by constraints, or the likely one (Taylor 2000, §2 and §3)."""
+"""The scale of an uncalibrated picture: stated, found by constraints, or estimated (Taylor 2000, §2 and §3)."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from posekit.solver import Problem
 #: surface is 1.8 square metres (Du Bois & Du Bois 1916).
 ROOT_AREA_METRES: Final = 0.67
 
-#: Root mean square distance of annotators' points over the root of the person's area in the picture: the constants of
-#: COCO's object keypoint similarity (cocodataset.org/#keypoints-eval), of neck and shoulders, pelvis and hips (as
-#: those), elbows, wrists, knees and ankles.
+#: Root mean square distance of annotators' points, in units of the root of the person's area in the picture: the
+#: constants of COCO's object keypoint similarity (cocodataset.org/#keypoints-eval) for the shoulders (also used for the
+#: neck), the hips (also for the pelvis), elbows, wrists, knees and ankles.
 ANNOTATION_SIGMAS: Final = np.repeat([0.079, 0.107, 0.072, 0.062, 0.087, 0.089], [3, 3, 2, 2, 2, 2])
 
 #: Standard deviation of each coordinate of a photograph's key points from the joints (14,), metres.
 PHOTOGRAPH_OFFSETS: Final = ANNOTATION_SIGMAS * (ROOT_AREA_METRES / math.sqrt(2))
 
-#: Depth by which a joint is off the body's middle, and distance of a camera, where none is known.
+#: Usual depth (metres) of a joint relative to the middle of the body, and usual distance (metres) of a camera.
 RELIEF_METRES, USUAL_DISTANCE_METRES = 0.25, 4.5
 
 #: Relative deviation of that distance: photographs of a whole person are taken from 3 to 7 m.
 DISTANCE_DEVIATION: Final = 0.4
 
-#: Relative deviation of a scale by how it was found: who stands for their stature does not stand quite straight.
+#: Relative deviation of a scale by the way it is found; people do not stand quite straight for their stature.
 SCALE_DEVIATIONS: Final = {"likely": 0.08, "min": 0.08, "stature": 0.03}
 
-#: Shortfall of a segment at a scale that is stated for exact points, in metres, that no noise explains.
+#: Shortfall of a segment (metres) that contradicts a stated scale of exact points.
 LONGEST_TOO_SHORT: Final = 0.3
 
 
@@ -54,7 +54,7 @@ def point_offsets(points: Array, scale: Array) -> Array:
 
 
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
-    r"""Return a scaled orthographic problem as a camera at the usual distance d sees it, before the person's middle.
+    r"""Turn a scaled orthographic problem into that of a perspective camera at the usual distance d from the person.
 
     Nearer parts look larger before every real camera. A posture of depth z about the plane of the scale is seen at
     :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
@@ -79,19 +79,19 @@ def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array)
 
 
 def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]:
-    """Return postures (N, 14, 3) of `from_usual_distance` in the frame of a scaled orthographic camera.
+    """Move solved postures of `from_usual_distance` into the frame of a scaled orthographic camera.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
-        Before the camera at the usual distance, metres.
+        Postures in the frame of the perspective camera, metres.
     middle, scale : array (N, 2), (N,)
         Middle of the person at the nominal scale, metres, and that scale.
 
     Returns
     -------
     joints, scale : array (N, 14, 3), (N,)
-        The neck has depth 0, and the scale is that of its plane.
+        Postures whose neck has depth 0, and the scale in the plane of the neck.
     """
     depth = joints[:, 0, 2]
     nearer = depth / USUAL_DISTANCE_METRES
@@ -102,7 +102,7 @@ def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]
 def scales_of(
     points: Array, linkage: Linkage, how: str, weights: Mapping[str, float], stated: float, strict: bool
 ) -> tuple[list[float], dict[str, Any]]:
-    """Return the scales of one picture, and what is known of its camera."""
+    """Return the scales of one picture, and the facts about its camera for the result."""
     family = LinkageFamily(linkage=linkage, image=points)
     bound, segment = family.minimum_scale, family.bounding_segment
     chosen = [bound if how == "min" else stated]
@@ -126,36 +126,38 @@ def figure_linkage(person: Figure) -> Linkage:
     return Linkage(name="figure", points=JOINTS, segments=SEGMENTS, lengths=lengths, unit=1.0)
 
 
-#: Depth by which the middle of each dimension is off the body's, standard deviation, metres: a little less than among
-#: random legal postures.
+#: Standard deviation (metres) of the depth of each dimension's middle relative to the middle of the body: a little less
+#: than among random legal postures.
 DEPTH_RELIEF: Final = np.array([0.15, 0.15, 0.22, 0.22, 0.15, 0.15, 0.25, 0.25, 0.12, 0.10, 0.05])
 
-#: Relative changes of widths and trunk with posture: the girdle moves, the back bends.
+#: Relative deviation of each dimension with posture: shoulders move and the back bends.
 LOOSENESS: Final = np.array([0.0] * 8 + [0.03, 0.02, 0.05])
 
-#: Joints at the ends of limbs, shoulder width, hip width, and of the line between their middles.
+#: Joints at the two ends of each dimension: limbs, shoulder width, hip width, and the line between their middles.
 DIMENSIONS: Final = [
     ((JOINT[f"{side}_{a}"],), (JOINT[f"{side}_{b}"],))
     for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
     for side in ("right", "left")
 ] + [((1,), (2,)), ((4,), (5,)), ((1, 2), (4, 5))]
 
+#: Cosines of the angles between evenly distributed directions and the optical axis.
 COSINES: Final = (np.arange(24) + 0.5) / 24
-#: Cosines of directions that are spread evenly, and logarithms of a scale about its first guess.
+
+#: Logarithms of tried scales relative to a first guess.
 LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
 
 
 def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
     r"""Find the scale at which a body's segments match their lengths in the image, and its log's deviation.
 
-    Taylor's bound (2000, eq. 3) is the least scale at which no segment is too short: one segment would set the scale of
-    all. Here each has its say. A segment of length l whose direction is spread evenly is seen as
-    :math:`e = s\,l\,\sqrt{1 - c^2}` with c uniform, blurred by what lengths and points are off.
+    Taylor's bound (2000, eq. 3) depends on one segment alone. Here every segment contributes: a segment of length l and
+    random direction has an image of length :math:`e = s\,l\,\sqrt{1 - c^2}` with c uniform, blurred by the errors of
+    lengths and points.
 
     Parameters
     ----------
     points : array (F, 14, 2)
-        Square pixels, or normalised image points: the scale then is one over the depth. NaN where not seen.
+        Square pixels; or normalised image points, whose scale is one over the depth. NaN if a point is not seen.
     person : Figure
 
     Returns

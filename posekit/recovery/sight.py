@@ -1,4 +1,4 @@
-"""`Sight`: the person, the noise, and the root of each frame, known before a posture is sought."""
+"""`Sight`: image points, their noise, and the neck of each frame, known before postures are sought."""
 
 from __future__ import annotations
 
@@ -21,17 +21,19 @@ from posekit.recovery.scales import SCALE_DEVIATIONS, figure_linkage, likely_sca
 from posekit.settings import RecoverSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
-#: Standard deviation of image points of which none is stated, pixels: of a detector's, and of others.
+#: Standard deviation (pixels) of image points if none is stated: of a detector's key points, and of other points.
 KEY_POINT_PIXELS, UNSTATED_PIXELS = 3.0, 1.0
 
-#: The same for image points that may be exact but whose tree cannot be grown: a joint or the neck is unknown.
+#: Standard deviation (pixels) of image points that may be exact, in frames without a tree: a joint or the neck is
+#: unknown.
 SHARP_PIXELS: Final = 0.3
 
-#: Standard deviation of a detector's key points from the figure's joints at full confidence, metres, and the power of
-#: the confidence with which it falls (fitted on Pose2Sim's recordings).
+#: Standard deviation (metres) between a detector's key points and the figure's joints at full confidence. It is divided
+#: by a power of the confidence (fitted on Pose2Sim's recordings).
 JOINT_OFFSET, OFFSET_POWER = 0.012, 0.7
 
-#: Confidence of a detector's point without one, and least confidences for its offset in metres and its pixels.
+#: Confidence of a detector's point if none is given, and least confidence used for the offset in metres and for the
+#: noise in pixels.
 UNSTATED_CONFIDENCE, LEAST_OFFSET_CONFIDENCE, LEAST_CONFIDENCE = 0.5, 0.05, 0.25
 
 #: Largest accepted distance of a given root from the neck's ray, metres.
@@ -56,17 +58,17 @@ class Sight(Record):
     deviation : array (H, 14)
         Standard deviation of each coordinate, in the image's unit.
     root : array (H, 3)
-        The neck, metres; NaN if unknown.
+        Position of the neck, metres; NaN if unknown.
     given : bool array (H,)
-        Whether the root was given, and not found from the head.
+        Whether the position of the neck was given, rather than found from the head.
     head : array (H, 5, 3)
         Head points, metres; NaN if unknown.
     size_deviation : array (H,)
-        Relative deviation of the size that all lengths share.
+        Relative deviation of the person's size, which is common to all lengths.
     may_be_exact : bool
-        Whether no deviation is stated, and no detector placed the points.
+        True if no deviation is stated and the points are not a detector's.
     reasons, cameras, roots
-        For each frame: the reason why nothing can be recovered, facts about the camera, and the way to the neck.
+        One entry a frame: the reason why nothing can be recovered, facts about the camera, and how the neck was found.
     """
 
     camera: PinholeCamera | LeeChenCamera | ScaledOrthographicCamera
@@ -96,17 +98,17 @@ class Sight(Record):
 
     @property
     def middle(self) -> Array:
-        """Middles of the trunk's normalised image points (H, 2)."""
+        """Means of the normalised image points of the trunk (H, 2)."""
         return np.asarray(np.nanmean(self.camera.normalize(self.image)[:, :6], axis=1))
 
 
 def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Gather what a view shows of a person.
+    """Return the image points, their noise and the neck of each frame of a view.
 
     Raises
     ------
     InputError
-        If a setting has no meaning for such a view, or no frame can be as the view states.
+        If a setting does not apply to such a view, or the view contradicts itself in every frame.
     """
     if isinstance(view.camera, ScaledOrthographicCamera):
         if settings.root != "auto":
@@ -119,14 +121,14 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
 
 
 def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
-    """Return the standard deviation of image points, pixels, and whether they and the lengths may be exact."""
+    """Return the standard deviation (pixels) of image points, and whether points and lengths may be exact."""
     usual = KEY_POINT_PIXELS if view.derived else UNSTATED_PIXELS
     stated = (settings.deviation, view.deviation, settings.length_deviation, view.length_deviation)
     return stated[0] or stated[1] or usual, not (view.derived or settings.refine or any(stated))
 
 
 def _unseen(view: View) -> list[str]:
-    """Say of each frame why nothing can be sought in it; empty if it can."""
+    """Return for each frame the reason why it cannot be recovered; empty if it can."""
     seen = np.isfinite(view.image[:, :, 0])
     trunk = seen[:, 1:4].any(axis=1)
     reasons = {
@@ -137,7 +139,7 @@ def _unseen(view: View) -> list[str]:
 
 
 def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Gather what a calibrated camera sees: the root as given, or from six head points."""
+    """Return the sight of a calibrated camera; the neck is the given one, or found from six head points."""
     count, model, reasons = len(view), view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert not isinstance(model, ScaledOrthographicCamera)
@@ -160,7 +162,7 @@ def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: 
             roots[k] = {"method": "head", "estimate": float(neck[k, 2]), "deviation": None}
         if isinstance(model, LeeChenCamera) and model.f is None:
             reasons = [own or of_head for own, of_head in zip(reasons, pose.reasons, strict=True)]
-    # Offsets in metres are converted by the size of the person in the image.
+    # Offsets in metres become pixels by the depth of the neck, or by the person's size in the image if it is unknown.
     depth, unplaced = root[:, 2].copy(), np.flatnonzero(~np.isfinite(root[:, 2]))
     if len(unplaced):
         depth[unplaced] = 1 / likely_scale(camera.normalize(view.image)[unplaced], person)[0]
@@ -193,11 +195,11 @@ def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: 
 def _head_pose(
     view: View, model: PinholeCamera | LeeChenCamera, person: Figure, settings: RecoverSettings
 ) -> tuple[PinholeCamera | LeeChenCamera, HeadPose | None]:
-    """Return the camera of all frames, and the pose of the head where six points of it are seen."""
+    """Return the camera of all frames, and the pose of the head in frames that show six points of it."""
     image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
     enough = np.isfinite(image).all(axis=2).sum(axis=1) >= ENOUGH_HEAD_POINTS
     unknown = isinstance(model, LeeChenCamera) and model.f is None
-    # A neck that was placed between the shoulders is not a point of the head.
+    # A neck computed from the shoulders is not a point of the head.
     if "neck" in view.derived or settings.root == "torso" or not enough.any():
         if unknown:
             raise refusal(view.source, "camera.f", "null", "six head points in head_image", "give them, or f")
@@ -212,7 +214,7 @@ def _head_pose(
 
 
 def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) -> None:
-    """Refuse given roots behind the camera or far from the neck's ray."""
+    """Refuse given positions of the neck behind the camera or far from the ray through its image."""
     _, ray = camera.rays(view.image[:, 0])
     beside = np.linalg.norm(root - (root * ray).sum(axis=1, keepdims=True) * ray, axis=1)
     for k in np.flatnonzero((root[:, 2] <= 0) | (beside > ROOT_REFUSED)).tolist():
@@ -222,7 +224,7 @@ def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) 
 
 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
-    """Describe the camera of a frame: of Lee & Chen's the paper's [R] and position (Table 2), else of the world."""
+    """Return facts about the camera of frame k; before Lee & Chen's camera, [R] and position are those of Table 2."""
     model = view.camera
     record: dict[str, Any] = dict.fromkeys(("f", "rotation", "position", "residual"))
     if isinstance(model, LeeChenCamera) and model.f is not None:
@@ -239,7 +241,7 @@ def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
 
 
 def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Gather what an uncalibrated picture shows: at one scale a frame, or at several that close the rigid parts."""
+    """Return the sight of uncalibrated pictures: one row a frame, or one for each scale that satisfies constraints."""
     model, reasons = view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert isinstance(model, ScaledOrthographicCamera)

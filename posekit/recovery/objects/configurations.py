@@ -1,4 +1,4 @@
-"""Configurations of a robot within its limits whose points are a posture's."""
+"""Configurations of a robot, within its limits, that place its points as in a posture."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from posekit.errors import refusal
 from posekit.geometry import Array, best_rotation, cross_matrix, quaternion_from_rotation
 from posekit.recovery.objects.linkage import Linkage
 
-#: Postures of a frame whose configurations are sought.
+#: Largest number of postures of a frame for which configurations are computed.
 MAX_CERTIFIED: Final = 64
 
-#: Random configurations, and those of them, nearest to a posture, from which its configuration is sought.
+#: Number of random configurations, and of the nearest ones to a posture, which are the starting points of the search.
 N_SHAPES, N_STARTS = 512, 4
 
 
 def configurations_of(
     robot: Any, linkage: Linkage, points: Array, frame: NDArray[np.intp], allowed: Array
 ) -> dict[str, Any]:
-    """Seek configurations within the robot's limits, from random ones whose points lie nearest to each posture.
+    """Find a configuration for each posture by least squares, from the nearest of many random configurations.
 
-    The base is laid on the posture by the best rotation and translation, so that least squares has the joints as
-    unknowns alone (variable projection, Golub & Pereyra 1973).
+    The base follows from the joints by the best rotation and translation, so that the joints are the only unknowns
+    (variable projection, Golub & Pereyra 1973).
     """
     import pinocchio as pin
     from scipy.optimize import least_squares
@@ -53,7 +53,7 @@ def configurations_of(
         return laid(placed(x)[known], target[known])[0].ravel()
 
     def slope(x: Array, target: Array, known: NDArray[np.bool_]) -> Array:
-        """Return the derivative of `off`; turning the base is no change (Kaufman 1975)."""
+        """Return the derivative of `off`, without the part that a rotation of the base cancels (Kaufman 1975)."""
         pin.computeJointJacobians(model, data, configuration(x))
         left, R = laid(placed(x)[known], target[known])
         every = [pin.getFrameJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED)[:3, base:] for k in ids]
@@ -88,7 +88,7 @@ def configurations_of(
 
 
 def laid(points: Array, target: Array) -> tuple[Array, Array]:
-    """Lay points (..., P, 3) on a target (P, 3): the remaining distances, and the rotations."""
+    """Fit points (..., P, 3) to a target (P, 3); return the remaining offsets (..., P, 3) and the rotations."""
     centred = points - points.mean(axis=-2, keepdims=True)
     goal = target - target.mean(axis=0)
     R, _ = best_rotation(np.einsum("pi,...pj->...ij", goal, centred))

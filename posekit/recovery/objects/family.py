@@ -14,10 +14,10 @@ from posekit.errors import CameraError, refusal
 from posekit.geometry import FARTHEST_COORDINATE, Array, Record, read_only
 from posekit.recovery.objects.linkage import Linkage
 
-#: Relative distance from the bound below which a scale is at it, and a segment is foreshortened to nothing.
+#: Relative distance of a scale from a segment's bound below which the segment has no depth.
 AT_BOUND: Final = 1e-12
 
-#: Coefficients of the incidence matrices below this are rounding: all are small fractions.
+#: Coefficients of the incidence matrices below this are rounding errors; the others are sums of halves.
 ZERO_COEFFICIENT: Final = 1e-9
 
 
@@ -35,7 +35,7 @@ class LinkageFamily(Record):
     image : array (P, 2)
         Image points, pixels; NaN where one is not seen.
     aspect : float
-        Width of a pixel over its height: u is rescaled by it, and s counts in v.
+        Width of a pixel over its height: u is multiplied by it, and s refers to v.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class LinkageFamily(Record):
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Which segments are seen at both ends (S,)."""
+        """True for segments seen at both ends (S,)."""
         return np.isfinite(self.extent)
 
     @property
@@ -86,7 +86,7 @@ class LinkageFamily(Record):
 
     @property
     def bounding_segment(self) -> str:
-        """Name of the segment that sets the bound."""
+        """Name of the segment with the largest bound."""
         return self.linkage.segment_names[int(np.nanargmax(self.bounds))]
 
     def foreshortening(self, s: ArrayLike) -> Array:
@@ -95,7 +95,7 @@ class LinkageFamily(Record):
         Raises
         ------
         CameraError
-            If a scale is below the bound: names the segment and the scale that it needs.
+            If a scale is below the bound; the message names the segment and the scale that it needs.
         """
         scale = np.asarray(s, dtype=np.float64)
         bound = self.minimum_scale
@@ -105,11 +105,11 @@ class LinkageFamily(Record):
             raise refusal("", "scale", f"{low:.9g}", needs, "give a larger scale", error=CameraError)
         apart = self.extent / scale[..., None]
         lengths = self.linkage.lengths
-        # As (l - e) (l + e): near the bound the difference of squares would lose half the digits.
+        # (l - e) (l + e), because near the bound the difference of squares would lose half the digits.
         return np.sqrt(np.maximum((lengths - apart) * (lengths + apart), 0.0))
 
     def points(self, s: ArrayLike, flips: ArrayLike) -> Array:
-        """Place the points (..., P, 3), units of length: x, y from the image, depth relative to the first point's.
+        """Return the points (..., P, 3), units of length: x, y from the image, depth relative to the first point.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class LinkageFamily(Record):
 
         Notes
         -----
-        A loop that does not close is averaged: its segments then have lengths a little off.
+        The depths around a loop that does not close are averaged; its segments then differ a little from their lengths.
         """
         signed = np.where(self.seen, np.asarray(flips, dtype=np.float64) * self.foreshortening(s), 0.0)
         return self.placed(s, np.where(self.incidence.placed, signed @ self.incidence.depth.T, np.nan))
@@ -131,13 +131,13 @@ class LinkageFamily(Record):
         return nodes[..., : len(self.linkage.points), :]
 
     def flips_of(self, points: ArrayLike) -> NDArray[np.int8]:
-        """Return the flips (..., S) of postures given by their points (..., P, 3); 0 where both ends are level."""
+        """Return the flips (..., S) of postures (..., P, 3); 0 for segments whose ends have the same depth."""
         nodes = self.linkage.place_nodes(np.asarray(points, dtype=np.float64))
         ends = np.array(self.linkage.segments)
         return np.sign(nodes[..., ends[:, 1], 2] - nodes[..., ends[:, 0], 2]).astype(np.int8)
 
     def flat_groups(self) -> Iterator[tuple[str, int, list[int]]]:
-        """Yield the kind, the dimension and the nodes of coplanar and collinear groups, as far as they are seen."""
+        """Yield the kind, the dimension (2 or 1) and the seen nodes of each coplanar or collinear group."""
         groups = [("coplanar", 2, group) for group in self.linkage.coplanar]
         groups += [("collinear", 1, group) for group in self.linkage.collinear]
         for kind, rank, group in groups:
@@ -147,13 +147,13 @@ class LinkageFamily(Record):
 
     @cached_property
     def incidence(self) -> Incidence:
-        """The matrices of the segments that are seen."""
+        """Incidence matrices of the segments that are seen."""
         return Incidence.of(self.linkage, self.seen)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Incidence(Record):
-    r"""The linear algebra of a linkage, or of the part of it that is seen.
+    r"""Incidence matrices of a linkage, or of the part of it that is seen.
 
     The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
     where a row of A has -1 and 1 at a segment's ends (halves for a midpoint). Then :math:`Z = B (\sigma dZ)`, and loops
@@ -162,13 +162,13 @@ class Incidence(Record):
     Parameters
     ----------
     depth : array (N, S)
-        B by node, relative to the first node of its piece; loops that do not close are averaged.
+        Rows of B: the depth of each node relative to the first node of its piece; loops that do not close are averaged.
     tree : array (N, S)
-        T, the same by the segments of the basis alone.
+        T, the same from the segments of the basis alone.
     basis : int array (K,)
-        Segments that depend on none before them; each of the others closes a loop.
+        Segments that span the object; each of the other segments closes a loop.
     loops : array (L, S)
-        C: one row a loop, its largest coefficient 1.
+        C: one row for each loop, whose largest coefficient is 1.
     part : int array (N,)
         Piece of each node; nodes of different pieces have no relative depth.
     placed : bool array (N,)
@@ -184,7 +184,7 @@ class Incidence(Record):
 
     @staticmethod
     def of(linkage: Linkage, seen: NDArray[np.bool_]) -> Incidence:
-        """Build the matrices of a linkage; `seen` (S,) tells which of its segments have both ends in the image."""
+        """Return the matrices of a linkage; `seen` (S,) is true for segments with both ends in the image."""
         from scipy.sparse.csgraph import connected_components
 
         weights = linkage.place_nodes(np.eye(len(linkage.points)))
@@ -192,7 +192,7 @@ class Incidence(Record):
         A = weights[ends[:, 1]] - weights[ends[:, 0]]
         graph = np.zeros((len(linkage.nodes),) * 2)
         graph[tuple(ends[kept].T)] = 1
-        # A midpoint is where its ends are as soon as one of them is placed and the segment is seen.
+        # A midpoint belongs to the piece of its ends if its segment is seen.
         for end, middle, whole in linkage.halves:
             graph[end, middle] = seen[whole]
         _, part = connected_components(graph, directed=False)
@@ -236,7 +236,7 @@ def with_depth(place: Array, depth: Array) -> Array:
 def off_flat(points: Array, rank: int) -> Array:
     """Return the distances (..., N, 3 - rank) of points (..., N, 3) from their best plane (rank 2) or line (rank 1).
 
-    The axes are those of the real parts: at the best plane the derivative is that with the plane held still.
+    The plane is fitted to the real parts of complex points: at the best plane, its own derivative does not matter.
     """
     centred = points - points.mean(axis=-2, keepdims=True)
     _, axes = np.linalg.eigh(np.swapaxes(centred.real, -1, -2) @ centred.real)

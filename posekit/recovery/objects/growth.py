@@ -1,4 +1,4 @@
-"""The interpretation tree of any articulated object: every way to flip its segments, pruned by loops and shape."""
+"""The interpretation tree of any articulated object: all flips of its segments, pruned by loops and shape."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from posekit.recovery.objects.family import LinkageFamily, off_flat, with_depth
 
 
 class Tolerance(NamedTuple):
-    """Allowed error of closing lengths, shortfall of segments and error of image points, units of length."""
+    """Allowed errors, units of length: of lengths that close a loop, shortfall of segments, and of image points."""
 
     rigid: float
     tangent: float
     beside: float
 
 
-#: Tolerances in longest segments: rounding, and points picked by hand.
+#: Tolerances relative to the longest segment: for exact points, and for points picked by hand.
 EXACT: Final = Tolerance(1e-6, 1e-9, 0.0)
 MEASURED: Final = Tolerance(0.01, 0.02, 0.01)
 
-#: Depth of a segment, in longest segments, below which both of its flips are one.
+#: Depth of a segment, relative to the longest one, below which both flips are the same posture.
 LEVEL: Final = 1e-6
 
-#: Residual of a minimum that leaves nothing: these alone are used where there are any.
+#: Largest residual of a minimum that satisfies the constraints exactly; other minima are used only without such ones.
 CLOSED_RESIDUAL: Final = 1e-16
 
-#: Largest number of postures of a level.
+#: Largest number of postures during the growth of a tree.
 MAX_POSTURES: Final = 200_000
 
 
 class Check(NamedTuple):
-    """What shows that a posture is wrong, once all segments that it depends on are flipped.
+    """A test of postures, applied once all segments that it depends on have a flip.
 
     Attributes
     ----------
     reason : str
     rows : array (R, S)
-        Depths that it reads, by signed foreshortenings.
+        Matrix from signed foreshortenings (S,) to the depths (R,) that the test reads.
     measure : callable
-        Depths (N, R) to an error (N,), units of length.
+        Maps depths (N, R) to errors (N,), units of length.
     most : float
-        Largest error that is allowed.
+        Largest allowed error.
     """
 
     reason: str
@@ -64,7 +64,7 @@ def grow_best(
     given: Tolerance | None,
     about: dict[str, Any],
 ) -> tuple[Array, Array, Array]:
-    """Grow one frame exactly; as measured where nothing is left or nothing shows that it is exact.
+    """Grow one frame with the exact tolerance; if no posture is left or nothing shows exactness, with the measured one.
 
     Returns
     -------
@@ -133,11 +133,11 @@ def grow(
 
 
 def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance) -> Iterator[Check]:
-    r"""List what loops, flips given by hand and shape demand.
+    r"""Yield the tests of one frame: loops, flips given by hand, and shape.
 
-    Where image points are off by p at most, a segment of length l that is seen e long has a depth between
-    :math:`\sqrt{l^2 - (e + 2p)^2}` and :math:`\sqrt{l^2 - (e - 2p)^2}`, whichever way it is flipped: a depth between
-    two points is off by no more than the sum over the segments between them.
+    If image points are off by at most p, a segment of length l whose image is e long has a depth between
+    :math:`\sqrt{l^2 - (e + 2p)^2}` and :math:`\sqrt{l^2 - (e - 2p)^2}`. The error of the depth between two points is at
+    most the sum over the segments between them.
     """
     linkage, tree, beside = family.linkage, family.incidence.tree, allowed.beside
     ends, names, place = np.array(linkage.segments), linkage.segment_names, family.place / s
@@ -168,7 +168,7 @@ def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: To
 
 
 def _gap(extent: float, length: float, beside: float, off: float, depths: Array) -> Array:
-    """Return by how much a segment that closes a loop is too long or too short for any place of its ends."""
+    """Return by how much (N,) a closing segment is too long or too short, whatever the errors of its ends."""
     depth = np.abs(depths[:, 0])
     far = np.hypot(extent + beside, depth + off)
     near = np.hypot(max(extent - beside, 0.0), np.maximum(depth - off, 0.0))
@@ -182,7 +182,7 @@ def _bend(place: Array, rank: int, depths: Array) -> Array:
 
 
 def _skew(one: Array, two: Array, depths: Array) -> Array:
-    """Return the product of two segments, which is zero at a right angle, over the longer one."""
+    """Return the scalar product of two segments divided by the longer length (N,); zero at a right angle."""
     a, b = depths.T
     longer = np.sqrt(np.maximum(one @ one + a * a, two @ two + b * b))
     return np.asarray(np.abs(one @ two + a * b) / longer)

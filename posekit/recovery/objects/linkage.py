@@ -1,4 +1,4 @@
-"""`Linkage`: an articulated object as data, from names, a TOML file, or a robot."""
+"""`Linkage`: an articulated object, made from names, a TOML file, or a robot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from posekit.geometry import Array, Record, read_only
 #: Largest number of segments of one object.
 MAX_SEGMENTS: Final = 2000
 
-#: Relative amount by which rounded lengths may miss the triangle inequality and still make a flat loop.
+#: Relative violation of the triangle inequality that is taken as rounding of lengths: the loop is then flat.
 LOOP_ROUNDING: Final = 1e-9
 
 
@@ -34,13 +34,13 @@ class Linkage(Record):
     name : str
         Name for messages and files.
     points : sequence of P str
-        Points that an image shows.
+        Names of the points in an image.
     segments : sequence of S (int, int)
         Nodes at the two ends of each rigid segment.
     lengths : array (S,)
-        Their lengths, in any unit: one factor is absorbed by the scale s (Taylor 2000, §2).
+        Lengths of the segments, in any unit: the scale s absorbs a common factor (Taylor 2000, §2).
     midpoints : sequence of (str, (int, int))
-        Names of further nodes P, P + 1, …, each in the middle of the segment between two points.
+        Names of further nodes P, P + 1, …, and the two points in the middle of whose segment each lies.
     coplanar : sequence of sequence of int
         Sets of four or more nodes that lie in a plane.
     perpendicular : sequence of (int, int)
@@ -48,7 +48,7 @@ class Linkage(Record):
     collinear : sequence of (int, int, int)
         Triples of nodes on one line.
     unit : float, optional
-        Metres in one unit of length; None where lengths are relative.
+        Metres in one unit of length; None if lengths are relative.
     height : float, optional
         Height of the whole object in the unit of its lengths.
     urdf : str
@@ -145,7 +145,7 @@ class Linkage(Record):
 
     @property
     def halves(self) -> tuple[tuple[int, int, int], ...]:
-        """Both halves of each segment with a midpoint: end, midpoint, segment."""
+        """Both halves of each segment with a midpoint: indices of end, midpoint and segment."""
         index = {frozenset(ends): number for number, ends in enumerate(self.segments)}
         return tuple(
             (end, len(self.points) + number, index[frozenset(ends)])
@@ -159,7 +159,7 @@ class Linkage(Record):
         Raises
         ------
         InputError
-            If there is none of that name.
+            If no segment has that name.
         """
         turned = [f"{self.nodes[b]}-{self.nodes[a]}" for a, b in self.segments]
         known = [*self.segment_names, *turned]
@@ -169,7 +169,7 @@ class Linkage(Record):
         return known.index(name) % len(turned)
 
     def place_nodes(self, points: Array) -> Array:
-        """Add the midpoints to points or to their images: (..., P, D) to (..., N, D)."""
+        """Append the midpoints to points or image points: (..., P, D) to (..., N, D)."""
         middles = [points[..., list(ends), :].mean(axis=-2) for _, ends in self.midpoints]
         return np.concatenate([points, np.stack(middles, axis=-2)], axis=-2) if middles else points
 
@@ -194,7 +194,7 @@ class Linkage(Record):
         segments : mapping
             Segment, as ``"a-b"`` or ``("a", "b")``, to its length.
         points : sequence of str, optional
-            Their order; by default that in which the segments name them.
+            Names of the points in order; by default in the order of the segments.
         midpoints : mapping, optional
             Name of a midpoint to the ends of its segment.
         coplanar, perpendicular, collinear
@@ -264,7 +264,7 @@ def load_linkage(name: str | Path) -> Linkage:
     Raises
     ------
     InputError
-        If there is none of these, or it describes no object.
+        If the name is unknown, or the file or robot describes no object.
 
     Examples
     --------
@@ -285,15 +285,15 @@ def load_linkage(name: str | Path) -> Linkage:
         raise refusal(name, "", shown(str(error)), "the fields of posekit.linkage/1", "correct it") from None
 
 
-#: Minimum distance from all joints; nearer than this, the base or the end of a limb is not a separate point.
+#: Distance (metres) from all joints below which the base or the end of a limb is not a separate point.
 MIN_POINT_DISTANCE_METRES: Final = 5e-3
 
 
 def linkage_of_robot(robot: Any) -> Linkage:
-    """Make the linkage of a robot: origins of its turning joints, its base and the ends of its limbs.
+    """Return the linkage of a robot; its points are the revolute joints, the base and the ends of limbs.
 
-    Two points that keep their distance in every configuration are joined by a segment, so that a body of three or more
-    points is a rigid triangle. Such pairs are found by comparing their distances over random configurations.
+    A segment joins two points whose distance is the same in several random configurations. A body with three or more
+    points is therefore a set of rigid triangles.
 
     Parameters
     ----------
@@ -303,12 +303,12 @@ def linkage_of_robot(robot: Any) -> Linkage:
     Raises
     ------
     InputError
-        If fewer than two points remain, or no rigid segments join them all.
+        If fewer than two points remain, or rigid segments do not connect all points.
     """
     import pinocchio as pin
 
     model = robot.model
-    # Beyond a sliding joint no distance to the rest is fixed.
+    # Points beyond a sliding joint keep no distance to the others.
     kinds = [joint.shortname().removeprefix("JointModel") for joint in model.joints]
     sliding = {k for k, kind in enumerate(kinds) if kind.startswith(("P", "T"))}
     turning = [k for k in range(1, model.njoints) if not sliding.intersection(model.supports[k])]
@@ -325,7 +325,7 @@ def linkage_of_robot(robot: Any) -> Linkage:
         pin.framesForwardKinematics(model, data, q)
         moved.append([data.oMf[k].translation.copy() for k in ids])
     places, ends = np.array(moved), [0, *range(1 + len(joints), len(ids))]
-    # Joints first; a base or an end counts where it is away from them all, and points that coincide are one.
+    # Joints come first; a base or an end near a joint is left out, and coincident joints are one point.
     kept: list[int] = []
     for k in [*range(1, 1 + len(joints)), *ends]:
         apart = MIN_POINT_DISTANCE_METRES if k in ends else 1e-9
@@ -352,7 +352,7 @@ def linkage_of_robot(robot: Any) -> Linkage:
 def read_nearer(
     linkage: Linkage, nearer: Mapping[str, str] | Sequence[Mapping[str, str]] | None, count: int
 ) -> NDArray[np.int8]:
-    """Return the flips (F, S) that are given by hand for F = `count` frames: 1, -1, or 0 for a segment without one.
+    """Return the flips (F, S) given by hand for F = `count` frames: 1, -1, or 0 if none is given.
 
     Parameters
     ----------
@@ -384,7 +384,7 @@ def read_nearer(
 
 
 def name_nearer(linkage: Linkage, flips: Array | NDArray[np.int8]) -> dict[str, str]:
-    """Turn flips (S,) into choices by name, a segment to its nearer end: the inverse of `read_nearer`."""
+    """Return flips (S,) as a mapping from segments to their nearer ends: the inverse of `read_nearer`."""
     return {
         name: linkage.nodes[ends[0] if flip > 0 else ends[1]]
         for name, ends, flip in zip(linkage.segment_names, linkage.segments, flips.tolist(), strict=True)

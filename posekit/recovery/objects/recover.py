@@ -1,4 +1,4 @@
-"""One uncalibrated view of any articulated object in, every posture behind it out (Taylor 2000)."""
+"""Every posture of any articulated object behind an uncalibrated view (Taylor 2000)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from posekit.recovery.objects.growth import CLOSED_RESIDUAL, EXACT, MEASURED, To
 from posekit.recovery.objects.linkage import Linkage, name_nearer, read_nearer
 from posekit.recovery.objects.scale import CONSTRAINT_KINDS, search
 
-#: Largest number of scales of a frame, the best first.
+#: Largest number of scales of a frame; those of least residual are used.
 MAX_SCALES: Final = 128
 
 
 def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
-    """Read a way to fix the scale: kind, number, weights of constraints.
+    """Parse the way in which the scale is fixed: return its kind, number, and weights of constraints.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
     Raises
     ------
     InputError
-        If it is none of these.
+        If the text has none of these forms.
 
     Examples
     --------
@@ -68,17 +68,17 @@ class ObjectRecovery(Record):
     frame : int array (N,)
         Frame of each posture.
     points : array (N, P, 3)
-        Camera frame, in the linkage's unit; NaN where a point is not seen.
+        Positions, camera frame, in the linkage's unit; NaN if a point is not seen.
     flips : int array (N, S)
-        1 where the first end of a segment is nearer, -1 where its second is, 0 where neither is or it is not seen.
+        1 if the first end of a segment is nearer, -1 if its second is, 0 if neither is or the segment is not seen.
     scale : array (N,)
         Pixels a unit of length.
     q : array (N, nq), optional
-        Configurations of the robot; NaN where none was sought.
+        Configurations of the robot; NaN if none was computed.
     distance : array (N,), optional
-        Largest distance of a point of the configuration from the posture's.
+        Largest distance between a point of the configuration and the same point of the posture, metres or units.
     certified : bool array (N,), optional
-        Whether a configuration within limits reaches the posture. Otherwise it is undecided.
+        True if a configuration within limits reaches the posture. False leaves it undecided.
     frames : sequence of mapping
         ``time``, ``judged``, ``reason``, ``rejected`` and ``family`` (``how``, ``bound``, ``segment``, ``chosen``,
         ``minima``, ``curve``) of each frame.
@@ -161,15 +161,15 @@ def recover_object(
     nearer : mapping or sequence of F mappings
         Flips given by hand: segment to its nearer end.
     tolerance : (float, float), optional
-        Allowed error of closing lengths and shortfall of segments, in the linkage's unit. By default a frame is exact
-        where a loop closes exactly that need not have, else measured (1 and 2 % of the longest segment).
+        Allowed error of closing lengths and shortfall of segments, in the linkage's unit. By default exact if some
+        independent loop or shape of the frame is exact, otherwise 1 and 2 % of the longest segment.
     robot : Robot, optional
-        `posekit.robots.Robot` with the linkage's points as frames: configurations within its limits are sought.
+        `posekit.robots.Robot` with the linkage's points as frames, whose configurations within limits are computed.
 
     Raises
     ------
     InputError
-        If a name is unknown, or no frame can be as the view states: the first frame's reason.
+        If a name is unknown, or every frame contradicts itself; the message is the first frame's reason.
 
     Examples
     --------
@@ -224,7 +224,7 @@ def recover_object(
 def _scales(
     family: LinkageFamily, scale: str | float | None, hand: NDArray[np.int8], given: Tolerance | None
 ) -> tuple[dict[str, Any], Array]:
-    """Find the scales (K,) of one frame, and describe them for the result."""
+    """Return the scales (K,) of one frame, and the facts about them for the result."""
     linkage = family.linkage
     longest = float(linkage.lengths.max())
     bound = family.minimum_scale

@@ -1,10 +1,10 @@
-r"""The scale that constraints fix: a search over one dimension and all flips that matter (Taylor 2000, §2.1).
+r"""The scales that satisfy constraints: a search over the scale and all relevant flips (Taylor 2000, §2.1).
 
-The scale is an angle, :math:`s = s_{min} / \cos\psi`, in which foreshortenings are smooth: as a function of s, dZ
-starts at the bound with a vertical tangent; as a function of :math:`\psi` the segment that sets the bound has
-:math:`dZ = l \sin\psi`. Residuals are dimensionless: lengths are in units of the mean segment. A minimum is a root of
-the exact derivative, which is known to full precision where the residual, a sum of squares near zero, is known to half.
-The derivative is the imaginary part of the residual after an imaginary step of the angle (Squire & Trapp 1998).
+The scale is parametrised by an angle, :math:`s = s_{min} / \cos\psi`. As a function of s, dZ has a vertical tangent at
+the bound; as a function of :math:`\psi` it is smooth, :math:`dZ = l \sin\psi` for the segment that sets the bound.
+Residuals are dimensionless: lengths are in units of the mean segment. A minimum is a root of the exact derivative,
+which gives all digits of the angle; the residual itself, a sum of squares, gives half of them. The derivative is the
+imaginary part of the residual after an imaginary step of the angle (Squire & Trapp 1998).
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
 #: determine the scale, up to this number together; a single block may have more assignments.
 MAX_FLIPS, MAX_BLOCK_FLIPS = 1 << 15, 1 << 20
 
-#: Distance (rad) from the right angle at which the search ends: a thousand times the bound.
+#: Distance (rad) from the right angle at which the search ends, at a thousand times the least scale.
 RIGHT_ANGLE: Final = 1e-3
 
-#: Angles at which residuals are sampled; the small ones resolve segments that are almost at the bound themselves.
+#: Angles (rad) at which residuals are sampled; small ones resolve segments whose own bound is near the largest one.
 GRID: Final = np.unique(
     np.concatenate([np.linspace(0.0, math.pi / 2 - RIGHT_ANGLE, 240), np.geomspace(1e-5, 0.03, 36)])
 )
 
-#: A residual, weighed by the squared sine and cosine of the angle, that is zero but for rounding.
+#: Largest residual, times the squared sine and cosine of the angle, that is taken as zero.
 FLAT_RESIDUAL: Final = 1e-23
 
-#: Angle (rad) from the bound below which the segment that sets it is foreshortened to nothing.
+#: Angle (rad) below which the scale is at the bound: the segment that sets the bound has no depth.
 VANISHED_ANGLE: Final = 2e-6
 
-#: A derivative and a residual that are zero but for rounding; angles (rad) of one minimum.
+#: Largest derivative and residual that are taken as zero; difference of angles (rad) within one minimum.
 ZERO_SLOPE, ZERO_RESIDUAL, SAME_ANGLE = 1e-12, 1e-24, 1e-9
 
 #: Residuals that are evaluated at once.
@@ -69,7 +69,7 @@ class Minima(Record):
     residual : array (M,)
         Weighted sum of squares that the constraints leave (dimensionless).
     flips : int array (M, S)
-        1 where the first end of a segment is nearer, -1 where its second is, 0 where it does not matter.
+        1 if the first end of a segment is nearer, -1 if its second is, 0 if the residual does not depend on it.
     curve_s, curve_residual : array (G,)
         Scales from the bound on, and the least residual there over all flips (Taylor 2000, Figs. 7b and 8b).
     """
@@ -86,7 +86,7 @@ class Minima(Record):
 
 
 class Constraints:
-    """The weighted residuals of one image, and the assignments of flips that are tried.
+    """The weighted residuals of one image, and the assignments of flips to search.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Constraints:
     matter : list of int
         Segments on whose flips the residual depends.
     signs : array (K, S)
-        Assignments of flips, mirror images once.
+        Assignments of flips; of two mirror images only one is listed.
     """
 
     def __init__(self, family: LinkageFamily, weights: Mapping[str, float], given: NDArray[np.int8]) -> None:
@@ -127,8 +127,8 @@ class Constraints:
         self.signs = np.where(self.given == 0, 1.0, self.given)[None]
         for block in sorted(_blocks([segments for _, segments, _ in every], len(lengths)), key=len):
             free = [k for k in block if self.given[k] == 0]
-            # Turning all signs of a block round mirrors the posture in depth and changes no residual: one sign is held,
-            # of a segment that does not set the bound.
+            # The opposite signs of a block mirror the posture in depth and have the same residual: one sign is fixed,
+            # that of a segment that does not set the bound.
             if len(free) == len(block):
                 free.remove(next((k for k in free if not self.bounding[k]), free[0]))
             if self.matter and len(self.signs) << len(free) > MAX_FLIPS:
@@ -217,7 +217,7 @@ def search(
     s = family.minimum_scale / np.cos(psi)
     exact = np.where(residual <= ZERO_RESIDUAL, 0.0, residual)
     order = np.lexsort((s, exact))
-    # Minima that differ by rounding alone are one.
+    # Minima that differ by rounding only are merged.
     key = np.column_stack([flips[order], np.round(psi[order] / SAME_ANGLE)])
     _, first = np.unique(key, axis=0, return_index=True)
     order = order[np.sort(first)]
@@ -231,9 +231,9 @@ def search(
 
 
 def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
-    """Find the minima of every assignment of flips: roots of the derivative, and minima at the bound.
+    """Return the minima of every assignment of flips: roots of the derivative, and minima at the bound.
 
-    Flips whose residual is zero at every scale fix none.
+    Assignments whose residual is zero at every scale have no minimum.
 
     Returns
     -------
@@ -265,7 +265,7 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
     if len(row):
         bracket = (GRID[cell], GRID[cell + 1])
         psi = elementwise.find_root(slope_at, bracket, args=(np.arange(len(row)),)).x
-    # A segment that has vanished at the bound has two flips that are one posture: a minimum if both grow from there.
+    # At the bound both flips of a segment without depth are one posture: a minimum if the residual of both increases.
     grows = np.concatenate(starts)
     closed = np.where(constraints.bounding & (constraints.given == 0), 0.0, signs)
     _, same = np.unique(closed, axis=0, return_inverse=True)
@@ -275,7 +275,7 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
 
 
 def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
-    """Group the segments of terms: those of different blocks share none."""
+    """Return the segments of residuals in blocks: residuals of different blocks share no segment."""
     from scipy.sparse.csgraph import connected_components
 
     graph = np.zeros((count, count))
@@ -287,7 +287,7 @@ def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
 
 
 def _closure(loop: Array, signed: Array, shrink: Array) -> Array:
-    """Return the squared distance between the two ends of a loop that was cut open."""
+    """Return the squared gap in depth around a loop."""
     return np.asarray((signed @ loop) ** 2)
 
 
