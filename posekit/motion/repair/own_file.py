@@ -76,11 +76,10 @@ def in_own_file(
             free = np.delete(free, angles)
         for (old, _, kind), step in zip(groups, steps, strict=True):
             found, factor = _columns_of(columns[:, free], old, *kind)
-            for entry, places in found.items():
+            for place, entry in found:
                 moving = np.abs(step[:, entry]) > TINY
-                for place in places:
-                    out[moving, free[place]] += factor * step[moving, entry]
-            free = np.delete(free, [place for places in found.values() for place in places])
+                out[moving, free[place]] += factor * step[moving, entry]
+            free = np.delete(free, [place for place, _ in found])
         if len(free) > len(names) / 2 and before.q is not None:
             stale.extend(dict.fromkeys(names))
         return out
@@ -94,15 +93,13 @@ def in_own_file(
         new = change(flat, [name] * flat.shape[1])
         return new.astype(value.dtype).reshape(*first[:-1], len(rows), *value.shape[len(first) :])
 
-    data, (container, document) = read_bytes(path), parsed(path)
+    written, data, (container, document) = b"", read_bytes(path), parsed(path)
     if isinstance(document, Table) and not document.about:
         written = _in_lines(text(data, str(path)), document, len(before), rows, change)
     elif container == "arrays":
         written = _in_arrays(data, str(path), change_array)
     elif container == "c3d" and len(rows) == len(before):
         written = with_points(data, document, change_array("", document.points))
-    else:
-        return b"", []
     following = f"left as they were, although they may follow from q: {', '.join(stale)}"
     return written, [following] if stale else []
 
@@ -126,29 +123,29 @@ def _counted(motion: Motion) -> Array:
 
 def _columns_of(
     columns: Array, entries: Array, factors: tuple[float, ...], most: float
-) -> tuple[dict[int, list[int]], float]:
-    """Return the columns (of C) of each entry (of K), and the factor of all, by which most of them are found."""
+) -> tuple[list[tuple[int, int]], float]:
+    """Return pairs of a column (of C) and its entry (of K), and their factor: the one that finds most entries."""
     some = slice(None, None, max(1, len(columns) // SAMPLE))
-    best: tuple[dict[int, list[int]], float] = {}, 1.0
+    best: tuple[list[tuple[int, int]], float] = [], 1.0
     for factor in factors:
         values = columns[some] / factor
         off = _apart(values[..., None], entries[some, None])
-        found: dict[int, list[int]] = {}
+        found: list[tuple[int, int]] = []
         for entry in range(entries.shape[1] if len(off) else 0):
             place = int(np.argmin(off[:, entry]))  # of equal columns the first that is free
             if off[place, entry] < most:
-                found[entry] = [place]
+                found.append((place, entry))
                 off[place] = np.inf
         best = max(best, (found, factor), key=lambda one: len(one[0]))
     found, factor = best
-    free = np.setdiff1d(np.arange(columns.shape[1]), [place for places in found.values() for place in places])
+    free = np.setdiff1d(np.arange(columns.shape[1]), [place for place, _ in found])
     if factors is LENGTHS[0] and found and free.size:  # joints between two markers
         values = columns[some][:, free] / factor
-        for entry in set(range(entries.shape[1])) - set(found):
+        for entry in set(range(entries.shape[1])) - {entry for _, entry in found}:
             off = _apart((values[:, :, None] + values[:, None]) / 2, entries[some, entry, None, None])
             one, other = np.unravel_index(int(np.argmin(off)), off.shape)
             if off[one, other] < most:
-                found[entry] = [int(free[one]), int(free[other])]
+                found += [(int(free[one]), entry), (int(free[other]), entry)]
     return found, factor
 
 
