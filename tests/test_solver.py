@@ -431,7 +431,7 @@ def test_starts_lie_on_the_rays_at_the_lengths(camera, rooted):
         np.testing.assert_allclose(depth / depth[:, :1], np.tile(DEPTHS / DEPTHS[0], (len(TRUTH), 1)))
 
 
-@pytest.mark.parametrize(("hidden", "count"), [([8], 2 * 30), ([6], 3 * 2 * 6), ([6, 8], 30 * 3)])
+@pytest.mark.parametrize(("hidden", "count"), [([8], 2 * 30), ([6], 30 * 2), ([6, 8], 30 * 3)])
 def test_starts_of_hidden_joints_have_the_lengths_all_around(hidden, count):
     image = IMAGE.copy()
     image[:, hidden] = np.nan
@@ -448,8 +448,12 @@ def test_starts_of_hidden_joints_have_the_lengths_all_around(hidden, count):
         np.linalg.norm(ends[:, 0] - start, axis=1),
         np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1),
     )
-    fits = np.isclose(first, upper) & np.isclose(second, lower)
-    assert fits.mean() > 0.5 and (fits.all() or hidden == [6])
+    np.testing.assert_allclose(first, upper)
+    # A wrist whose ray passes too far from its elbow is at the nearest point of the ray.
+    aside = np.abs(np.einsum("ni,ni->n", ends[:, 1] - ends[:, 0], ends[:, 1])) < 1e-6
+    fits = np.isclose(second, lower)
+    assert (fits | (aside & (second > lower))).all() and (fits.all() or hidden == [6])
+    assert fits.any()
     for k, joint in enumerate((6, 8)):
         if joint not in hidden:
             np.testing.assert_allclose(CAMERA.project(ends[:, k]), IMAGE[row, joint], atol=1e-6)

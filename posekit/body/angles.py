@@ -38,6 +38,9 @@ TIED_ANGLES_RADIANS: Final = 1e-8
 #: Angles of a whole limb: three of its ball joint and one of its hinge.
 N_LIMB_ANGLES: Final = 4
 
+#: Plane of elevation (radians) at which the turn of an arm is cut: behind the back, on the other arm's side.
+SEAM: Final = np.radians(-115.0)
+
 HIP_FLEXIONS: Final = tuple(DOFS.index(f"{side}_hip.flexion") for side in SIDES)
 PELVIS_FLEXION: Final = DOFS.index("pelvis.flexion")
 
@@ -286,6 +289,22 @@ def _upper_angles(upper: Array, limits: Limits) -> Array:
     angles = _least_violating(direction_branches(upper) * limits.sign, limits)
     angles[:, 0] = np.where(_along_abduction_axis(upper), limits.clip(0, angles[:, 0]), angles[:, 0])
     return angles
+
+
+def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
+    r"""Return elevation, plane and turn of an arm without rotation (N,), radians.
+
+    The turn is the twist of the swing-twist decomposition less what an arm gathers when it is carried around the
+    vertical: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)
+    - (1 - \cos e)(90^\circ - p)`.
+    """
+    forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
+    down = np.cos(flexion) * np.cos(abduction)
+    elevation, plane = np.arctan2(np.hypot(forward, outward), down), np.arctan2(outward, forward)
+    a, b = flexion / 2, abduction / 2
+    twist = -2 * np.arctan2(np.sin(a) * np.sin(b), np.cos(a) * np.cos(b))
+    from_side = np.pi / 2 - np.where(plane < SEAM, plane + 2 * np.pi, plane)
+    return elevation, plane, twist - (1 - np.cos(elevation)) * from_side
 
 
 def other_branch(angles: Array) -> Array:

@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.angles import arm_angles
 from posekit.errors import refusal
 from posekit.geometry import Array, Flags, Ints, unit
 from posekit.skeleton import DOFS, LIMB_JOINTS
@@ -43,9 +44,6 @@ ELEVATION, PLANE, TURN, VALGUS = range(4, 8)
 
 #: Whether a lower segment that stands off away from the body reads as an internal rotation: arms, legs.
 VALGUS_SIGNS: Final = np.array([-1.0, 1.0])
-
-#: Plane of elevation (radians) at which the turn of an arm is cut: behind the back, on the other arm's side.
-SEAM: Final = np.radians(-115.0)
 
 #: Fraction of a range that a sinus leaves at the very end of another angle (dimensionless).
 LEAST_LEFT: Final = 0.1
@@ -184,7 +182,7 @@ class Limits:
         readings = [*np.moveaxis(angles, -1, 0)]
         offset = np.zeros(len(a))
         if kind == 0:
-            elevation, plane, offset = arm_readings(a, b)
+            elevation, plane, offset = arm_angles(a, b)
             readings += [elevation[:, None], plane[:, None]]
         lower, upper, turns, outward = self._bounds(limb, angles, readings, tolerance)
         if turns:
@@ -213,30 +211,28 @@ class Limits:
         turns: dict[int, Array] = {}
         outward = [np.zeros(shape), np.zeros(shape)]
         couplings = zip(n["role"][: int(n["couplings"])].astype(int).tolist(), n["knots"], strict=False)
-        for (which, target, side, of, count), (at, mean, limit) in couplings:
+        for (which, target, side, of, count), knots in couplings:
             if which != kind:
                 continue
-            end = np.broadcast_to(np.interp(readings[of], at[:count], limit[:count]), shape)
-            # A bound by an angle that is not known (NaN) is none.
-            pick = np.fmax if side == 0 else np.fmin
+            at, mean, limit = knots[:, :count]
+            end = np.broadcast_to(np.interp(readings[of], at, limit), shape)
             if target == TURN:
                 turns[side] = end
             elif target == VALGUS:
                 sign = 2 * side - 1
-                square = float(np.interp(np.pi / 2, at[:count], limit[:count]))
+                square = float(np.interp(np.pi / 2, at, limit))
                 turn, positive = _valgus(angles[..., 3], sign * end, sign * square)
                 upward = positive == (sign * VALGUS_SIGNS[kind] > 0)
                 outward[0] += np.where(upward, 0.0, turn)
                 outward[1] += np.where(upward, turn, 0.0)
             else:
-                column = 0 if target == ELEVATION else target
+                # A bound by an angle that is not known (NaN) is none.
+                pick, column = np.fmin if side else np.fmax, 0 if target == ELEVATION else target
                 bounds[side][..., column] = pick(bounds[side][..., column], end)
-                if target != ELEVATION:
-                    middle = np.interp(readings[of], at[:count], mean[:count])
-                    means[side][..., column] = pick(means[side][..., column], middle)
+                middle = np.interp(readings[of], at, mean)
+                means[side][..., column] = pick(means[side][..., column], middle)
         if n["sinus"][kind]:
-            fixed = n["limit"][limb], n["mean"][kind]
-            _round_off(angles, bounds, means, *fixed, n["sinus"][kind], tolerance)
+            _round_off(n, limb, angles, bounds, means, tolerance)
         return bounds[0], bounds[1], turns, outward
 
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
@@ -260,7 +256,6 @@ class Limits:
 
 def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -> None:
     """Write couplings and sinuses into the numbers."""
-    nothing = (0.0, 0.0)
     couplings = ranges.get("coupling", ())
     longest = max((len(one["points"]) for one in couplings), default=0)
     if len(couplings) > MAX_COUPLINGS or longest > MAX_KNOTS:
@@ -269,7 +264,7 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -
     for k, one in enumerate(couplings):
         kind = 0 if one["angle"].split(".")[0] in ("shoulder", "elbow") else 1
         side = int(one["end"] == "upper")
-        (shift, spread), (origin, _) = zeros.get(one["angle"], nothing), zeros.get(one["of"], nothing)
+        (shift, spread), (origin, _) = (zeros.get(one[name], (0.0, 0.0)) for name in ("angle", "of"))
         target, of = (_place(kind, one[name]) for name in ("angle", "of"))
         knots = np.array(one["points"], dtype=np.float64).T
         count = knots.shape[1]
@@ -302,15 +297,10 @@ def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
 
 
 def _round_off(
-    angles: Array,
-    bounds: list[Array],
-    means: list[Array],
-    limit: Array,
-    mean: Array,
-    power: float,
-    slack: float,
+    n: NDArray[np.void], limb: int, angles: Array, bounds: list[Array], means: list[Array], slack: float
 ) -> None:
     """Narrow the bounds of abduction, then of rotation, by how far the angles before are from their middles."""
+    limit, mean, power = n["limit"][limb], n["mean"][limb // 2], n["sinus"][limb // 2]
     used = np.zeros(angles.shape[:2])
     for place in range(3):
         low, high = (m[..., place] if place == 2 else mean[place, k] for k, m in enumerate(means))
@@ -323,22 +313,6 @@ def _round_off(
             off = angles[..., place] - middle
             half = np.where(off < 0, middle - limit[place, 0], limit[place, 1] - middle)
             used = used + (np.abs(off) / (half + slack)) ** power
-
-
-def arm_readings(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
-    r"""Return elevation, plane and turn of an arm without rotation (N,), radians.
-
-    The turn is the twist of the swing-twist decomposition less what an arm gathers when it is carried around the
-    vertical: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)
-    - (1 - \cos e)(90^\circ - p)`.
-    """
-    forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
-    down = np.cos(flexion) * np.cos(abduction)
-    elevation, plane = np.arctan2(np.hypot(forward, outward), down), np.arctan2(outward, forward)
-    a, b = flexion / 2, abduction / 2
-    twist = -2 * np.arctan2(np.sin(a) * np.sin(b), np.cos(a) * np.cos(b))
-    from_side = np.pi / 2 - np.where(plane < SEAM, plane + 2 * np.pi, plane)
-    return elevation, plane, twist - (1 - np.cos(elevation)) * from_side
 
 
 def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:

@@ -92,20 +92,20 @@ class Modes:
         """Return the covariance of all joint positions of some modes (K, 42, 42), square metres."""
         return np.asarray(run("covariance", self.problem, self.frame[rows], self.x[rows], KNOWN))
 
-    def residuals(self, rows: Ints | slice = slice(None)) -> Mapping[str, Array]:
-        """Return the size of every residual of some modes (K,), standard deviations, by what it is of.
+    def residuals(self) -> Mapping[str, Array]:
+        """Return the size of every residual of all modes (M,), standard deviations, by name.
 
         Names are ``image right_wrist``, ``length neck-pelvis``, ``root``, ``size`` and ``limit right_elbow.flexion``.
         """
-        x, p, limits = self.x[rows], self.problem.records[self.frame[rows]], self.problem.limits
-        joints = x[:, :42].reshape(-1, 14, 3)
+        x, joints, p, limits = self.x, self.joints, self.problem.records[self.frame], self.problem.limits
         root = np.einsum("nab,nb->na", p["root_weight"], joints[:, 0] - p["root"])
         single = [np.linalg.norm(root, axis=1)[:, None], np.abs(p["size_weight"] * x[:, 42])[:, None]]
         image, length = reference.image_terms(p, joints)[0], reference.length_terms(p, x)[0]
         table = np.concatenate([np.linalg.norm(image, axis=1), np.abs(length), *single], axis=1)
         out = dict(zip(RESIDUAL_NAMES, table.T, strict=True))
         if limits is not None:
-            beyond = p["limit_weight"][:, None] * np.abs(reference.limit_terms(limits, joints, 31)[0])
+            angles = np.concatenate([r for r, _ in reference.limit_terms(limits, joints, 31)], axis=1)
+            beyond = p["limit_weight"][:, None] * np.abs(angles)
             out |= dict(zip([f"limit {name}" for name in limits.names], beyond.T, strict=True))
         return out
 
@@ -117,7 +117,6 @@ def distinct(
     x: Array,
     parts: int,
     within: float | Array,
-    *,
     sure: bool = False,
 ) -> Flags:
     """Return which bodies (N, 43), the best first in each group, differ from all that are kept before them.
@@ -128,9 +127,3 @@ def distinct(
     near = np.broadcast_to(np.asarray(within, dtype=np.float64), group.shape)
     reach = MERGE_REACH_METRES if sure else 0.0
     return np.asarray(run("distinct", problem, group, frame, x, parts, near, reach, MERGE_CHI2, KNOWN))
-
-
-def merged(modes: Modes) -> Modes:
-    """Return the best of every set of modes that are one; they are sorted by frame and chi2."""
-    frame, x = modes.frame, modes.x
-    return modes.take(distinct(modes.problem, frame, frame, x, 31, MERGE_DISTANCE_METRES, sure=True))

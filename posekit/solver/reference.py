@@ -6,7 +6,7 @@ the trunk (six joints and the size), bits 1 to 4 the limbs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Final
 
@@ -121,9 +121,9 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
     on_size = np.where(w > 0, -records["length_weight"][:, some], 0.0)
     out.add(r, _along(d, INCIDENCE[some][:, free]), on_size)
     if problem.limits is not None:
-        terms = limit_terms(problem.limits, joints, parts)
-        out.beyond, d = (records["limit_weight"][0] * one for one in terms)
-        out.slopes = out.add(out.beyond, d[:, :, free].reshape(*d.shape[:2], -1))
+        w, terms = records["limit_weight"][0], limit_terms(problem.limits, joints, parts)
+        added = [(w * r, out.add(w * r, w * d[:, :, free].reshape(*d.shape[:2], -1))) for r, d in terms]
+        out.beyond, out.slopes = (np.concatenate(one, axis=1) for one in zip(*added, strict=True))
     if pull is not None:
         r = pull(joints)
         moved = joints[:, None] + PULL_STEP * np.eye(SIZE).reshape(-1, 14, 3)
@@ -169,24 +169,21 @@ def length_terms(
     return r, np.concatenate([((w / square)[..., None] * line)[:, None], bend * across], axis=1)
 
 
-def limit_terms(limits: Limits, joints: Array, parts: int) -> tuple[Array, Array]:
-    """Return limits beyond their ends, radians, of the pelvis's three angles and four of each limb, as far as free.
+def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
+    """Yield angles beyond their limits, radians, zero within: of the pelvis (N, 3), then of each limb (N, 4), as free.
 
-    Residuals (N, K) are zero within. Derivatives are (N, L, 14, 3); the last L - K rows are the turn of each limb about
-    a joint that is almost straight and bent beyond its end: how far it is bent grows on all sides, as the length of a
-    segment that turns.
+    Derivatives along the joints are (N, 3, 14, 3) and (N, 5, 14, 3): see `_limb_slopes`.
     """
-    torso, hips = trunk_frames(joints, bool(limits.numbers["between_hips"]))
-    residuals, slopes, turns = [np.zeros((len(joints), 0))], [np.zeros((len(joints), 0, 14, 3))], []
+    frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
         low, high = limits.numbers["pelvis"].T
-        angles = turned_near(ball_branch(relative_rotation(torso, hips)) * lim.PELVIS_SIGNS, (low + high) / 2)
-        residuals.append(angles - np.clip(angles, low, high))
-        slopes.append(_pelvis_slopes(limits, joints, torso, hips, residuals[-1] != 0))
+        angles = turned_near(ball_branch(relative_rotation(*frames)) * lim.PELVIS_SIGNS, (low + high) / 2)
+        r = angles - np.clip(angles, low, high)
+        yield r, _pelvis_slopes(limits, joints, *frames, r != 0)
     for limb in range(4):
         if parts >> (limb + 1) & 1:
-            frame = torso if limb < 2 else hips
-            angles = limb_branch(frame, *lim.limb_directions(joints, limb))
+            R = frames[limb // 2]
+            angles = limb_branch(R, *lim.limb_directions(joints, limb))
             r, writing = limits.residual(limb, angles)
             d, row = np.zeros((len(joints), 5, 14, 3)), np.flatnonzero(r.any(axis=1))
             if len(row):
@@ -194,11 +191,8 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> tuple[Array, Array
                 moved, _ = limits.residual(limb, steps, np.repeat(writing[row], 4))
                 along = (moved.reshape(-1, 4, 4) - r[row, None]) / ANGLE_STEP
                 along = np.where(r[row, :, None] != 0, np.swapaxes(along, 1, 2), 0.0)
-                d[row] = _limb_slopes(limits, joints[row], frame[row], limb, angles[row], along, r[row, 3])
-            residuals.append(r)
-            slopes.append(d[:, :4])
-            turns.append(d[:, 4:])
-    return np.concatenate(residuals, axis=1), np.concatenate([*slopes, *turns], axis=1)
+                d[row] = _limb_slopes(limits, joints[row], R[row], limb, angles[row], along, r[row, 3])
+            yield r, d
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
@@ -233,7 +227,8 @@ def _limb_slopes(
 ) -> Array:
     """Turn slopes (M, 4, 4) along a limb's four angles into derivatives (M, 5, 14, 3) along the joints.
 
-    The last row is the limb's turn about a joint that is almost straight and `bent` (M,) radians beyond its end.
+    The last row is curvature: the limb's turn about an elbow or knee that is almost straight and `bent` (M,) radians
+    beyond its end. How far it is bent grows on all sides, as the length of a segment that turns.
     """
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
     upper, lower = (one[:, None] for one in lim.limb_directions(joints, limb))
@@ -346,7 +341,7 @@ def information(problem: Problem, which: Ints, x: Array, known: Array, parts: in
     the factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
     """
     p, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
-    H = evaluate(problem, which, x, parts).matrix
+    H = evaluate(problem, which, x, parts).matrix + FLOOR * np.eye(3 * len(free) + 1)
     place = np.where((p["image"][:, free] != 0).any(axis=(2, 3)), known[0], known[1])
     H[:, :-1, :-1] += np.repeat(place, 3, axis=1)[:, None] * np.eye(3 * len(free))
     some = np.isin(SEGMENT_ENDS, free[free >= 6])
@@ -365,14 +360,12 @@ def information(problem: Problem, which: Ints, x: Array, known: Array, parts: in
 
 def covariance(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
     """Return the covariances of the joints (N, 42, 42)."""
-    H = information(problem, which, x, known) + FLOOR * np.eye(SIZE + 1)
-    return np.asarray(np.linalg.inv(H)[:, :SIZE, :SIZE])
+    return np.asarray(np.linalg.inv(information(problem, which, x, known))[:, :SIZE, :SIZE])
 
 
 def log_determinants(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
     """Return the logarithms of the determinants of the information (N,)."""
-    H = information(problem, which, x, known) + FLOOR * np.eye(SIZE + 1)
-    return np.asarray(np.linalg.slogdet(H)[1])
+    return np.asarray(np.linalg.slogdet(information(problem, which, x, known))[1])
 
 
 def distinct(

@@ -10,7 +10,7 @@ from posekit.geometry import Array, Ints
 from posekit.solver import reference
 from posekit.solver.engine import descend
 from posekit.solver.limits import ENDS, MIDDLES
-from posekit.solver.modes import MERGE_DISTANCE_METRES, Modes, distinct, merged
+from posekit.solver.modes import MERGE_DISTANCE_METRES, Modes, distinct
 from posekit.solver.problem import ROBUST_DEVIATIONS, Problem
 from posekit.solver.reference import Pull
 from posekit.solver.starts import limb_starts, trunk_starts
@@ -50,9 +50,6 @@ WHOLE: Final = 31
 #: Whole bodies of a frame that are tried, the likeliest ones: more arise only where much is hidden.
 MOST_BODIES: Final = 1500
 
-#: Frames solved together: enough to spread the overhead of NumPy, few enough to keep memory small.
-AT_ONCE: Final = 32
-
 #: Degrees of freedom that chi2 is granted at least: limits and lengths add to it even where nothing is left over.
 LEAST_FREEDOM: Final = 4
 
@@ -81,88 +78,73 @@ def solve(
     if max_chi2 is None:
         from scipy.special import gammainccinv
 
-        passing = 2 * gammainccinv(np.maximum(problem.freedom, LEAST_FREEDOM) / 2, REJECTION_PROBABILITY)
-        passing = passing + ROBUST_DEVIATIONS**2 * (
-            problem.records["robust"] > 0
-        )  # one gross error of a detector
+        gross = ROBUST_DEVIATIONS**2 * (problem.records["robust"] > 0)  # one gross error of a detector
+        freedom = np.maximum(problem.freedom, LEAST_FREEDOM)
+        passing = gross + 2 * gammainccinv(freedom / 2, REJECTION_PROBABILITY)
     else:
         passing = np.full(len(problem), float(max_chi2))
-    found = [
-        _solved(problem, np.arange(at, min(at + AT_ONCE, len(problem))), passing, pull)
-        for at in range(0, max(len(problem), 1), AT_ONCE)
-    ]
-    frame, x, chi2 = (np.concatenate([part[k] for part in found]) for k in range(3))
-    modes = Modes(problem=problem, frame=frame, x=x, chi2=chi2)
-    if most is not None:
-        first = np.searchsorted(modes.frame, modes.frame)
-        modes = modes.take(np.arange(len(modes)) - first < most)
-    return modes
-
-
-def _solved(whole: Problem, frames: Ints, passing: Array, pull: Pull | None) -> tuple[Ints, Array, Array]:
-    """Return the modes of some frames: frames of the whole problem (M,), unknowns (M, 43), and chi2."""
-    problem, passing = whole.take(frames), passing[frames]
-    frame, x, chi2 = _bodies(problem, *_trunks(problem, passing), passing)
-    if pull is not None:
-        near = chi2 <= passing[frame]
-        frame, hopeless = frame[near], HOPELESS * passing[frame[near]]
-        damping = np.full(len(frame), reference.FIRST_DAMPING)
-        x, chi2, _ = reference.descend(problem, frame, x[near], WHOLE, PULL_STEPS, hopeless, damping, pull)
-    order = np.lexsort((chi2, frame))
-    order = order[chi2[order] <= passing[frame[order]]]
-    modes = merged(Modes(problem=problem, frame=frame[order], x=x[order], chi2=chi2[order]))
-    return frames[modes.frame], modes.x, modes.chi2
-
-
-def _trunks(problem: Problem, passing: Array) -> tuple[Ints, Array, Array]:
-    """Return the trunks' modes: frames (T,), unknowns (T, 43), and chi2."""
     frame, trunk = trunk_starts(problem)
     x = np.zeros((len(frame), 43))
     x[:, :18] = trunk.reshape(-1, 18)
+    trunks = _minima(problem, passing, frame, x, 1, HOPELESS_TRUNK)
+    frame, x, chi2 = _minima(problem, passing, *_bodies(problem, *trunks, passing), WHOLE, HOPELESS)
+    if pull is not None:
+        hopeless, damping = HOPELESS * passing[frame], np.full(len(frame), reference.FIRST_DAMPING)
+        x, chi2, _ = reference.descend(problem, frame, x, WHOLE, PULL_STEPS, hopeless, damping, pull)
+        order = _best(problem, passing, frame, x, chi2, WHOLE)
+        frame, x, chi2 = frame[order], x[order], chi2[order]
+    modes = Modes(problem=problem, frame=frame, x=x, chi2=chi2)
+    return modes if most is None else modes.take(_rank(frame) < most)
+
+
+def _rank(group: Ints) -> Ints:
+    """Return the place of each entry within its group; groups are ascending."""
+    return np.arange(len(group)) - np.searchsorted(group, group)
+
+
+def _best(problem: Problem, most: Array, frame: Ints, x: Array, chi2: Array, parts: int) -> Ints:
+    """Return the rows of distinct bodies with a chi2 of at most `most` (F,) of their frame, the best first."""
+    order = np.lexsort((chi2, frame))
+    order = order[np.isfinite(chi2[order]) & (chi2[order] <= most[frame[order]])]
+    within, sure = (SAME_TRUNK_METRES, False) if parts == 1 else (MERGE_DISTANCE_METRES, True)
+    return order[distinct(problem, frame[order], frame[order], x[order], parts, within, sure=sure)]
+
+
+def _minima(
+    problem: Problem, passing: Array, frame: Ints, x: Array, parts: int, hopeless: float
+) -> tuple[Ints, Array, Array]:
+    """Return the minima that starts reach and that pass: frames (M,), unknowns (M, 43), and chi2, the best first.
+
+    Starts that approach each other after a few steps go on as one.
+    """
     damping = np.full(len(frame), reference.FIRST_DAMPING)
     for steps, level in ((FIRST_STEPS, np.inf), (40, 1.0)):
-        hopeless = HOPELESS_TRUNK * passing[frame]
-        x, chi2, damping = descend(problem, frame, x, 1, most=steps, hopeless=hopeless, damping=damping)
-        order = np.lexsort((chi2, frame))
-        order = order[np.isfinite(chi2[order]) & (chi2[order] <= level * passing[frame[order]])]
+        given_up = hopeless * passing[frame]
+        x, chi2, damping = descend(problem, frame, x, parts, most=steps, hopeless=given_up, damping=damping)
+        order = _best(problem, level * passing, frame, x, chi2, parts)
         frame, x, chi2, damping = frame[order], x[order], chi2[order], damping[order]
-        keep = distinct(problem, frame, frame, x, 1, SAME_TRUNK_METRES)
-        frame, x, chi2, damping = frame[keep], x[keep], chi2[keep], damping[keep]
     return frame, x, chi2
 
 
-def _bodies(
-    problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
-) -> tuple[Ints, Array, Array]:
-    """Return whole bodies at their minima: frames (B,), unknowns (B, 43), and chi2."""
+def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array) -> tuple[Ints, Array]:
+    """Return whole bodies that limbs make on trunks: frames (B,) and unknowns (B, 43)."""
     open_ = problem.sized | ~problem.rooted
     if open_[frame].any():
         # At the depth of a trunk alone a limb may be too short for its image, so that near and far fall together:
         # each trunk is first moved to where its best limbs want it.
-        row, body, _ = _combined(problem, frame, x, chi2, most=1)
+        row, body = _combined(problem, frame, x, chi2, most=1)
         row, body = row[open_[frame[row]]], body[open_[frame[row]]]
         body, value, _ = descend(problem, frame[row], body, WHOLE, hopeless=HOPELESS * passing[frame[row]])
         good = value <= 2 * HOPELESS * passing[frame[row]]
         x[row[good]] = body[good]
-    row, body, _ = _combined(problem, frame, x, chi2, most=None)
-    frame = frame[row]
-    hopeless = HOPELESS * passing[frame]
-    x, chi2, damping = descend(problem, frame, body, WHOLE, most=FIRST_STEPS, hopeless=hopeless)
-    # Bodies that approach each other go on as one.
-    order = np.lexsort((chi2, frame))
-    own = frame[order]
-    keep = order[distinct(problem, own, own, x[order], WHOLE, MERGE_DISTANCE_METRES, sure=True)]
-    frame, hopeless = frame[keep], hopeless[keep]
-    x, chi2, _ = descend(problem, frame, x[keep], WHOLE, hopeless=hopeless, damping=damping[keep])
-    return frame, x, chi2
+    row, body = _combined(problem, frame, x, chi2, most=MOST_BODIES)
+    return frame[row], body
 
 
-def _combined(
-    problem: Problem, frame: Ints, x: Array, chi2: Array, most: int | None
-) -> tuple[Ints, Array, Array]:
-    """Put limbs on trunks in all combinations that can pass: trunks (B,), unknowns (B, 43), and predicted chi2.
+def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -> tuple[Ints, Array]:
+    """Put limbs on trunks in all combinations that can pass: trunks (B,) and unknowns (B, 43).
 
-    With `most`, keep only the `most` best positions of each limb on a trunk.
+    Of each limb on a trunk, keep the `most` best positions.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2
@@ -177,8 +159,7 @@ def _combined(
         on, alone, value = on[order], alone[order], value[order]
         hidden = (~problem.seen_joints[frame[on]][:, [MIDDLES[limb], ENDS[limb]]]).sum(axis=1)
         keep = distinct(problem, on, frame[on], alone, 2 << limb, SAME_LIMB_METRES[hidden], sure=True)
-        if most is not None:
-            keep &= np.arange(len(on)) - np.searchsorted(on, on) < most
+        keep &= _rank(on) < most
         on, ends, value = on[keep], alone[keep][:, column], value[keep]
         # Every body so far with every position of this limb on its trunk.
         first = np.searchsorted(on, np.arange(len(frame) + 1))
@@ -188,9 +169,8 @@ def _combined(
         total = total[which] + value[choice]
         good = np.lexsort((total, frame[row[which]]))
         good = good[total[good] < LOOSE_BODY]
-        own = frame[row[which[good]]]
-        good = np.sort(good[np.arange(len(own)) - np.searchsorted(own, own) < MOST_BODIES])
+        good = np.sort(good[_rank(frame[row[which[good]]]) < MOST_BODIES])
         which, choice, total = which[good], choice[good], total[good]
         row, body = row[which], body[which].copy()
         body[:, column] = ends[choice]
-    return row, body, total
+    return row, body

@@ -26,12 +26,6 @@ UNSEEN_TRUNK_METRES: Final = 5.0
 #: Directions in which a hidden joint starts from its neighbour.
 DIRECTIONS: Final = 30
 
-#: Distances from shoulder to wrist, or hip to ankle, over the limb's length, if the joint between is hidden.
-REACHES: Final = (0.55, 0.8, 0.97)
-
-#: Positions of a hidden elbow or knee around the line between its neighbours.
-AROUND: Final = 6
-
 
 def sphere(count: int) -> Array:
     """Return unit vectors (count, 3) spread evenly over the sphere (Fibonacci lattice)."""
@@ -66,13 +60,11 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
     open_ = np.flatnonzero(~known)
     if open_.size:
         d, seen = directions[open_], problem.seen_joints[open_]
-        farthest = np.full(open_.size, np.inf)
-        for k in TRUNK_SEGMENTS:
-            a, b = SEGMENTS[k]
-            sine = np.linalg.norm(cross(d[:, a], d[:, b]), axis=1)
-            length = np.exp(p["log_length"][open_, k])
-            both = seen[:, a] & seen[:, b] & (sine > 1e-6)
-            farthest = np.where(both, np.minimum(farthest, length / np.where(both, sine, 1.0)), farthest)
+        a, b = np.array([SEGMENTS[k] for k in TRUNK_SEGMENTS]).T
+        sine = np.linalg.norm(cross(d[:, a], d[:, b]), axis=2)
+        both = seen[:, a] & seen[:, b] & (sine > 1e-6)
+        length = np.exp(p["log_length"][open_][:, TRUNK_SEGMENTS])
+        farthest = np.where(both, length / np.where(both, sine, 1.0), np.inf).min(axis=1)
         farthest = np.where(np.isfinite(farthest), farthest, UNSEEN_TRUNK_METRES)
         # A hidden neck starts on the mean ray of the trunk.
         mean = np.einsum("fji,fj->fi", d[:, :TRUNK], seen[:, :TRUNK].astype(float))
@@ -85,17 +77,33 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
     return frame[order], np.concatenate(places)[order]
 
 
+def branches(
+    problem: Problem, frame: Ints, joint: int, start: Array, ways: Array, hidden: Ints | int
+) -> tuple[Ints, Array]:
+    """Return rows (S,), ascending, and ends (S, 3) of the segments that lift a joint from N starts.
+
+    A seen joint is placed near and far on its ray. A hidden one is placed in the first `hidden`, int or (N,), of the
+    directions `ways` (N, W, 3).
+    """
+    seen = problem.seen_joints[frame, joint]
+    row = np.repeat(np.arange(len(frame)), np.where(seen, 2, hidden))
+    way = np.arange(len(row)) - np.searchsorted(row, row)
+    length = np.exp(problem.records["log_length"][frame[row], LIFTED[joint]])
+    on_ray = lift(problem, frame[row], joint, start[row], length, way == 1)
+    around = start[row] + length[:, None] * ways[row, way]
+    return row, np.where(seen[row, None], on_ray, around)
+
+
 def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
     """Return frames (S,), ascending, and trunks (S, 6, 3): near and far of each seen joint from every neck."""
     frame, neck = necks(problem)
     trunk = np.zeros((len(frame), TRUNK, 3))
     trunk[:, 0] = neck
     for joint in range(1, TRUNK):
-        row = np.repeat(np.arange(len(frame)), 1 + problem.seen_joints[frame, joint])
+        anywhere = np.zeros((len(frame), 2, 3))
+        row, place = branches(problem, frame, joint, trunk[:, PARENTS[joint]], anywhere, 1)
         frame, trunk = frame[row], trunk[row]
-        length = np.exp(problem.records["log_length"][frame, LIFTED[joint]])
-        far = np.diff(row, prepend=-1) == 0
-        trunk[:, joint] = lift(problem, frame, joint, trunk[:, PARENTS[joint]], length, far)
+        trunk[:, joint] = place
         if joint in (3, 5):  # hips hang on the pelvis, which is placed before
             frame, trunk = _filled(problem, frame, trunk, slice(0 if joint == 3 else 4, joint + 1))
     return frame, trunk
@@ -152,55 +160,15 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     limb : int
         Of `posekit.solver.limits.LIMBS`.
     """
-    middle, end = MIDDLES[limb], ENDS[limb]
-    lengths = np.exp(problem.records["log_length"][frame])
-    upper, lower = lengths[:, LIFTED[middle]], lengths[:, LIFTED[end]]
-    start = trunk[:, STARTS[limb]]
-    seen = problem.seen_joints[frame][:, [middle, end]]
-    rows, ends = [np.empty(0, dtype=np.intp)], [np.empty((0, 2, 3))]
-    for of_middle, of_end in ((True, True), (True, False), (False, True), (False, False)):
-        own = np.flatnonzero((seen == [of_middle, of_end]).all(axis=1))
-        if not own.size:
-            continue
-        s, f, u, w = start[own], frame[own], upper[own], lower[own]
-
-        def lifts(joint: int, origin: Array, length: Array, f: Ints = f) -> list[Array]:
-            return [lift(problem, f, joint, origin, length, far) for far in (False, True)]
-
-        ways = sphere(DIRECTIONS)
-        if of_middle and of_end:
-            pairs = [(a, b) for a in lifts(middle, s, u) for b in lifts(end, a, w)]
-        elif of_middle:
-            pairs = [(a, a + w[:, None] * way) for a in lifts(middle, s, u) for way in ways]
-        elif of_end:
-            tips = [tip for reach in REACHES for tip in lifts(end, s, reach * (u + w))]
-            pairs = [pair for tip in tips for pair in _around(s, tip, u, w)]
-        else:
-            bent = [(way, other) for way in ways for other in (way, -way, _side(way))]
-            pairs = [(s + u[:, None] * a, s + u[:, None] * a + w[:, None] * b) for a, b in bent]
-        rows += [own] * len(pairs)
-        ends += [np.stack(pair, axis=1) for pair in pairs]
-    row = np.concatenate(rows)
-    order = np.argsort(row, kind="stable")
-    return row[order], np.concatenate(ends)[order]
-
-
-def _around(start: Array, end: Array, upper: Array, lower: Array) -> list[tuple[Array, Array]]:
-    """Return a hidden middle joint in some turns about the line from start to end, with the end (N, 3)."""
-    line = end - start
-    reach = np.sqrt(dot(line, line))
-    axis = unit(line)
-    along = (reach**2 + upper**2 - lower**2) / (2 * reach)
-    off = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
-    other = np.where(np.abs(axis[:, :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    first = unit(cross(axis, other))
-    second = cross(axis, first)
-    return [
-        (start + along[:, None] * axis + off[:, None] * (np.cos(t) * first + np.sin(t) * second), end)
-        for t in np.arange(AROUND) * 2 * np.pi / AROUND
-    ]
-
-
-def _side(way: Array) -> Array:
-    """Return a unit vector square to another."""
-    return unit(np.cross(way, [0.0, 1.0, 0.0] if abs(way[1]) < 0.9 else [1.0, 0.0, 0.0]))
+    start, ways = trunk[:, STARTS[limb]], sphere(DIRECTIONS)
+    around = np.broadcast_to(ways, (len(frame), *ways.shape))
+    row, middle = branches(problem, frame, MIDDLES[limb], start, around, DIRECTIONS)
+    # Beyond a hidden joint the limb goes straight on, back, or at a right angle.
+    upper = unit(middle - start[row])
+    side = unit(cross(upper, np.where(np.abs(upper[:, 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])))
+    bent = np.stack([upper, -upper, side] * (DIRECTIONS // 3), axis=1)
+    seen = problem.seen_joints[frame[row], MIDDLES[limb]]
+    around = np.where(seen[:, None, None], ways, bent)
+    hidden = np.where(seen, DIRECTIONS, 3)
+    again, end = branches(problem, frame[row], ENDS[limb], middle, around, hidden)
+    return row[again], np.stack([middle[again], end], axis=1)
