@@ -1,4 +1,4 @@
-"""Collision and visual bodies of a robot, and their meshes, which come from its own directories alone."""
+"""Collision and visual bodies of a robot. Meshes are read only from the robot's package directories."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ Kind = Literal["collision", "visual"]
 
 #: Bytes of all meshes of a robot: about two million triangles of STL.
 MAX_MESHES_BYTES: Final = 100_000_000
+#: Bytes of the header of a binary STL file, which ends with the number of triangles, and of one triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50
 
 
@@ -31,7 +32,7 @@ def build_bodies(
     Parameters
     ----------
     model : pinocchio.Model
-        Made of the same URDF.
+        Built from the same URDF.
     robot : Element
         The checked URDF.
     package_dirs : sequence of Path
@@ -44,7 +45,7 @@ def build_bodies(
     Raises
     ------
     InputError
-        If a mesh is outside of `package_dirs`, missing, too large or damaged, or a body was not loaded.
+        If a mesh is outside `package_dirs`, missing, too large or damaged.
     """
     resolved, sizes = copy.deepcopy(robot), dict[Path, int]()
     for link in resolved.findall("link"):
@@ -67,9 +68,8 @@ def build_bodies(
         if isinstance(mesh, coal.BVHModelBase):
             # coal accepts NaN silently.
             ok = mesh.num_tris > 0 and (np.abs(mesh.vertices()) <= MAX_NUMBER).all()
-            need(
-                source, ok, place, "a mesh with other vertices", f"up to {MAX_NUMBER:g} m", "export it again"
-            )
+            got, expected = "a mesh without triangles or too large", f"coordinates up to {MAX_NUMBER:g} m"
+            need(source, ok, place, got, expected, "export it again")
     return geometry
 
 
@@ -79,8 +79,8 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
     Parameters
     ----------
     name : str
-        As in the URDF: ``package://PACKAGE/…``, ``file:///…``, absolute or relative. A package is a folder of that
-        name in a package directory, or such a directory itself.
+        The name in the URDF: ``package://PACKAGE/…``, ``file:///…``, or an absolute or relative path. PACKAGE is
+        the name of a package directory or of a folder inside one.
     package_dirs : sequence of Path
         The only directories from which meshes are read.
     source, place : str
@@ -89,21 +89,20 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
     Returns
     -------
     Path
-        The file, with symbolic links followed.
+        The file. Symbolic links are resolved.
 
     Raises
     ------
     InputError
-        If no such file lies inside of them once links and ``..`` are followed.
+        If the resolved path is no file inside a package directory.
     """
     scheme, mark, rest = name.partition("://")
     field, known = f"{place}: mesh {shown(name)}", scheme in ("package", "file") or not mark
-    need(
-        source, known, field, f"{cut(scheme)}://", "package://, file:// or a path", "copy it beside the URDF"
-    )
+    expected = "package://, file:// or a path"
+    need(source, known, field, f"{cut(scheme)}://", expected, "copy it beside the URDF")
     package, _, inner = (rest if mark else name).partition("/")
     homes = [folder / inner for folder in package_dirs if mark and inner and folder.name == package]
-    with suppress(OSError):  # of a name that is too long
+    with suppress(OSError):  # raised if the name is too long
         for path in (*homes, *(folder / (rest if mark else name) for folder in package_dirs)):
             found = path.resolve()
             if found.is_file() and any(found.is_relative_to(folder.resolve()) for folder in package_dirs):
@@ -131,11 +130,11 @@ def _check_mesh_file(path: Path) -> int:
 
 
 def link_of(model: pin.Model, body: pin.GeometryObject) -> str:
-    """Return the link that carries a body."""
+    """Return the name of the link that carries a body."""
     return str(model.frames[body.parentFrame].name)
 
 
 def first_link(model: pin.Model, joint: int) -> int:
-    """Return the frame of the first link on a joint."""
+    """Return the frame index of the first link that moves with a joint."""
     frames = enumerate(model.frames)
     return next(k for k, one in frames if one.parentJoint == joint and one.type == pin.FrameType.BODY)

@@ -17,15 +17,16 @@ from posekit.skeleton import PARTS
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
 
-#: Metres: a shorter part gets no capsule.
+#: Length below which a piece of a segment gets no capsule, metres.
 SHORTEST: Final = 1e-3
 
 
 def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     """Build the collision bodies of a robot with capsules in place of meshes.
 
-    Capsules are laid along the segments between mapped joints. A segment with joints inside it, as a spine, is cut
-    there; each body carries its own part, named after the segment, with a number if there are several.
+    Each capsule lies along a segment between two mapped joints. A segment that spans several joints, such as the
+    spine, is cut at these joints, and each moving body carries one piece. A piece has the name of its segment, with a
+    number if the segment has several pieces.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
         Its own primitive shapes stay. A humanoid without any body gets a capsule for every part. A robot that is not
         a humanoid gets none, as nothing is known of its shape.
     figure : Robot
-        The stick figure, whose capsules are laid along the limbs in the same proportions.
+        The stick figure. The capsules have its proportions.
     """
     model, plain, meshed = robot.model, copy.deepcopy(robot.tree), set[int]()
     for link in plain.findall("link"):
@@ -55,7 +56,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
         up, down = (list(model.supports[robot.joint_map[name].joint]) for name in joints)
         common = len(set(up) & set(down))
         carriers = [*reversed(up[common:]), *down[common - 1 :]]
-        # The joint between two bodies is the one further from the root.
+        # Two neighbouring bodies meet at the joint that is further from the root.
         places = [data.oMi[max(pair)].translation for pair in pairwise(carriers)]
         edges = [float((place - start) @ (end - start)) / length**2 for place in places]
         cuts = pairwise(np.clip([0.0, *edges, 1.0], first, last))
@@ -74,7 +75,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
 
 
 def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
-    """Return the figure's capsules: start and end of the axis, and radius, in shares of their part's length."""
+    """Return the start, the end and the radius of the figure's capsules, as shares of their segment's length."""
     found, (data, place) = {}, _neutral(figure)
     for body in figure.geometry.geometryObjects:
         part = link_of(figure.model, body)
@@ -88,7 +89,7 @@ def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
 
 
 def _neutral(robot: Robot) -> tuple[pin.Data, dict[str, Array]]:
-    """Return Pinocchio's data and the mapped points (3,), metres, at its neutral configuration."""
+    """Return Pinocchio's data and the mapped points (3,), metres, at Pinocchio's neutral configuration."""
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
     return data, {name: data.oMi[site.joint].act(site.offset) for name, site in robot.joint_map.items()}

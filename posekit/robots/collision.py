@@ -19,28 +19,28 @@ from posekit.skeleton import PARTS
 #: Number of pairs of bodies that are measured at once and stay in the processor's cache, and least number of
 #: configurations, which spreads NumPy's overhead.
 PAIRS_AT_ONCE, LEAST_AT_ONCE = 20_000, 128
-#: Metres that hulls and capsules are taken larger, above the tolerance of coal's GJK.
+#: Margin added to bodies in tests that exclude contact, metres. It exceeds the tolerance of coal's GJK.
 ROOM: Final = 1e-6
-#: Metres within which the depth of a penetration is computed.
+#: Tolerance of the depth of a penetration, metres.
 DEPTH: Final = 1e-5
 #: Shapes whose distances have a closed form.
 ROUND: Final = coal.Sphere | coal.Capsule
-#: Least extent of a mesh over its size below which it is flat.
+#: Ratio of a mesh's smallest extent to its size below which the mesh is flat (dimensionless).
 FLAT: Final = 1e-6
 
 
 def set_pairs(
     model: pin.Model, geometry: pin.GeometryModel, neutral: Array, parts: Collection[tuple[str, str]]
 ) -> None:
-    """Set the pairs of bodies to check if no SRDF names pairs.
+    """Choose the pairs of bodies to check for a robot whose SRDF disables none.
 
-    All pairs are checked except neighbours and pairs that touch in the neutral configuration. For capsules that stand
-    for a humanoid's parts, only the pairs in `parts` are checked: those of the stick figure's bodies.
+    Neighbours and pairs that touch in the neutral configuration are removed. Capsules of a humanoid's parts are checked
+    only if the stick figure checks the same parts: `parts` has the names of its pairs of bodies.
     """
     checked_parts = {frozenset(map(_part, pair)) for pair in parts}
     pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects
     joints, names = [body.parentJoint for body in bodies], [_part(body.name) for body in bodies]
-    # The neighbour above is the nearest joint with a body: the thigh's is the pelvis if a hip has three hinges.
+    # The neighbour of a body is the nearest body above it: the pelvis for a thigh, even if the hip has three hinges.
     above = {joint: set(list(model.supports[joint])[:-1]).intersection(joints) for joint in joints}
     near = [{joint, max(carriers, default=0)} for joint, carriers in above.items()]
     data, geometry_data = model.createData(), geometry.createData()
@@ -59,27 +59,21 @@ def _part(body: str) -> str:
 
 
 def disable_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: str, source: str) -> bool:
-    """Remove the pairs of links that an SRDF disables; return whether it disables some.
+    """Remove the pairs of links that an SRDF disables. Return whether the SRDF disables any pair.
 
-    Links that the robot lacks are passed over: published robots share an SRDF among variants.
+    Links that the robot lacks are ignored, because variants of a published robot share an SRDF.
 
     Raises
     ------
     InputError
-        If the text is no SRDF, or none of its links is the robot's.
+        If the text is no SRDF, or the robot has none of its links.
     """
     root = parse_xml(srdf, source)
     need(source, root.tag == "robot", "", f"the root element <{cut(root.tag)}>", "<robot>", "name an SRDF")
     links = [one.get(end, "") for one in root.findall("disable_collisions") for end in ("link1", "link2")]
     known = not links or any(map(model.existBodyName, links))
-    need(
-        source,
-        known,
-        "<disable_collisions>",
-        f"{cut(', '.join(links))}",
-        "links of the robot",
-        "name its SRDF",
-    )
+    got, expected = f"only unknown links ({cut(', '.join(links))})", "links of the robot"
+    need(source, known, "<disable_collisions>", got, expected, "name this robot's SRDF")
     pin.removeCollisionPairsFromXML(model, geometry, srdf)
     return bool(links)
 
@@ -94,9 +88,9 @@ class Contacts(NamedTuple):
     frame, pair : int arrays (K,)
         Row of the configuration and index of the pair, for each pair nearer than the margin; sorted.
     distance : array (K,)
-        Signed distance in metres, negative for penetration. Two meshes have the distance or the depth of their
-        convex hulls: they are at least so far apart, and at most so deep in each other. If the hulls overlap and
-        the meshes do not touch, it is the distance of the meshes.
+        Signed distance in metres, negative for penetration. For meshes that touch it is the depth of their convex
+        hulls, an upper bound of their own depth. For meshes that do not touch it is the distance of their hulls, a
+        lower bound, or their own distance if the hulls overlap.
     """
 
     hit: Flags
@@ -108,9 +102,9 @@ class Contacts(NamedTuple):
 class SelfCollision:
     """Collision queries of one model.
 
-    Pairs that keep apart are recognised in NumPy by the balls and the boxes around the bodies (Gottschalk, Lin and
-    Manocha 1996, §5); two capsules or spheres are measured there exactly. The other pairs are tested by their convex
-    hulls, and by their meshes only if these touch.
+    NumPy excludes pairs whose bounding balls or bounding boxes are apart (Gottschalk, Lin and Manocha 1996, §5), and
+    measures capsules and spheres exactly. coal tests the convex hulls of the remaining pairs, and their meshes only if
+    the hulls touch.
 
     Parameters
     ----------
@@ -147,7 +141,7 @@ class SelfCollision:
             request.epa_tolerance = DEPTH
 
     def contacts(self, q: Array, margin: float = 0.0) -> Contacts:
-        """Return the pairs nearer than a margin.
+        """Return the pairs of bodies that are nearer to each other than a margin.
 
         Parameters
         ----------
@@ -167,7 +161,7 @@ class SelfCollision:
         return Contacts(hit, row[kept], pair[kept], distance[kept])
 
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
-        """Return the pairs that can be nearer than the margin: rows, pairs, and distances of capsules, else NaN."""
+        """Return rows and pairs that can be nearer than the margin, and the distances of capsules, NaN for others."""
         frames, centre = self._kinematics.place(q)
         axes = np.einsum("jbin,bjk->ikbn", frames, self._axes).reshape(3, 3, -1)
         places, count = centre.transpose(1, 0, 2), len(q)
@@ -192,7 +186,7 @@ class SelfCollision:
         return row[near], pair[near], distance[near]
 
     def _measure(self, q: Array, row: Ints, pair: Ints, distance: Array, margin: float) -> None:
-        """Fill in the distances that are NaN and within the margin, with coal."""
+        """Replace distances that are NaN and below the margin by distances from coal, in place."""
         model, data, meshes, mesh_data = self.model, self._data, self._meshes, self._mesh_data
         hulls, hull_data = self._hulls, self._hull_data
         rows, pairs, placed, placed_meshes = row.tolist(), pair.tolist(), -1, -1
@@ -216,7 +210,7 @@ class SelfCollision:
 
 
 def _hull(mesh: coal.BVHModelBase) -> coal.CollisionGeometry:
-    """Return the convex hull of a mesh; the mesh itself if it is flat, for which coal has none."""
+    """Return the convex hull of a mesh, or the mesh itself if it is flat: coal has no hulls of flat meshes."""
     vertices = np.array(mesh.vertices())
     if np.linalg.matrix_rank(vertices - vertices.mean(axis=0), tol=FLAT * np.abs(vertices).max()) < 3:
         return mesh
@@ -228,7 +222,7 @@ def _hull(mesh: coal.BVHModelBase) -> coal.CollisionGeometry:
 
 
 def _box(shape: coal.CollisionGeometry) -> tuple[Array, Array, float]:
-    """Return a box along a shape's axes: centre, half sides; and the radius of a ball about its centre."""
+    """Return a shape's bounding box along its axes (centre, half sides) and the radius of a bounding ball, metres."""
     shape.computeLocalAABB()
     low, high = np.ravel(shape.aabb_local.min_), np.ravel(shape.aabb_local.max_)
     centre, half = (low + high) / 2, (high - low) / 2

@@ -1,4 +1,4 @@
-"""Mimicking joints, and q from tables whose columns are named."""
+"""Mimicking joints, and configurations from tables with named columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Mimic(NamedTuple):
-    """A joint that follows another one: value = multiplier * value of target + offset (rad or m)."""
+    """A joint that follows a target joint: value = multiplier * (value of the target) + offset, rad or m."""
 
     joint: str
     target: str
@@ -28,7 +28,7 @@ class Mimic(NamedTuple):
 
 
 def mimics_of(robot: Element) -> tuple[Mimic, ...]:
-    """List the mimics of a checked URDF, each after the one that its target is."""
+    """List the mimicking joints of a checked URDF. If a target mimics another joint, the target comes first."""
     found: dict[str, Mimic] = {}
     for joint in robot.findall("joint"):
         mimic, name = joint.find("mimic"), joint.get("name", "")
@@ -65,7 +65,7 @@ def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple
     at, given = [entries[key] for key in columns], np.array(list(columns.values())).T
     q[:, at] = given
     q = robot.with_mimics(q)
-    q[:, at] = given  # mimicking joints may have columns of their own
+    q[:, at] = given  # columns of mimicking joints keep their values
     following = {mimic.joint for mimic in robot.mimics}
     left = [
         entry.name
@@ -80,5 +80,5 @@ def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple
 
 
 def _key(name: str) -> str:
-    """Return a name of a column without case and without ``_joint`` at the end of the joint's name."""
+    """Return a column's name in lower case, without ``_joint`` at the end of the joint's name."""
     return str(name).strip().lower().replace("_joint.", ".").removesuffix("_joint")

@@ -1,4 +1,4 @@
-"""Find a robot's files: by the name of a published one, or by path."""
+"""Find a robot's files by the name of a published robot or by path."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from posekit.files import DATA
 #: Names of the built-in figure.
 FIGURE: Final = ("figure", "stick_figure")
 ROBOT_PACKAGE: Final = "example-robot-data"
-#: Number of folders above a URDF that can be its package, and the names that a package has inside.
+#: Number of parent folders of a URDF that can be its package, and names of files or folders that mark a package.
 _PACKAGE_DEPTH, _PACKAGE_SIGNS = 4, ("package.xml", "meshes", "mesh")
 
 
@@ -26,8 +26,8 @@ def find(name_or_path: str | Path) -> tuple[str, Path, Path | None, tuple[Path, 
     Parameters
     ----------
     name_or_path : str or path
-        A name of `robot_names`, or the path of a URDF. Names with a slash or a suffix are paths. The packages of a
-        path are its own folder and, up to four folders above, those that hold ``package.xml`` or meshes.
+        A name from `robot_names`, or the path of a URDF. A name with a slash, or with the suffix ``.urdf`` or
+        ``.xml``, is a path.
 
     Returns
     -------
@@ -35,12 +35,13 @@ def find(name_or_path: str | Path) -> tuple[str, Path, Path | None, tuple[Path, 
     urdf : Path
     srdf : Path or None
     package_dirs : tuple of Path
-        The folders from which meshes are read.
+        The only folders from which meshes are read: the URDF's folder, and each of its four parent folders that
+        holds ``package.xml``, ``meshes`` or ``mesh``.
 
     Raises
     ------
     InputError
-        If there is no such robot; the nearest names are given.
+        If there is no such robot. The message suggests similar names.
     """
     name = str(name_or_path)
     known = _published() if isinstance(name_or_path, str) else {}
@@ -59,7 +60,7 @@ def find(name_or_path: str | Path) -> tuple[str, Path, Path | None, tuple[Path, 
 
 
 def robot_names() -> tuple[str, ...]:
-    """List the names that `find` knows in this environment."""
+    """List the names of robots that `load_robot` finds in this environment."""
     return tuple(sorted(_published()))
 
 
@@ -67,7 +68,7 @@ def robot_names() -> tuple[str, ...]:
 def _published() -> dict[str, tuple[Path, Path]]:
     """Map names to the URDF and SRDF files of the figure and, if it is installed, of example-robot-data.
 
-    The distribution has data alone, under the prefix of its packager; a system package puts them under ``share``.
+    The Python package example-robot-data keeps its files below ``cmeel.prefix``; system packages use ``share``.
     """
     robots = Path(sys.prefix) / "share" / ROBOT_PACKAGE / "robots"
     with suppress(PackageNotFoundError):

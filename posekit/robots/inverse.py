@@ -1,4 +1,4 @@
-"""Inverse kinematics: joint positions to configurations inside the limits, for a batch of postures."""
+"""Inverse kinematics: configurations within the joint limits that reach joint positions, for a batch of postures."""
 
 from __future__ import annotations
 
@@ -16,46 +16,41 @@ from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, POINTS
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
 
-#: Metres: a posture is met if no known point is farther off; otherwise other starts are tried.
+#: Distance (m) from their targets within which all known points must be; otherwise other starts are tried.
 MET: Final = 1e-3
-#: m^2/rad^2: pull toward the start; chooses among configurations that place the points alike.
+#: Weight of the squared distance from the start, m^2/rad^2. It selects among configurations with equal points.
 PULL: Final = 1e-10
+#: Largest number of steps of a search.
 STEPS: Final = 40
 #: Relative decrease of the cost below which a search ends.
 PRECISION: Final = 1e-4
-#: m^2: a smaller decrease ends the search in any case; distances are then below a nanometre.
+#: Decrease of the cost (m^2) below which a search ends in any case. Distances are then below a nanometre.
 LEAST: Final = 1e-19
-#: Postures searched side by side, whose Jacobians have about 15 MB.
+#: Number of postures that are searched at once. Their Jacobians have about 15 MB.
 BLOCK: Final = 256
-#: Levenberg-Marquardt: first, smallest and largest damping, and its factors after good and bad steps.
+#: Damping of Levenberg-Marquardt: first, smallest and largest value, and factors after a good and a bad step.
 DAMPING: Final = (1e-3, 1e-12, 1e6, 0.1, 8.0)
-#: m^2/rad^2 added to the diagonal that scales the damping, for entries that move no point.
+#: Smallest scale of the damping, m^2/rad^2. It bounds the steps of joints that move no point.
 FLOOR: Final = 1e-6
-#: Other starts that are tried: the middles of the limits, and random configurations.
+#: Number of other starts: the middle of the limits, then random configurations.
 SEEDS: Final = 4
 
 
 class _Problem:
-    """Least squares of one robot: targets (N, P, 3) of its points, limits, and the entries of v that move."""
+    """The least-squares problem of one robot: N postures with targets (N, P, 3) of its P mapped points, metres."""
 
     def __init__(self, robot: Robot, joints: Array) -> None:
         model = robot.model
         columns = [POINTS.index(name) for name in robot.joint_map]
         padded = np.pad(joints, ((0, 0), (0, len(POINTS) - len(JOINTS)), (0, 0)), constant_values=np.nan)
-        self.robot, self.model, self.kinematics, self.targets = (
-            robot,
-            model,
-            robot.kinematics,
-            padded[:, columns],
-        )
+        self.robot, self.model, self.kinematics = robot, model, robot.kinematics
+        self.targets = padded[:, columns]
         self.known = np.asarray(np.isfinite(self.targets).all(axis=2))
         self.trunk = [k for k, column in enumerate(columns) if column < N_TRUNK_JOINTS]
-        # Entries of q and v of the joints that have limits: hinges and slides.
-        single = [j for j in range(1, model.njoints) if model.nqs[j] == 1]
-        self.at_q, self.at_v = (
-            np.array(first, dtype=np.intp)[single] for first in (model.idx_qs, model.idx_vs)
-        )
-        # A mimicking joint moves with its target: v = S u, u the entries of the other joints.
+        # Indices in q and v of the joints with limits: hinges and slides.
+        single = np.array(model.nqs) == 1
+        self.at_q, self.at_v = np.array(model.idx_qs)[single], np.array(model.idx_vs)[single]
+        # A mimicking joint moves with its target: v = S u, where u are the entries of v of all other joints.
         follow = np.eye(model.nv)
         for mimic in robot.mimics:
             one, other = (model.idx_vs[model.getJointId(name)] for name in (mimic.joint, mimic.target))
@@ -64,22 +59,25 @@ class _Problem:
         self.follow = follow[:, self.free]
 
     def gaps(self, positions: Array, rows: Ints) -> Array:
-        """Return the offsets (n, P, 3) of points from their targets, zero where unknown."""
+        """Return the offsets (n, P, 3) of points from their targets, metres; zero for unknown targets."""
         return np.where(self.known[rows, :, None], positions - self.targets[rows], 0.0)
 
     def away(self, q: Array, start: Array) -> Array:
-        """Return how far hinges and slides are from the start, as entries of v (n, nv)."""
+        """Return the differences of hinges and slides from the start, as entries of v (n, nv), zero elsewhere."""
         out = np.zeros((len(q), self.model.nv))
         out[:, self.at_v] = q[:, self.at_q] - start[:, self.at_q]
         return out
 
     def cost(self, q: Array, start: Array, rows: Ints) -> Array:
-        """Return half the sum of squared distances, and of the pull toward the start (n,)."""
+        """Return half the sum (n,) of the squared distances and the weighted squared difference from the start, m^2."""
         gap = self.gaps(self.kinematics.positions(q), rows)
         return np.asarray((gap**2).sum(axis=(1, 2)) + PULL * (self.away(q, start) ** 2).sum(axis=1)) / 2
 
     def step(self, q: Array, start: Array, rows: Ints, damping: Array) -> Array:
-        """Return damped Gauss-Newton steps (n, nv); entries at a limit and pushed against it stay (Bertsekas 1982)."""
+        """Return damped Gauss-Newton steps (n, nv).
+
+        An entry at a limit does not move if the gradient pushes it outward (Bertsekas 1982).
+        """
         positions, jacobian = self.kinematics.jacobians(q)
         gap = self.gaps(positions, rows).reshape(len(q), -1)
         J = (jacobian * self.known[rows, :, None, None]).reshape(len(q), gap.shape[1], -1)
@@ -98,12 +96,12 @@ class _Problem:
         return -np.linalg.solve(H, (moving * gradient)[..., None])[..., 0] @ S.T
 
     def moved(self, q: Array, step: Array) -> Array:
-        """Take steps (n, nv) up to the limits."""
+        """Return the configurations (n, nq) after steps (n, nv), clipped to the limits."""
         out = np.array([pin.integrate(self.model, a, b) for a, b in zip(q, step, strict=True)])
         return self.inside(out.reshape(len(q), self.model.nq))
 
     def inside(self, q: Array) -> Array:
-        """Return configurations (n, nq) within the limits, with mimicking joints in place."""
+        """Clip configurations (n, nq) to the limits, and let mimicking joints follow their targets."""
         return self.robot.with_mimics(np.clip(q, self.robot.lower, self.robot.upper))
 
     def worst(self, q: Array) -> Array:
@@ -112,7 +110,7 @@ class _Problem:
         return np.asarray(np.linalg.norm(gaps, axis=2).max(axis=1, initial=0.0))
 
     def laid(self, q: Array) -> Array:
-        """Repeat a configuration (nq,), its floating root moved so that the trunk lies best on its targets."""
+        """Repeat a configuration (nq,) for N postures, with its floating root moved so that the trunk fits best."""
         out = np.tile(q, (len(self.targets), 1))
         if not self.robot.free_flyer:
             return out
@@ -121,17 +119,17 @@ class _Problem:
         gap = np.nan_to_num(mean_known((targets - points).transpose(0, 2, 1)))
         root, fixed = pin.XYZQUATToSE3(np.array(q[:7])), self.model.jointPlacements[1]
         for row, (R, t) in enumerate(zip(found.rotation, found.translation, strict=True)):
-            # Too few known points cannot turn the trunk.
+            # Fewer than three known points determine no rotation.
             T = pin.SE3(R, t) if np.isfinite(R).all() else pin.SE3(np.eye(3), gap[row])
             out[row, :7] = pin.SE3ToXYZQUAT(fixed.actInv(T * fixed * root))
         return out
 
 
 def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
-    r"""Find configurations that place the mapped joints, inside the limits.
+    r"""Find configurations within the limits that place the mapped joints.
 
-    Minimises :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, all
-    postures side by side. Postures that are not met are tried from other starts.
+    Minimise :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, for all
+    postures at once. If a posture is not reached, the search is repeated from other starts.
 
     Parameters
     ----------
@@ -139,8 +137,8 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     joints : array (14, 3) or (N, 14, 3)
         Metres, world; NaN is unknown.
     start : array (N, nq), optional
-        Configurations near the solution. What the points do not determine stays near them, by default near the
-        neutral configuration.
+        Configurations near the solution; by default the neutral configuration. Joints that the points do not determine
+        stay near it.
 
     Returns
     -------
@@ -152,7 +150,7 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     Raises
     ------
     InputError
-        If the robot has no joint map, or an array has another shape.
+        If the robot is not a humanoid, or an array has another shape.
     """
     given = np.asarray(joints, dtype=np.float64)
     given = given[None] if given.ndim == 2 else given
@@ -176,7 +174,7 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
 
 
 def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Array, Array]:
-    """Search from configurations (n, nq) of some rows; return where it ended, and the cost (n,)."""
+    """Search for the postures `rows` from configurations (n, nq); return the final ones and their costs (n,), m^2."""
     q, damping = q.copy(), np.full(len(q), DAMPING[0])
     cost = problem.cost(q, start, rows)
     for first in range(0, len(q), BLOCK):

@@ -18,23 +18,23 @@ from posekit.robots.urdf import need
 from posekit.skeleton import POINTS, SIDES
 
 SCHEMA: Final = "posekit.joint_map/1"
-#: Maps of the package, in the order in which they are tried.
+#: Joint maps that come with posekit, in the order in which `find_joint_map` tries them.
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
 
-#: Places of a model that stand for points of `posekit.skeleton.POINTS`, in that order.
+#: Place on a robot of each point that it has, by the point's name, in the order of `posekit.skeleton.POINTS`.
 JointMap = Mapping[str, Site]
 
 
 def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
-    """Load a joint map by name (one of `BUILT_IN`) or from a TOML file, for a model.
+    """Load the joint map of a model by name (one of `BUILT_IN`) or from a TOML file.
 
     Raises
     ------
     InputError
-        If there is no such map, it is not as ``posekit.joint_map/1`` requires, or the model lacks one of its frames.
+        If there is no such map, the map does not follow ``posekit.joint_map/1``, or the model lacks one of its frames.
     """
     found = dict[str, Site]()
-    # A link goes before a joint of the same name.
+    # If a joint and a link have the same name, the link is used.
     links_last = sorted(enumerate(model.frames), key=lambda one: one[1].type == pin.FrameType.BODY)
     frames = {frame.name: frame for _, frame in links_last}
     for point, (frame, offset) in _places(str(name)).items():
@@ -46,7 +46,10 @@ def load_joint_map(name: str | Path, model: pin.Model) -> JointMap:
 
 
 def find_joint_map(model: pin.Model) -> JointMap:
-    """Return the first built-in map whose frames a model has, or a map from its joints' names; empty if none fits."""
+    """Return the first built-in map whose frames the model has, or else a map derived from the names of its joints.
+
+    The map is empty if the model is not a humanoid.
+    """
     for name in BUILT_IN:
         if all(model.existFrame(frame) for frame, _ in _places(name).values()):
             return load_joint_map(name, model)
@@ -56,9 +59,9 @@ def find_joint_map(model: pin.Model) -> JointMap:
 def _derived(model: pin.Model) -> JointMap:
     """Derive a map from the names of the moving joints; empty if an elbow, a knee, a shoulder or a hip is missing.
 
-    If a shoulder or a hip has several joints, the middle one is used, near which all axes pass; elsewhere the first
-    joint with such a name is used. The neck is the middle between the shoulders on the body that carries the arms, the
-    pelvis the body that carries the legs.
+    If a shoulder or a hip has several joints, its middle joint is used: all axes pass near it. Elbows, wrists, knees
+    and ankles use their first joint. The neck is the midpoint of the shoulders, on the body that carries both arms. The
+    pelvis is the origin of the body that carries both legs.
     """
     words = read_table("names", "joint_maps", ("names",), "posekit.joint_names/1", "joint map")
     chains: dict[str, list[int]] = {}
@@ -87,7 +90,7 @@ def _derived(model: pin.Model) -> JointMap:
 
 @lru_cache(maxsize=16)
 def _places(name: str) -> dict[str, tuple[Any, Any]]:
-    """Read a joint map: the frame of each point, and the offset in that frame."""
+    """Read the frame of each point of a joint map, and the point's offset in that frame, metres."""
     places, given = {}, read_table(name, "joint_maps", BUILT_IN, SCHEMA, "joint map").get("points")
     for point, place in (given if isinstance(given, dict) else {"points": given}).items():
         need(name, point in POINTS, "points", shown(point), "a joint's name", nearest(point, POINTS))

@@ -42,7 +42,7 @@ class Kinematics:
     model : pinocchio.Model
         Joints may be revolute, continuous, prismatic, planar and floating.
     points : sequence of Site
-        The points to place; only joints that lead to one are placed.
+        The points to place. Joints that no point depends on are not computed.
     """
 
     def __init__(self, model: pin.Model, points: Sequence[Site]) -> None:
@@ -77,7 +77,7 @@ class Kinematics:
         ).reshape(-1, 4, 3)
 
     def place(self, q: Array) -> tuple[Array, Array]:
-        """Place the points, and the joints that they are on.
+        """Return the positions of the points, and the axes of their joints.
 
         Parameters
         ----------
@@ -118,9 +118,9 @@ class Kinematics:
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
         """Return the axes (njoints, 3, 3, N) and origins (njoints, 3, N) of the joints that lead to a point."""
-        columns = np.concatenate([q.T, np.zeros((1, len(q)))])  # a row for the universe if q is empty
+        columns = np.concatenate([q.T, np.zeros((1, len(q)))])  # the last row serves the universe if nq is 0
         first, second = columns[self._at]
-        cos, sin = first.copy(), second.copy()  # of a continuous joint
+        cos, sin = first.copy(), second.copy()  # entries of a continuous joint
         cos[self._angle], sin[self._angle] = np.cos(first[self._angle]), np.sin(first[self._angle])
         cos[self._slides], sin[self._slides] = 1.0, 0.0
         axes, origin = np.zeros((len(first), 3, 3, len(q))), np.zeros((len(first), 3, len(q)))
@@ -144,12 +144,12 @@ class Kinematics:
 
 
 def _mix(parent: Array, translation: Array, rotation: Array) -> Array:
-    """Return the axes and the origin (4, 3) of a frame in the axes of a parent that is turned (3, 3) itself."""
+    """Return three axes and the origin (4, 3) of a child frame in the axes of its parent's turned frame (3, 3)."""
     return np.vstack([rotation.T, translation]) @ parent
 
 
 def _mixed(mix: Array, axes: Array) -> Array:
-    """Return the axes and the origins (4, K, 3, N) of frames, by their mixes (K, 4, 3) of their parents' axes."""
+    """Return axes and origins (4, K, 3, N) of K frames, from coordinates (K, 4, 3) in their parents' axes."""
     flat = mix @ axes.reshape(len(mix), 3, axes.shape[2] * axes.shape[3])
     return np.asarray(flat.reshape(len(mix), 4, *axes.shape[2:]).transpose(1, 0, 2, 3))
 
@@ -173,7 +173,7 @@ class Entry(NamedTuple):
 
 
 def entries_of(model: pin.Model) -> list[Entry]:
-    """List the entries of q. The seven of a floating root have no prefix: x, y, z, qx, qy, qz, qw."""
+    """List the entries of q. The entries of a floating root have no prefix: x, y, z, qx, qy, qz, qw."""
     entries = []
     for joint in range(1, model.njoints):
         kind, name = model.joints[joint].shortname(), str(model.names[joint])

@@ -1,4 +1,4 @@
-"""A robot: Pinocchio's model of a checked URDF, with its limits, names, bodies and the places of the 14 joints."""
+"""A robot: Pinocchio's model of a checked URDF, with limits, names, collision bodies and the 14 joints."""
 
 from __future__ import annotations
 
@@ -32,38 +32,39 @@ from posekit.skeleton import JOINTS, POINTS
 
 Bodies = Literal["meshes", "capsules", "none"]
 
-#: Distance from 1 up to which the length of a quaternion is normalised: files are written with few digits.
+#: Largest deviation of a quaternion's length from 1 that is normalised (dimensionless). Files have few digits.
 ROUNDED: Final = 1e-2
-#: Names of the floating joint that is added; the first one that no joint of the URDF has.
+#: Names for an added floating joint. The first name that no joint of the URDF has is used.
 ROOT_NAMES: Final = ("root_joint", "free_flyer", "posekit_root_joint")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Robot(Record):
-    """A robot, made from texts; `load_robot` makes one from files.
+    """A robot, built from the texts of a URDF and an SRDF; `load_robot` builds one from files.
 
     Parameters
     ----------
     urdf : str
-        The URDF. It is parsed and checked once; Pinocchio is given the checked elements.
+        Text of the URDF. It is parsed and checked once; Pinocchio reads the checked elements.
     srdf : str or None
-        The SRDF, which names pairs of links that are not checked for collision.
+        Text of the SRDF, which names pairs of links that are not checked for collision.
     name, source : str
         The robot's name, and the file it came from, for errors.
     package_dirs : tuple of Path
         The only directories from which meshes are read.
     fixed_base : bool
-        Fix the root, as for an arm; otherwise it moves freely, by the URDF's own floating joint if there is one.
+        Whether the root is fixed, as for an arm. Otherwise it moves freely, with the URDF's own floating joint if there
+        is one.
     bodies : {"meshes", "capsules", "none"}
-        Collision bodies: those of the URDF; the same with capsules in place of meshes, or along the limbs if it has
-        no bodies; or none.
+        Collision bodies. ``meshes`` are the bodies of the URDF. ``capsules`` replace its meshes, or lie along the limbs
+        if the URDF has no bodies.
     joint_map_file : str
         Name or TOML file of the joint map; see `joint_map`.
 
     Raises
     ------
     InputError
-        If a text or a mesh is not as it should be; one line that names the place.
+        If a text or a mesh is damaged or against the rules of URDF. The message names the place in one line.
 
     Examples
     --------
@@ -91,12 +92,12 @@ class Robot(Record):
 
     @cached_property
     def tree(self) -> ElementTree.Element:
-        """The checked elements of the URDF; not to be changed."""
+        """The checked elements of the URDF. Change only copies."""
         return check_urdf(self.urdf, self.source)
 
     @cached_property
     def model(self) -> pin.Model:
-        """Pinocchio's model. Mimicking joints have entries of q of their own: see `mimics`."""
+        """Pinocchio's model. Mimicking joints have their own entries of q: see `mimics`."""
         joints = {joint.get("name"): joint.get("type") for joint in self.tree.findall("joint")}
         root: tuple[Any, ...] = ()
         if not self.fixed_base and "floating" not in joints.values():
@@ -135,22 +136,25 @@ class Robot(Record):
 
     @cached_property
     def lower(self) -> Array:
-        """Lower limits of q (nq,), rad and m; -inf if there are none."""
+        """Lower limits of q (nq,), rad and m; -inf for entries without a limit."""
         return self._limits(self.model.lowerPositionLimit, -np.inf)
 
     @cached_property
     def upper(self) -> Array:
-        """Upper limits of q (nq,), rad and m; inf if there are none."""
+        """Upper limits of q (nq,), rad and m; inf for entries without a limit."""
         return self._limits(self.model.upperPositionLimit, np.inf)
 
     @cached_property
     def neutral(self) -> Array:
-        """The neutral configuration (nq,): zero, or the nearest limit, with mimicking joints in place."""
+        """The neutral configuration (nq,): zero or the limit nearest to zero; mimicking joints follow their targets."""
         return read_only(self.with_mimics(np.clip(pin.neutral(self.model), self.lower, self.upper)[None])[0])
 
     @cached_property
     def configuration_names(self) -> tuple[str, ...]:
-        """Name of each entry of q: the joint's; x, y, z, qx, qy, qz, qw of the root; ``.cos``, ``.sin``."""
+        """Name of each entry of q: the joint's name, with ``.cos`` and ``.sin`` if the joint is continuous.
+
+        A floating root has the entries x, y, z, qx, qy, qz, qw.
+        """
         return tuple(entry.name for entry in entries_of(self.model))
 
     @cached_property
@@ -160,12 +164,12 @@ class Robot(Record):
 
     @cached_property
     def mimics(self) -> tuple[Mimic, ...]:
-        """The joints that follow others; a joint comes after the one that it follows."""
+        """The joints that mimic a target joint. If a target mimics another joint, the target comes first."""
         return mimics_of(self.tree)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
-        """The collision bodies, as Pinocchio names them: link and number."""
+        """Pinocchio's names of the collision bodies: link and number."""
         return tuple(body.name for body in self.geometry.geometryObjects)
 
     @cached_property
@@ -175,20 +179,20 @@ class Robot(Record):
 
     @cached_property
     def collision_pairs(self) -> tuple[tuple[str, str], ...]:
-        """The pairs of bodies that are checked, by name."""
+        """The names of the two bodies of each pair that is checked for collision."""
         pairs = self.geometry.collisionPairs
         return tuple((self.body_names[pair.first], self.body_names[pair.second]) for pair in pairs)
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of URDF and SRDF, by which a report identifies the robot."""
+        """SHA-256 of URDF and SRDF. A report identifies the robot by it."""
         return hashlib.sha256(f"{self.urdf}\0{self.srdf or ''}".encode()).hexdigest()
 
     @cached_property
     def joint_map(self) -> JointMap:
-        """The frames that stand for the 14 joints: a built-in or a given map, or one from the names of the joints.
+        """The place on the robot of each of the 14 joints; empty if the robot is not a humanoid.
 
-        It is empty if the robot is not a humanoid.
+        It is the given map, a built-in map, or a map derived from the names of the robot's joints.
 
         Raises
         ------
@@ -201,27 +205,27 @@ class Robot(Record):
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """The kinematics of the mapped points."""
+        """Batched kinematics of the mapped points."""
         return Kinematics(self.model, list(self.joint_map.values()))
 
     def checked(self, q: ArrayLike, source: str = "q") -> Array:
-        """Check configurations: Pinocchio accepts quaternions of any length.
+        """Check the shape and the numbers of configurations, and normalise their quaternions.
 
         Parameters
         ----------
         q : array (nq,) or (N, nq)
         source : str
-            Their name in errors.
+            Name of the configurations in errors.
 
         Returns
         -------
         array (N, nq)
-            A copy; quaternions, and cosines and sines, of unit length.
+            A copy. Quaternions, and pairs of cosine and sine, have unit length.
 
         Raises
         ------
         InputError
-            If the shape is another, a number is not finite, or a quaternion's length is more than 0.01 from 1.
+            If the shape is wrong, a number is not finite, or a quaternion's length differs from 1 by more than 0.01.
         """
         q, check = np.atleast_2d(np.array(q, dtype=np.float64)), partial(need, source)
         remedy = "give a row a configuration, in the order of configuration_names"
@@ -244,7 +248,7 @@ class Robot(Record):
         return q
 
     def with_mimics(self, q: Array) -> Array:
-        """Return configurations (N, nq) whose mimicking joints have the values of their targets."""
+        """Return configurations (N, nq) with mimicking joints set to the values that follow from their targets."""
         q, model = q.copy(), self.model
         for mimic in self.mimics:
             joint, target = model.getJointId(mimic.joint), model.getJointId(mimic.target)
@@ -258,7 +262,7 @@ class Robot(Record):
         return q
 
     def mimic_errors(self, q: Array) -> Array:
-        """Return the deviations (N, M) of mimicking joints from their targets' values, rad or m; see `mimics`."""
+        """Return the deviations (N, M) of the M mimicking joints from the values set by `with_mimics`, rad or m."""
         steps = [pin.difference(self.model, a, b) for a, b in zip(self.with_mimics(q), q, strict=True)]
         at = [self.model.idx_vs[self.model.getJointId(mimic.joint)] for mimic in self.mimics]
         return np.reshape(steps, (-1, self.model.nv))[:, at]
@@ -269,8 +273,8 @@ class Robot(Record):
         Parameters
         ----------
         names : sequence of str
-            Names of the columns: entries of `configuration_names`, or joints; a continuous joint is one angle in
-            radians, or its cosine and sine. Case and an ending ``_joint`` do not matter.
+            Names of the columns: entries of `configuration_names`, or joints. A continuous joint has one column with
+            an angle in radians, or two with its cosine and sine. Case and a final ``_joint`` do not matter.
         values : array (N, len(names))
             Radians and metres.
 
@@ -279,17 +283,17 @@ class Robot(Record):
         q : array (N, nq)
             Joints without a column follow the joint that they mimic, or have their neutral value.
         notes : tuple of str
-            Joints without a column, and columns that were ignored.
+            Sentences that list joints without a column and ignored columns.
 
         Raises
         ------
         InputError
-            If less than half of the columns are the robot's, or a name is given twice.
+            If fewer than half of the columns belong to the robot, or two columns have the same name.
         """
         return from_columns(self, names, values)
 
     def points(self, q: ArrayLike) -> Array:
-        """Return the 14 joints (N, 14, 3) of configurations (N, nq), metres, world; NaN for joints it lacks.
+        """Return the 14 joints (N, 14, 3) of configurations (N, nq), metres, world; NaN for joints the robot lacks.
 
         Raises
         ------
@@ -303,7 +307,7 @@ class Robot(Record):
     def velocities(self, q: Array, time: Array) -> Array:
         """Return the joint velocities (T - 1, nv) between configurations (T, nq) at times (T,): rad/s and m/s.
 
-        The difference is `pinocchio.difference`: the twist of a floating root in its own frame, linear first.
+        They are those of `pinocchio.difference`: a floating root has a twist in its own frame, linear part first.
         """
         steps = [pin.difference(self.model, a, b) for a, b in pairwise(q)]
         return np.array(steps).reshape(-1, self.model.nv) / np.diff(time)[:, None]
@@ -315,7 +319,7 @@ class Robot(Record):
         ----------
         q : array (N, nq)
         margin : float
-            Metres below which pairs are listed; touching pairs alone by default.
+            Distance below which pairs are listed, metres; by default only touching pairs are listed.
 
         Returns
         -------
@@ -332,7 +336,7 @@ class Robot(Record):
         return self._collision.contacts(self.checked(q), margin)
 
     def configurations(self, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return configurations that place the joints, inside the limits: see `posekit.robots.inverse.solve`.
+        """Return configurations within the limits that place the joints: see `posekit.robots.inverse.solve`.
 
         Parameters
         ----------
@@ -358,7 +362,7 @@ class Robot(Record):
         return SelfCollision(self.model, self.geometry)
 
     def _limits(self, given: Array, none: float) -> Array:
-        """Return limits of q (nq,), only of joints with one entry: Pinocchio gives quaternions limits, too."""
+        """Keep the given limits (nq,) of joints with one entry of q; the entries of other joints have no limit."""
         return read_only(np.where(np.repeat(self.model.nqs, self.model.nqs) == 1, given, none))
 
 
@@ -378,20 +382,20 @@ def load_robot(
     name_or_path : str or path
         A published robot (``g1``, ``human``, ``talos``, ``panda``, …), ``figure``, or the path of a URDF.
     srdf : path, optional
-        Its SRDF; by default the published one, or the one of the same name beside the URDF.
+        The robot's SRDF; by default the published SRDF, or the SRDF of the same name beside the URDF.
     bodies : {"meshes", "capsules", "none"}
         Collision bodies: see `Robot`. Capsules need no mesh files.
     package_dirs : sequence of path
-        Directories that hold the packages of its meshes, besides its own.
+        More directories with the packages of the robot's meshes. Its own folders are always searched.
     fixed_base : bool
-        Fix the root, as for an arm.
+        Whether the root is fixed, as for an arm.
     joint_map : str or path
-        Name or TOML file of the joint map; by default the one that fits.
+        Name or TOML file of the joint map; by default a map that fits the robot.
 
     Raises
     ------
     InputError
-        One line that says what is wrong with the name, a file, a mesh or a number.
+        If a name, a file, a mesh or a number is wrong. The message says how in one line.
 
     Examples
     --------

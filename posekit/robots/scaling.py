@@ -1,4 +1,4 @@
-"""A robot with the segment lengths of a person: the origins of its URDF joints are moved."""
+"""Scale a robot to the segment lengths of a person by moving the origins of its URDF joints."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ from posekit.skeleton import HIPS, JOINT, JOINTS, LIMB_SEGMENTS, SEGMENTS, TORSO
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
 
-#: Ratios of a person's length to the robot's that are plausible; beyond them the unit is wrong.
+#: Plausible ratios of a person's segment length to the robot's (dimensionless); beyond them the unit is wrong.
 RATIO: Final = (0.05, 20.0)
-#: Metres within which two places are one.
+#: Distance within which two places coincide, metres.
 SAME: Final = 1e-9
 
 
 def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     """Return the robot with the median segment lengths of postures.
 
-    At the neutral configuration the mapped joints have the person's distances. Limbs have them in every
-    configuration. Bodies grow with their segments; hands, feet and head keep their size.
+    Limb segments have the person's lengths in every configuration; distances within torso and hips are the person's at
+    the neutral configuration. Bodies grow with their segments; hands, feet and head keep their size.
 
     Parameters
     ----------
     robot : Robot
-        With a joint map.
+        A humanoid. Other robots are returned as they are.
     joints : array (N, 14, 3) or (14, 3)
-        Metres; NaN is unknown. Lengths that are never seen stay the robot's.
+        Metres; NaN is unknown. Segments that are unknown in all postures keep the robot's length.
 
     Returns
     -------
     Robot
-        Made of a URDF with other joint origins; its name is the robot's.
+        A robot of the same name whose URDF has other joint origins and body sizes.
 
     Raises
     ------
     InputError
-        If the robot has no joint map, or a length is beyond 20 times the robot's, up or down.
+        If a length is more than 20 times larger or smaller than the robot's.
     """
     given = np.asarray(joints, dtype=np.float64).reshape(-1, *np.shape(joints)[-2:])[:, : len(JOINTS)]
     model, tree, data = robot.model, copy.deepcopy(robot.tree), robot.model.createData()
@@ -57,7 +57,7 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     above = {link: end.get("link", "") for link, one in joint_of.items() for end in one.findall("parent")}
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     place = {link: data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in links}
-    # New origins (m) at neutral of the root and of the links in scaled chains. Rotations at neutral stay.
+    # New origins (3,), metres, of the root and of links in scaled chains, at neutral. Their rotations do not change.
     origin = {link: place[link].translation for link in links.keys() - joint_of.keys()}
     grown = set[str]()
     for name in ("pelvis", *JOINTS):
@@ -74,7 +74,7 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
         if min(size, length) > SAME:
             stretch = length / size * rotation_between(old / size, new / length)
         for link in path:
-            # Other links that start at the same place stay with the chain, as the second of two clavicles.
+            # Links with the same origin move together, such as the two clavicles of a robot.
             for other in (one for one in above if above[one] == above[link]):
                 offset = place[other].translation - place[last].translation
                 if np.allclose(place[other].translation, place[link].translation, atol=SAME):
@@ -104,16 +104,16 @@ def _set(element: Element, attribute: str, values: Array) -> None:
 
 
 def segment_lengths(joints: Array) -> Array:
-    """Return the median length of each segment of `posekit.skeleton.SEGMENTS` (17,), metres; NaN if never seen."""
+    """Return the median length of each segment of `posekit.skeleton.SEGMENTS` (17,), metres; NaN if unknown."""
     gaps = np.linalg.norm(joints[:, [a for a, _ in SEGMENTS]] - joints[:, [b for _, b in SEGMENTS]], axis=2)
     return np.array([known_median(one) for one in gaps.T])
 
 
 def _wanted(own: Array, joints: Array, source: str) -> Array:
-    """Return places (14, 3) of the joints at neutral that have the lengths of postures, near the robot's own.
+    """Return positions (14, 3) of the joints at neutral with the segment lengths of postures, metres.
 
-    Torso and hips have the median shape of the postures in which they are whole, laid on the robot's own; limbs keep
-    the robot's directions.
+    Torso and hips have the median shape of the postures in which all their joints are known, aligned with the robot's
+    joints. Limbs keep the robot's directions.
     """
     lengths, kept = segment_lengths(joints), segment_lengths(own[None])
     ratio = lengths / kept

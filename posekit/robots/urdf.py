@@ -1,7 +1,7 @@
 """URDF and SRDF texts: parsed once, checked, and reduced to the elements that a model is made of.
 
-Pinocchio's reader drops bodies and inertias that it does not understand, accepts reversed limits and axes of zero
-length, and overflows its stack on long chains. All of these are refused here, with one line that names the place.
+Pinocchio's reader drops bodies that it does not understand, accepts reversed limits and axes of zero length, and
+overflows its stack on long chains. These faults are refused here, in one line that names the place.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from posekit.errors import cut, nearest, one_line, refusal, shown
 
 Element = ElementTree.Element
 
-#: Bytes of a URDF or SRDF; published ones have at most 0.3 MB.
+#: Largest size of a URDF or SRDF, bytes. Published files have at most 0.3 MB.
 MAX_BYTES: Final = 10_000_000
-#: Elements inside each other; readers recurse.
+#: Largest depth of nested elements. Native readers are recursive.
 MAX_NESTING: Final = 64
-#: Links from the root to a leaf; Pinocchio's reader overflows its stack at about 5000.
+#: Largest number of links from the root to a leaf. Pinocchio's reader overflows its stack at about 5000.
 MAX_CHAIN: Final = 250
 #: Largest numbers of parts. The largest published robots have about 150 links and 112 bodies; Pinocchio's data grow
 #: with the cube of the degrees of freedom and have 0.3 GB at 200.
 MOST: Final = {"links": 1000, "bodies": 500, "degrees of freedom": 200}
 #: Largest coordinate, metres or radians; products of larger numbers overflow.
 MAX_NUMBER: Final = 1e6
-#: Range of the largest limit of a revolute joint (rad) that is read as degrees if two joints have it.
+#: Range of limits of revolute joints (rad) that are probably degrees if at least two joints have such a limit.
 #:
-#: Published robots have limits of at most 10 rad, or of 1e16 for rotors without limits.
+#: Published robots have limits of at most 10 rad, and 1e16 rad for rotors without limits.
 DEGREES: Final = (15.0, 720.0)
 
 #: Degrees of freedom of each joint type.
@@ -63,14 +63,14 @@ _SINGLES: Final = (
 #: Elements with numbers, and those whose numbers are coordinates and sizes.
 _PLACED: Final = ("origin", "axis", *SIZES)
 _NUMERIC: Final = ("limit", "mimic", "mass", *_PLACED)
-#: Children of links and joints that a model is made of; others, as of simulators, are removed.
+#: Children of links and joints that the model is built from. Others, such as those of simulators, are removed.
 _KEPT: Final = {
     "link": ("inertial", "collision", "visual", "collision_checking"),
     "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
 }
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
-#: Refuses unless a condition is true: condition, place, got, expected, remedy.
+#: A function that raises a refusal unless a condition is true: condition, place, got, expected, remedy.
 Need = Callable[[object, str, str, str, str], None]
 
 
@@ -81,12 +81,13 @@ def need(source: str | Path, ok: object, place: str, got: str, expected: str, re
 
 
 def parse_xml(text: str, source: str | Path) -> Element:
-    """Parse XML without DOCTYPE and entities, of bounded depth and size.
+    """Parse XML of bounded size and depth, without DOCTYPE and entities.
 
     Raises
     ------
     InputError
-        If it is malformed (line and column are given), declares a DOCTYPE or an entity, or exceeds a bound.
+        If the text is malformed (the message gives line and column), declares a DOCTYPE or an entity, or exceeds a
+        bound.
     """
     check = partial(need, source)
     check(len(text) <= MAX_BYTES, "", f"{len(text):,} bytes", f"at most {MAX_BYTES:,}", "simplify the file")
@@ -105,7 +106,7 @@ def parse_xml(text: str, source: str | Path) -> Element:
 
 
 def check_urdf(text: str, source: str) -> Element:
-    """Parse a URDF and check everything that a model is made of.
+    """Parse a URDF and check the links and joints that the model is built from.
 
     Parameters
     ----------
@@ -117,13 +118,13 @@ def check_urdf(text: str, source: str) -> Element:
     Returns
     -------
     Element
-        ``<robot>`` with its checked links and joints alone. Pinocchio is given this tree, not the text.
+        The element ``<robot>`` with only checked links, joints and materials. Pinocchio reads this tree, not the text.
 
     Raises
     ------
     InputError
         If links and joints are not one tree of at most 1000 links; a name is repeated; a number is missing, not
-        finite, or of impossible size; limits are reversed, absent or in degrees; a body has no size.
+        finite, or too large; limits are reversed, absent or in degrees; a body has no size.
     """
     robot, check = parse_xml(text, source), partial(need, source)
     check(robot.tag == "robot", "", f"the root element <{cut(robot.tag)}>", "<robot>", "name a URDF")
@@ -148,14 +149,14 @@ def check_urdf(text: str, source: str) -> Element:
         for visual in link.findall("visual"):
             for material in visual.findall("material"):
                 if not material.get("name") or not (len(material) or material.get("name") in materials):
-                    visual.remove(material)  # the reader would refuse the whole robot
+                    visual.remove(material)  # Pinocchio would refuse the whole robot
     robot.set("name", robot.get("name") or "robot")
-    robot.set("version", "1.1")  # readers of URDF 1.0 drop capsules
+    robot.set("version", "1.1")  # Pinocchio ignores capsules in URDF 1.0
     return robot
 
 
 def text_with(robot: Element, *kinds: str) -> str:
-    """Write a checked URDF with bodies of the given kinds (collision, visual) alone."""
+    """Write a checked URDF with only bodies of the given kinds (collision, visual)."""
     robot = copy.deepcopy(robot)
     for link in robot.findall("link"):
         for body in (*link.findall("collision"), *link.findall("visual")):
@@ -197,7 +198,7 @@ def _check_tree(robot: Element, check: Need) -> None:
 
 
 def _check_numbers(part: Element, place: str, check: Need) -> None:
-    """Refuse values of joints and links that are not numbers; visual bodies are exempt, as they are only drawn."""
+    """Refuse values of joints and links that are not numbers. Visual bodies are not checked: they are only drawn."""
     for element in (one for child in part if child.tag != "visual" for one in child.iter()):
         check("quat_xyzw" not in element.attrib, place, "a rotation as quat_xyzw", "rpy", "write it as rpy")
         for attribute, text in element.items():
@@ -213,7 +214,7 @@ def _check_numbers(part: Element, place: str, check: Need) -> None:
 
 
 def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
-    """Refuse types, limits, axes and mimics that a model would not have as they are meant."""
+    """Refuse joints with a wrong type, limit, axis or mimic, and limits in degrees."""
     large: dict[str, float] = {}
     for name, joint in joints.items():
         place, kind, limit = f"joint {name!r}", joint.get("type", ""), joint.find("limit")
