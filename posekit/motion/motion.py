@@ -19,45 +19,45 @@ PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Motion(Record):
-    """T frames of one body, or of several recordings one after another. A posture is a motion of one frame.
+    """T frames of one body, in one recording or several. A posture is a motion of one frame.
 
     Parameters
     ----------
     joints : array (T, J, 3), optional
-        Positions of named points, metres, in one world frame (or in the frame of `up`, see `in_world`). NaN marks an
+        Positions of named points, metres. All frames share one world frame, unless `in_world` is False. NaN marks an
         unknown point.
     joint_names : sequence of J str
         Names of the points: `posekit.skeleton.JOINTS`, `HEAD_POINTS`, `FEET_POINTS`. The 14 joints by default.
     q : array (T, nq), optional
         Configurations of `robot` in Pinocchio's convention: metres, quaternion x, y, z, w, radians.
     q_names : sequence of nq str
-        Name of each entry of `q`, as `posekit.robots.Robot.configuration_names` has them; empty for the robot's order.
+        Name of each entry of `q`, from `posekit.robots.Robot.configuration_names`; empty for the robot's order.
     robot : str
-        Name or path of the robot's URDF; ``figure`` for the built-in figure; empty where it is not known.
+        Name or path of the robot's URDF; ``figure`` for the built-in figure; empty if unknown.
     time : array (T,), optional
-        Seconds; NaN where it is not known. All NaN by default.
+        Seconds; NaN if unknown. All NaN by default.
     frame : int array (T,), optional
-        Number of each frame within its recording, from 0. Rows with the same number are alternative postures of one
-        frame. Consecutive by default.
+        Number of each row's frame within its recording, from 0. Rows with the same number are alternative postures of
+        one frame. By default rows are numbered consecutively.
     clip : int array (T,), optional
         Recording of each row, from 0.
     clips : sequence of str
-        Names of the recordings; empty where they have none.
+        Names of the recordings; empty if they have none.
     up : str
-        Axis that points up: ``+x`` … ``-z``; empty where it is not known.
+        Axis that points up: ``+x`` … ``-z``; empty if unknown.
     unit : str
-        Unit of length of the file that the motion came from.
+        Unit of length in the file.
     in_world : bool
-        Whether all frames share one origin. False if each frame has its own, such as the middle of the hips: then
-        nothing is known of the ground or of the way that the body travels.
+        Whether all frames share one origin. False if each frame has its own origin, such as the middle of the hips:
+        then neither the ground nor the path of the body is known.
     source : str
-        File that the motion came from; empty where there is none.
+        File from which the motion was read; empty if there is none.
     layout : str
-        Name of the layout that gave the file's names their meaning.
+        Name of the layout that maps the file's names to points or joints.
     notes : sequence of str
-        Facts that were found out about the file, one sentence each.
+        Facts about the file that the reader found or assumed, one sentence each.
     warnings : sequence of str
-        Contradictions in the file that a person must see, one sentence each.
+        Contradictions in the file, for the user to check, one sentence each.
     document : object, optional
         The parsed file. A writer of the same container uses it to keep the user's hierarchy, names and channels.
 
@@ -163,19 +163,19 @@ class Motion(Record):
 
     @property
     def rate(self) -> float | None:
-        """Frames per second, from the median step of time; None if it is not known."""
+        """Frames per second, from the median step of time; None if unknown."""
         step = np.diff(np.asarray(self.time))[np.diff(np.asarray(self.clip)) == 0]
         step = step[np.isfinite(step) & (step > 0)]
         return float(np.round(1.0 / np.median(step), 6)) if len(step) else None
 
     @property
     def in_time(self) -> bool:
-        """Whether every frame of a recording has one posture: alternative postures are not a motion."""
+        """Whether frames follow each other in time: there are several, and none has alternative postures."""
         clip, frame = np.asarray(self.clip), np.asarray(self.frame)
         return len(self) > 1 and len(np.unique(clip * (frame.max() + 1) + frame)) == len(self)
 
     def points(self, names: Sequence[str]) -> Array:
-        """Return positions (T, len(names), 3) of named points; NaN for those that the motion does not have."""
+        """Return positions (T, len(names), 3) of named points, metres; NaN for points that the motion lacks."""
         found = np.full((len(self), len(names), 3), np.nan)
         if self.joints is not None:
             place = {name: index for index, name in enumerate(self.joint_names)}
@@ -200,7 +200,7 @@ class Motion(Record):
 
     @property
     def up_vector(self) -> Array | None:
-        """Unit vector (3,) that points up; None if it is not known."""
+        """Unit vector (3,) that points up; None if unknown."""
         return up_vector(self.up) if self.up else None
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice | Sequence[int]) -> Motion:
@@ -221,7 +221,7 @@ class Motion(Record):
         Raises
         ------
         InputError
-            If the motion does not know which way is up.
+            If `up` is no axis, or the up axis of the motion is unknown.
         """
         if up == self.up or self.joints is None:
             return self

@@ -1,4 +1,4 @@
-"""`validate`: files, folders, arrays and results, judged clip by clip; folders of the clips that pass."""
+"""`validate`: judge files, folders, arrays and results clip by clip; copy the clips that pass."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 #: Name of the table of clips in a folder of kept clips.
 CLIP_TABLE: Final = "clips.csv"
 
-#: Files without motion that a report names.
+#: Maximum number of files without motion that a note names.
 MOST_NAMED: Final = 3
 
-#: Difference of two times that is rounding, seconds.
+#: Largest rounding error of a difference of two times, seconds.
 ROUNDING_SECONDS: Final = 1e-6
 
 
@@ -51,27 +51,27 @@ def validate(
     profile: str | None = None,
     ground: str | float | None = None,
 ) -> Report:
-    """Judge whatever holds postures: files, folders and patterns, arrays, motions, results.
+    """Judge postures and motion from files, folders, patterns, arrays, `Motion` or results.
 
     Parameters
     ----------
     given : path, sequence of path, array, Motion or Recovery
-        Files, folders of them and patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
-        metres, NaN where unknown; configurations (T, nq) of `urdf`; or what `posekit.open` returns. Frames in time are
-        judged by the checks over time too; an array is motion if its `rate` is given.
+        Files, folders, and patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
+        metres, NaN if unknown; configurations (T, nq) of `urdf`; or a motion or result from `posekit.open`. Checks over
+        time are applied to frames that follow each other in time; for an array this requires `rate`.
     settings : ValidateSettings, optional
-        Settings that decide the verdicts; by default a result's own.
+        Settings for the verdicts; for a result, by default the settings with which it was recovered.
     urdf : str, path, Figure or Robot
-        The body that judges, as `posekit.Validator` takes it. By default the robot that a file names, else the figure.
+        Body to judge with, as for `posekit.Validator`. By default the robot that a file names, else the figure.
     layout, unit, up, rate, person
-        Facts about files and arrays that they do not state: see `posekit.open`. An array (T, J, 3) with a `layout` has
-        its points in the layout's order.
+        Facts that files and arrays do not state: see `posekit.open`. The points of an array (T, J, 3) with a `layout`
+        are in the layout's order.
     keep : path, optional
         New folder for the clips that pass: see `keep_clips`.
     keep_spans : float or str, optional
-        Least duration of the longest valid span, seconds, that is kept of other clips.
+        Minimum duration, seconds, of the longest valid span of a clip that does not pass; longer spans are kept, too.
     checks, ranges, profile, ground : optional
-        As the fields of `ValidateSettings`, on top of the settings.
+        Fields of `ValidateSettings`; they replace those of `settings`.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def validate(
     Raises
     ------
     InputError
-        If a single file cannot be read, none of several can be judged, or what is asked is impossible.
+        If the only file cannot be read, none of several files can be judged, or a setting is wrong.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def validate(
 
 
 class Judge:
-    """The body and the settings that judge, loaded once for all files.
+    """Body and settings for judging, loaded once for all files.
 
     Parameters
     ----------
@@ -120,19 +120,19 @@ class Judge:
 
     @property
     def name(self) -> str:
-        """The name of the robot for readers of tables; readers need none for the figure."""
+        """Name of the robot, for readers of tables; empty for the figure."""
         name = str(getattr(self.urdf, "name", self.urdf) or "")
         return "" if name in ("figure", "stick_figure") else name
 
     def validator(self, robot: str) -> Validator:
-        """Return the validator of the body that was given, else of the robot that a file names."""
+        """Return the validator of the given body; without one, of the robot that a file names."""
         body = self.urdf or robot or "figure"
         if str(body) not in self._made:
             self._made[str(body)] = Validator(body, self.settings, **self.changes)
         return self._made[str(body)]
 
     def motion(self, given: Any, facts: Mapping[str, Any]) -> Motion:
-        """Return an array or a motion with the facts that are stated beside it."""
+        """Return an array or a motion as a `Motion` with the stated facts: layout, unit, up, rate."""
         from posekit.formats.arrays import has_layout
 
         layout, unit, up, rate = (facts.get(name) for name in ("layout", "unit", "up", "rate"))
@@ -164,7 +164,7 @@ class Judge:
         return validator.check(given)
 
     def _of_recovery(self, recovery: Recovery) -> Report:
-        """Judge every survivor of a result by its own settings: lengths, ranges, tolerances."""
+        """Judge every survivor of a result by the lengths, ranges and tolerances with which it was recovered."""
         fields = {name: value for name, value in recovery.settings.items() if name in SHARED}
         settings = self.settings or ValidateSettings(**fields)
         side = recovery.settings.get("shoulders", "")
@@ -193,7 +193,7 @@ SHARED: Final = ("checks", "ranges", "rules", "walkers", "contact_margin")
 
 
 def in_order(motion: Motion, validator: Validator) -> Motion:
-    """Return a motion of configurations in the order of the robot that judges."""
+    """Return a motion with the entries of q in the order of the validator's robot."""
     names = validator.configuration_names
     if not motion.q_names or tuple(motion.q_names) == names:
         return motion
@@ -207,7 +207,7 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
 
 
 def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Report:
-    """Judge files one after the other; of several, those that cannot be read are listed."""
+    """Judge files one after the other; if there are several, the report lists those that cannot be read."""
     import posekit
 
     reports: list[Report] = []
@@ -242,13 +242,13 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
 
 
 def _of_file(report: Report) -> tuple[str, ...]:
-    """Return the notes of one file's report with the name of the file; notes on the ground are counted together."""
+    """Return the notes of a report, each preceded by the name of its file, except notes about the ground."""
     name = Path(report.files[0]).name if report.files else ""
     return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
 
 
 def _is_view(path: Path) -> bool:
-    """Tell whether a file is a view of another object than a person, which holds no motion."""
+    """Return whether a file is a view of an object, which holds no motion."""
     return path.suffix.lower() == ".json" and b"posekit.view/1" in path.read_bytes()[:200]
 
 
@@ -261,10 +261,10 @@ def refuse_without_joints(held: Any, path: Path) -> None:
 
 
 def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None) -> str:
-    """Write the clips that pass into a new folder, whole or not at all, with a table of all clips.
+    """Write the clips that pass, and a table of all clips, into a new folder; after an error nothing is written.
 
-    A file in which every frame passes is copied unchanged. From other files, the frames that pass are written in the
-    file's own format.
+    A file in which every frame passes is copied unchanged. The kept frames of other files are written in the format
+    of the file.
 
     Parameters
     ----------
@@ -273,17 +273,17 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     folder : path
         New or empty.
     spans : float, optional
-        Least duration of the longest valid span, seconds, that is kept of clips that do not pass.
+        Minimum duration, seconds, of the longest valid span of a clip that does not pass; longer spans are kept.
 
     Returns
     -------
     str
-        Number of clips that were kept, in a sentence.
+        Sentence with the number of kept clips.
 
     Raises
     ------
     InputError
-        If the folder holds something, or a file cannot be read or written.
+        If the folder is not empty, or a file cannot be read or written.
     """
     from posekit.formats.tables import columns_of_rows, csv_text
 
@@ -308,7 +308,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
 
 
 def _kept(report: Report, folder: Path, spans: float | None) -> Iterator[dict[str, Any]]:
-    """Write file by file, and yield a row for each clip."""
+    """Write the kept frames of each file, and yield one row of the table for each clip."""
     rows, clips = clip_rows(report), report.clips
     by_file: dict[str, list[int]] = {}
     for k, clip in enumerate(clips):
@@ -337,7 +337,7 @@ def _kept(report: Report, folder: Path, spans: float | None) -> Iterator[dict[st
 
 
 def _frames(report: Report, clip: ClipDecision, number: int, spans: float | None) -> NDArray[np.intp]:
-    """Return the rows of the report that are kept of a clip."""
+    """Return the rows of the report that belong to the kept frames of a clip."""
     rows = np.flatnonzero(report.clip == number)
     if clip.decision == "keep":
         return rows

@@ -1,4 +1,4 @@
-"""A motion nearby that passes, in the user's own file."""
+"""Repair: find a nearby motion that passes all checks, and write it in the format of the user's file."""
 
 from posekit.motion.repair.repair import Repaired as Repaired
 from posekit.motion.repair.repair import repair as repair

@@ -1,4 +1,4 @@
-"""Clips as repair changes them: points of a measured body, or configurations of a robot, with the same operations."""
+"""Recordings during a repair: `Clip` holds points of a person, `RobotClip` configurations of a robot."""
 
 from __future__ import annotations
 
@@ -54,26 +54,26 @@ DEPTH_METRES: Final = 5e-5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clip:
-    """One recording of points, and the changes that were made.
+    """One recording of points, with the frames and remedies that changed it.
 
     Parameters
     ----------
     motion : Motion
-        The recording as it was given.
+        The recording before the repair.
     validator : Validator
-        The judge.
+        Checks and settings that the repair must satisfy.
     state : array (T, …)
-        Points (T, P, 3) in the order of `posekit.skeleton.NAMES`, or a robot's configurations (T, nq).
+        Points (T, P, 3) in the order of `posekit.skeleton.NAMES`, metres, or a robot's configurations (T, nq).
     time : array (T,)
         Seconds.
     rows : int array (T,)
-        Frame of `motion` of each frame; -1 for one that was inserted.
+        Index in `motion` of each frame; -1 for an inserted frame.
     filled : bool array (T,)
-        Frames made from their neighbours.
+        Whether each frame was interpolated from its neighbours.
     mirrored : bool
         Whether right and left were exchanged in all frames.
     done : tuple of str
-        Names of the remedies that helped.
+        Names of the remedies that reduced the number of findings.
     """
 
     motion: Motion
@@ -87,7 +87,7 @@ class Clip:
 
     @classmethod
     def of(cls, motion: Motion, validator: Validator) -> Self:
-        """Return a recording before any change."""
+        """Return an unchanged recording as a clip."""
         count = len(motion)
         return cls(
             motion=motion,
@@ -100,7 +100,7 @@ class Clip:
 
     @staticmethod
     def state_of(motion: Motion) -> Array:
-        """Return the state of a recording."""
+        """Return the points (T, P, 3) of a recording in the order of `NAMES`, metres."""
         return motion.points(NAMES)
 
     def __len__(self) -> int:
@@ -108,7 +108,7 @@ class Clip:
         return len(self.state)
 
     def following(self, first: Clip) -> Self:
-        """Return the changes of a clip and then of this one, which was made of it."""
+        """Return this clip with the changes of `first` included: this clip was started from the result of `first`."""
         return replace(
             self,
             motion=first.motion,
@@ -119,12 +119,12 @@ class Clip:
 
     @property
     def own_rows(self) -> Ints:
-        """Frame of `motion` that each frame (T,) comes from; an inserted frame has that of the frame before it."""
+        """Index in `motion` (T,) of each frame; an inserted frame has the index of the frame before it."""
         return self.rows[np.maximum.accumulate(np.where(self.rows < 0, 0, np.arange(len(self))))]
 
     @property
     def entries(self) -> Sequence[str]:
-        """Names of what the state of a frame consists of."""
+        """Names of the points, or of the entries of q, in the state of one frame."""
         return NAMES
 
     def as_motion(self) -> Motion:
@@ -140,13 +140,13 @@ class Clip:
         )
 
     def checks(self, *, over_time: bool) -> list[Check]:
-        """Return the checks over time that are asked for, or those of postures."""
+        """Return the chosen checks over time, or the chosen checks of single postures."""
         of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
 
     def report(self, *, over_time: bool) -> Report:
-        """Ask the checks over time, or those of postures; there must be some."""
+        """Return the report of the checks over time, or of the checks of postures; at least one must be chosen."""
         validator = copy(self.validator)
         validator.settings = self.validator.settings.changed(checks=self.checks(over_time=over_time))
         return validator.check(self.as_motion())
@@ -156,13 +156,13 @@ class Clip:
         return self.state
 
     def taken(self, order: Ints, time: Array) -> Self:
-        """Return the clip with its frames in another order, at some times."""
+        """Return the clip with the frames `order`, at the times `time` (T,), seconds."""
         return replace(
             self, state=self.state[order], rows=self.rows[order], filled=self.filled[order], time=time
         )
 
     def with_gaps(self, gaps: Ints) -> Self:
-        """Insert frames before each frame (T,), evenly in time, and interpolate them."""
+        """Insert `gaps` (T,) frames before each frame, evenly in time, and interpolate them."""
         own = np.cumsum(gaps + 1) - 1
         inserted = np.ones(own[-1] + 1, dtype=np.bool_)
         inserted[own] = False
@@ -171,7 +171,7 @@ class Clip:
         return replace(wide, rows=np.where(inserted, -1, wide.rows)).interpolated(inserted)
 
     def interpolated(self, bad: Flags) -> Self:
-        """Put frames between the good ones around them; a few at an end of the clip continue the motion."""
+        """Interpolate bad frames (T,) between good frames; up to three bad frames at an end continue the motion."""
         bad = bad | ~self.placed()
         rows, before, after, share = between(bad)
         near = near_good(bad)[rows]
@@ -181,35 +181,36 @@ class Clip:
         return replace(self, state=out, filled=filled)
 
     def placed(self) -> Flags:
-        """Return the frames (T,) in which enough is known to place a body."""
+        """Return whether the joints of the trunk are known in each frame (T,): without them no body can be placed."""
         return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Move states (n, …) a share (n,) of the way to others."""
+        """Turn postures `start` (n, P, 3) a share (n,) of the way to `end`; lengths stay those of `start`."""
         return carried(start, end, share)
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Return states (n, …) between others; lengths go from the ones to the others, too."""
+        """Return states (n, …) a share (n,) of the way from `start` to `end`; lengths change by the same share."""
         there = self.carried(start, end, share)
         back = self.carried(end, start, 1 - share)
         return there + share[:, None, None] * (back - there)
 
     def shifted(self, by: Array) -> Self:
-        """Move the body by (T, 3), metres."""
+        """Return the clip with the body moved by the vector `by` (T, 3) in each frame, metres."""
         return replace(self, state=self.state + by[:, None])
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
-        """Smooth the points that are loose (T, P); head and feet move with necks and ankles."""
+        """Smooth each point in the frames in which it is loose (T, P); head and feet as neck and ankles."""
         loose = loose.copy()
         loose[:, len(JOINTS) :] = loose[:, PIECE_PARENTS[len(JOINTS) :]]
         loose &= np.isfinite(self.state).all(axis=(0, 2))
         return replace(self, state=smoothed(self.state, loose, strength))
 
     def legal(self) -> Self:
-        """Return the clip with postures that checks of postures pass.
+        """Return the clip with rejected postures replaced by postures that pass the checks of postures.
 
-        A posture that is rejected goes as far as it must toward the first that passes of these: itself pushed inside
-        the bounds that it violates, one between the nearest good ones, and the nearest good one.
+        Three goals are tried in turn: the posture pushed inside the bounds that it violates, a posture interpolated
+        between the nearest good frames, and the nearest good frame. The rejected posture moves toward the first goal
+        that passes, only as far as is necessary.
         """
         if not self.checks(over_time=False):
             return self
@@ -224,9 +225,10 @@ class Clip:
         return clip if self.motion.in_time else clip.restored(bad, self.state[bad])
 
     def pushed(self, rows: Ints, report: Report) -> Array:
-        """Push some frames inside bounds: distances by the joints, then all else by turning limbs, then all parts.
+        """Push the postures of some frames (n,) inside their bounds.
 
-        Elbows and knees that bend backward are straight at first: a posture alone does not show it, its neighbours do.
+        Joints are moved until the rigid lengths are inside their bounds; then limbs are turned, and then all parts of
+        the body, until all other checks are satisfied. Elbows and knees that bend backward are first made straight.
         """
         vectors, found = vectors_of(self.state), report.findings
         for row, place, value in zip(found["row"], found["place"], found["value"], strict=True):
@@ -242,10 +244,13 @@ class Clip:
         return state
 
     def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
-        """Return margins (n, K) inside the bounds of lengths, or of all else, as metres; infinite where undecided."""
+        """Return margins (n, K) of postures (n, P, 3), metres: of lengths if `rigid`, else of all other checks.
+
+        A margin is infinite where a check is undecided.
+        """
         joints, head, feet = np.split(points, [len(JOINTS), len(POINTS)], axis=1)
         these = replace(body, joints=joints, head=head, feet=feet, motion=False)
-        vars(these)["person"] = body.person  # that of the whole clip, not of these postures
+        vars(these)["person"] = body.person  # measured in the whole clip, not in these postures
         found = [np.full((len(points), 1), np.inf)]
         for check in self.checks(over_time=False):
             if (check.name == "rigid-parts") == rigid:
@@ -256,7 +261,7 @@ class Clip:
         return np.where(np.isnan(every), np.inf, every)
 
     def eased(self, rows: Ints, goal: Array) -> Self:
-        """Bring some frames as far toward goals (n, …) as they must; those that are rejected there stay."""
+        """Move some frames (n,) toward goals (n, …) until they pass; a frame whose goal is rejected stays."""
         start = self.state[rows]
         low, high = np.zeros(len(rows)), np.full(len(rows), np.nan)
         share = np.ones(len(rows))
@@ -270,7 +275,7 @@ class Clip:
         return self.with_rows(rows[passing], self.halfway(start, goal, high)[passing])
 
     def restored(self, rows: Ints, given: Array) -> Self:
-        """Give trunk, head and limbs of some frames their given directions (n, P, 3) where all checks still pass."""
+        """Restore the given directions (n, P, 3) of trunk, head and limbs in some frames, if all checks still pass."""
         clip = self
         for pieces in ({TORSO_PIECE, HIPS_PIECE}, {HEAD_PIECE}, *LIMB_PIECES):
             own = [k for k, piece in enumerate(PIECE_OF_POINT) if piece in pieces]
@@ -281,17 +286,20 @@ class Clip:
         return clip
 
     def with_rows(self, rows: Ints, state: Array) -> Self:
-        """Return the clip with other states of some frames."""
+        """Return the clip with new states (n, …) of some frames (n,)."""
         out = self.state.copy()
         out[rows] = state
         return replace(self, state=out)
 
     def invalid(self, rows: Ints) -> Flags:
-        """Return which of some frames (n,) checks of postures reject; a person is measured in all frames."""
+        """Return whether checks of postures reject each of some frames (n,); lengths are measured in all frames."""
         return self.report(over_time=False).invalid[rows]
 
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
-        """Return good states for some frames: between those that pass, and the nearest; else the body at rest."""
+        """Return two good states for some frames (n,): interpolated between frames that pass, and the nearest of them.
+
+        If fewer than two frames pass, both are the posture at rest.
+        """
         if not self.motion.in_time or passing.sum() < 2:
             rest = self.laid(np.repeat(self.rest()[None], len(rows), axis=0), rows)
             return rest, rest
@@ -302,19 +310,22 @@ class Clip:
         return self.laid(found, rows), self.laid(nearest, rows)
 
     def rest(self) -> Array:
-        """Return the person's posture at rest (P, 3)."""
+        """Return the person's neutral posture (P, 3), metres."""
         body = Body.of(self.as_motion(), self.validator.settings, base=self.validator.figure)
         return np.concatenate([body.figure.neutral_points, np.full((len(FEET), 3), np.nan)])
 
     def laid(self, state: Array, rows: Ints) -> Array:
-        """Lay states (n, …) on the trunks of some frames."""
+        """Return states (n, …) moved rigidly so that their trunks lie on the trunks of some frames (n,)."""
         found = align(state[:, TRUNK], self.state[rows][:, TRUNK], scale=False)
         turned = np.einsum("nij,npj->npi", found.rotation, state)
         return np.asarray(turned + found.translation[:, None])
 
 
 def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
-    """Return the frames (T,) that checks reject; if places are given, where (T, K), with unknown ones everywhere."""
+    """Return whether checks reject each frame (T,), or each frame at each of K places (T, K) if places are given.
+
+    A finding at a place that is not among `places` counts at every place.
+    """
     found = report.findings
     mine = np.isin(found["check"], [k for k, name in enumerate(report.checks) if name in checks])
     out = np.zeros((len(report), max(len(places), 1)), dtype=np.bool_)
@@ -325,7 +336,7 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
 
 
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
-    """Return bad frames, the good ones before and after each, and the share (n,) of the way between them.
+    """Return the n bad frames, the good frames before and after each, and the share (n,) of the way between them.
 
     At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
     frames the result is empty.
@@ -339,7 +350,7 @@ def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
 
 
 def near_good(bad: Flags) -> Flags:
-    """Return the bad frames (T,) that their neighbours can replace: at an end of the clip only a few."""
+    """Return the bad frames (T,) that can be interpolated; at an end of the clip only if they are at most three."""
     good = np.flatnonzero(~bad)
     found = bad.copy()
     if len(good) and good[0] > MOST_CONTINUED:
@@ -351,16 +362,16 @@ def near_good(bad: Flags) -> Flags:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RobotClip(Clip):
-    """One recording of a robot's configurations, and the changes that were made; the fields of `Clip`."""
+    """One recording of a robot's configurations; the fields are those of `Clip`."""
 
     @staticmethod
     def state_of(motion: Motion) -> Array:
-        """Return the configurations."""
+        """Return the configurations (T, nq) of a recording."""
         return np.array(motion.q)
 
     @cached_property
     def robot(self) -> Any:
-        """The robot, or the figure, whose configurations these are."""
+        """The robot, or the figure, to which the configurations belong."""
         return self.validator.robot
 
     @property
@@ -380,11 +391,11 @@ class RobotClip(Clip):
         )
 
     def placed(self) -> Flags:
-        """Return the frames (T,) whose configuration is known."""
+        """Return whether the configuration of each frame (T,) is known."""
         return np.asarray(np.isfinite(self.state).all(axis=1))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Move configurations a share of the geodesics to others."""
+        """Return configurations (n, nq) a share (n,) of the geodesic from `start` to `end`."""
         model = self.robot.model
         steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
         steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
@@ -392,24 +403,24 @@ class RobotClip(Clip):
         return np.asarray(self.robot.with_mimics(np.array(out).reshape(start.shape)))
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Return configurations between others."""
+        """Return configurations (n, nq) a share (n,) of the way from `start` to `end`."""
         return self.carried(start, end, share)
 
     def restored(self, rows: Ints, given: Array) -> Self:
-        """Return the clip as it is: joints that no bound concerns were not pushed."""
+        """Return the clip unchanged: a push moves only the joints that it must."""
         return self
 
     def shifted(self, by: Array) -> Self:
-        """Move the root by (T, 3), metres; a robot with a fixed root stays."""
+        """Return the clip with the root moved by the vector `by` (T, 3), metres; a fixed root stays."""
         out = self.state.copy()
         if self.robot.free_flyer:
             out[:, :3] += by
         return replace(self, state=out)
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
-        """Smooth the entries of q that are loose (T, nq)."""
+        """Smooth each entry of q in the frames in which it is loose (T, nq)."""
         out = self.state.copy()
-        if self.robot.free_flyer:  # quaternions of one sign can be smoothed as numbers
+        if self.robot.free_flyer:  # quaternions whose signs agree can be smoothed component by component
             turn = out[:, 3:7]
             turn[1:] *= np.cumprod(np.where((turn[1:] * turn[:-1]).sum(axis=1) < 0, -1.0, 1.0))[:, None]
         out = smoothed(out, loose, strength)
@@ -418,7 +429,7 @@ class RobotClip(Clip):
         return replace(self, state=np.where(loose.any(axis=1, keepdims=True), out, self.state))
 
     def invalid(self, rows: Ints) -> Flags:
-        """Return which of some frames (n,) checks of postures reject: each is judged by itself."""
+        """Return whether checks of postures reject each of some frames (n,); only these frames are judged."""
         return super(RobotClip, self.taken(rows, self.time[rows])).invalid(np.arange(len(rows)))
 
     def rest(self) -> Array:
@@ -426,14 +437,14 @@ class RobotClip(Clip):
         return np.asarray(self.robot.neutral)
 
     def laid(self, state: Array, rows: Ints) -> Array:
-        """Give configurations (n, nq) the roots of some frames."""
+        """Return configurations (n, nq) with the root replaced by the root of some frames (n,)."""
         root = 7 if self.robot.free_flyer else 0
         return np.concatenate([self.state[rows, :root], state[:, root:]], axis=1)
 
     def pushed(self, rows: Ints, report: Report) -> Array:
         """Bring joints within the limits of the URDF, and move bodies apart.
 
-        The root stays, and so do joints that the motion never moves: a file may lack them.
+        The root stays, and so do joints that do not move in the recording: its file may have no column for them.
         """
         robot, model = self.robot, self.robot.model
         lower, upper = robot.lower + INSIDE_LIMITS, robot.upper - INSIDE_LIMITS

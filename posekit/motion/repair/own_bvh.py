@@ -1,4 +1,4 @@
-"""Repaired motion in the user's own BVH file: only the rotations that move."""
+"""Write a repaired motion into the user's BVH file: only the channels that must change do."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from posekit.motion.motion import Motion
 from posekit.motion.repair.clip import Clip, between
 from posekit.skeleton import JOINTS, LIMB_JOINTS, NAMES, SIDES
 
-#: Distance below which a node of a hierarchy is a joint of ours.
+#: Distance below which a node of the file's hierarchy and a point of the motion are the same.
 SAME_METRES: Final = 1e-6
-#: Distance by which the points of a frame may be off that keeps its channels: joints that a layout derives depend on
-#: medians over all frames.
+#: Distance between repaired points and points of the file below which a frame keeps its channels: the positions of
+#: joints that a layout derives depend on medians over all frames, so they are not exact.
 STAYS_METRES: Final = 5e-6
-#: Change of a channel below which its text stays, file's unit; and of a rotation below which its node stays.
+#: Change of a channel below which its text stays (file's unit), and of an entry of a rotation matrix.
 TINY: Final = 1e-10
 #: Words for one side in names of joints.
 SIDE_WORDS: Final = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"))
 
 
 def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
-    """Turn the joints of a BVH file as a clip's points are turned.
+    """Return a BVH file whose joints are turned such that its points are those of the clip.
 
-    The pieces of the body turn by the rotations that bring the points of the file to those of the clip. Nodes of one
-    piece keep their channels, except the first; frames whose points stay keep all of them. Frames that were made from
-    their neighbours are interpolated channel by channel first.
+    Each rigid piece of the body is turned by the rotation that brings its points in the file to its points in the
+    clip; only the channels of the first node of a piece change. Frames whose points stay keep all channels.
+    Interpolated frames of the clip are first interpolated channel by channel.
     """
     document = _renamed(document) if clip.mirrored else document
     values = _filled(document, document.values[clip.rows], clip.filled)
@@ -50,7 +50,10 @@ def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
 
 
 def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
-    """Return the node at each point of the motion; of several in one place the nearest to the next joint."""
+    """Return the node of the file at each point of the motion.
+
+    If several nodes lie at one point, the node nearest to the next joint of the limb is chosen.
+    """
     sample = slice(None, None, max(1, len(motion) // 20))
     absolute = positions_are_absolute(document)
     points = world_points(document, absolute=absolute, values=document.values[sample]) * UNITS[motion.unit]
@@ -68,7 +71,7 @@ def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
 
 
 def _above(document: Bvh, node: int) -> list[int]:
-    """Return a node and those that it hangs on, up to a root."""
+    """Return a node and its ancestors up to the root, in this order."""
     way = [node]
     while document.parents[way[-1]] >= 0:
         way.append(document.parents[way[-1]])
@@ -76,7 +79,7 @@ def _above(document: Bvh, node: int) -> list[int]:
 
 
 def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[Ints, int]:
-    """Return the piece that each node turns with (P,), -1 above the body, and the node on which the body hangs."""
+    """Return the rigid piece of each node (P,), -1 for ancestors of the body, and the node at which the body starts."""
     limbs = [[nodes.get(JOINTS[joint]) for joint in limb[:2]] for limb in LIMB_JOINTS]
     ways = [set(_above(document, start)[1:]) for start, _ in limbs if start is not None]
     common = set.intersection(*ways) if ways else {0}
@@ -100,14 +103,14 @@ def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[Ints, int]:
 
 
 def _channels(document: Bvh, node: int, *, rotations: bool) -> tuple[list[int], list[int]]:
-    """Return the columns of a node's rotations, or of its positions, and their axes."""
+    """Return the columns of a node's rotation channels, or of its position channels, and the axis of each column."""
     start = document.columns[node].start
     own = [(start + k, axis) for k, (one, axis) in enumerate(document.channels[node]) if one == rotations]
     return [column for column, _ in own], [axis for _, axis in own]
 
 
 def _local(document: Bvh, values: Array, node: int) -> Array:
-    """Return a node's rotations in its parent (T, 3, 3)."""
+    """Return the rotation matrices (T, 3, 3) of a node in the frame of its parent."""
     at, axes = _channels(document, node, rotations=True)
     if not at:
         return np.tile(np.eye(3), (len(values), 1, 1))
@@ -116,9 +119,10 @@ def _local(document: Bvh, values: Array, node: int) -> Array:
 
 
 def _with_rotation(document: Bvh, values: Array, node: int, R: Array) -> Array:
-    """Return channels (T, C) with rotations (T, 3, 3) of a node, by the angles nearest to those that are there.
+    """Return channels (T, C) with new rotations R (T, 3, 3) of a node.
 
-    A node with fewer than three rotations keeps the part that they can express.
+    Among equivalent Euler angles the ones nearest to the present angles are chosen. A node with fewer than three
+    rotation channels takes the part of R that its channels can express.
     """
     at, axes = _channels(document, node, rotations=True)
     order = "".join("XYZ"[axis] for axis in [*axes, *({0, 1, 2} - set(axes))])
@@ -134,7 +138,7 @@ def _with_rotation(document: Bvh, values: Array, node: int, R: Array) -> Array:
 def _turned(
     document: Bvh, values: Array, nodes: Mapping[str, int], before: Array, after: Array, base: Motion
 ) -> Array:
-    """Return channels (n, C) of frames whose points (n, P, 3) go from one place to another."""
+    """Return channels (n, C) that move the points of n frames from `before` to `after` (n, P, 3), metres."""
     values = values.copy()
     pieces, body = _pieces(document, nodes)
     turn = turns_between(before, after)
@@ -167,7 +171,7 @@ def _turned(
 
 
 def _filled(document: Bvh, values: Array, filled: Flags) -> Array:
-    """Interpolate the channels of frames between those around them."""
+    """Return channels (T, C) with the frames `filled` (T,) interpolated between the other frames."""
     values = values.copy()
     rows, before, after, share = between(filled)
     start, end = values[before], values[after]
@@ -182,7 +186,7 @@ def _filled(document: Bvh, values: Array, filled: Flags) -> Array:
 
 
 def _renamed(document: Bvh) -> Bvh:
-    """Return the file with the names of right and left exchanged."""
+    """Return the file with the names of right and left joints exchanged."""
     head, mark, rest = re.split(r"(^[ \t]*MOTION)", document.text, maxsplit=1, flags=re.M | re.I)
     other = {name: _twin(name, document.names) for name in document.names}
     head = re.sub(

@@ -1,4 +1,4 @@
-"""Repaired numbers in the user's own table or arrays: only columns that hold what moved, only where it moved."""
+"""Write a repaired motion into the user's table or arrays: only numbers that the repair changed are replaced."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ from posekit.formats.tables import Table, numbers
 from posekit.geometry import Array, turned_near
 from posekit.motion.motion import Motion
 
-#: From numbers (T, C) and the names of their columns to repaired numbers (T', C).
+#: Function of the numbers (T, C) of a file and the names of their columns; it returns repaired numbers (T', C).
 Change = Callable[[Array, list[str]], Array]
 
-#: Numbers of a file for one unit of an entry, and the largest difference of a column from an entry that it holds:
-#: frame numbers and seconds, metres, quaternions (in files they are off length 1), radians.
+#: Possible factors from an entry of the motion to a column of a file, and the largest difference between a column and
+#: its entry: for frame numbers and seconds, metres, quaternions (in files their length is not exactly 1), radians.
 COUNTS: Final = ((1.0,), 1e-6)
 LENGTHS: Final = ((1.0, 100.0, 1000.0, 1 / 0.0254), 1e-4)
 QUATERNIONS: Final = ((1.0, -1.0), 0.02)
 ANGLES: Final = ((1.0, float(np.degrees(1.0))), 1e-3)
-#: Frames by which columns are recognised.
+#: Number of frames in which columns and entries are compared.
 SAMPLE: Final = 40
-#: Change of an entry below which its numbers stay, metres or radians.
+#: Change of an entry below which its column stays, metres or radians.
 TINY: Final = 1e-10
-#: Least significant digits of a changed number: fewer would round a posture over its bounds.
+#: Minimum number of significant digits of a changed number: with fewer, rounding could violate a bound.
 DIGITS: Final = 7
 
 
 def in_own_file(
     path: str | Path, before: Motion, after: Motion, rows: NDArray[np.intp]
 ) -> tuple[bytes, list[str]]:
-    """Return a table or arrays with the numbers that a repair changed.
+    """Return the user's table or arrays with the numbers that a repair changed.
 
-    Columns are found by their numbers: a column, or the mean of two markers, is an entry of the motion times a factor.
-    It moves by the change of the entry; all other columns, names and numbers stay.
+    Columns are recognised by their numbers: a column, or the mean of two markers' columns, equals an entry of the
+    motion times a factor. Such a column changes as its entry does; all other columns and all names stay.
 
     Parameters
     ----------
@@ -55,14 +55,14 @@ def in_own_file(
     before, after : Motion
         Before and after the repair, in the order of the file.
     rows : int array (T',)
-        Frame of `before` that each frame of `after` was made from.
+        Index in `before` of each frame of `after`.
 
     Returns
     -------
     data : bytes
-        The file; empty if its container is not changed in place.
+        Contents of the file; empty if its container cannot be changed in place.
     notes : list of str
-        Contents that could not follow the repair.
+        A sentence about arrays that may depend on the configurations and were not changed.
     """
     groups = _groups(before, after)
     steps = [np.nan_to_num(new - old[rows]) for old, new, _ in groups]
@@ -105,7 +105,7 @@ def in_own_file(
 
 
 def _groups(before: Motion, after: Motion) -> list[tuple[Array, Array, Any]]:
-    """Return old and new values (T, K), and kind, of entries whose columns have one unit."""
+    """Return groups of entries of one unit: values before (T, K) and after (T', K) the repair, and factors as above."""
     counted = (_counted(before), _counted(after), COUNTS)
     if before.q is None:
         old, new = (np.asarray(one.joints).reshape(-1, 3 * len(one.joint_names)) for one in (before, after))
@@ -124,7 +124,7 @@ def _counted(motion: Motion) -> Array:
 def _columns_of(
     columns: Array, entries: Array, factors: tuple[float, ...], most: float
 ) -> tuple[list[tuple[int, int]], float]:
-    """Return pairs of a column (of C) and its entry (of K), and their factor: the one that finds most entries."""
+    """Return pairs (column, entry) of equal numbers, and the factor with which most entries have a column."""
     some = slice(None, None, max(1, len(columns) // SAMPLE))
     best: tuple[list[tuple[int, int]], float] = [], 1.0
     for factor in factors:
@@ -150,14 +150,14 @@ def _columns_of(
 
 
 def _apart(values: Array, wanted: Array) -> Array:
-    """Return the largest difference over the frames where something is known; infinite where nothing is."""
+    """Return the largest difference in the frames in which `wanted` is known; infinite if it is unknown in all."""
     known, off = np.isfinite(wanted), np.nan_to_num(np.abs(values - wanted), nan=np.inf)
     off = np.where(known, off, 0.0).max(axis=0, initial=0.0)
     return np.where(known.any(axis=0), off, np.inf)
 
 
 def _euler(motion: Motion) -> dict[str, Any]:
-    """Return the fields by which a robot's table writes the root's rotation as angles; empty if it has none."""
+    """Return the layout's description of the root's Euler angles; empty if the file has none."""
     if motion.q is None or not motion.layout:
         return {}
     turn: dict[str, Any] = load_layout(motion.layout).fields.get("rotation", {})
@@ -165,7 +165,7 @@ def _euler(motion: Motion) -> dict[str, Any]:
 
 
 def _turned(before: Motion, after: Motion, rows: NDArray[np.intp]) -> Array:
-    """Return the change (T', 3) of the angles of the root, in the unit of the file."""
+    """Return the change (T', 3) of the root's Euler angles, in the unit of the file."""
     turn = _euler(before)
     degrees = turn.get("unit") == "deg"
     old, new = (
@@ -177,7 +177,7 @@ def _turned(before: Motion, after: Motion, rows: NDArray[np.intp]) -> Array:
 
 
 def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], change: Change) -> bytes:
-    """Return a text whose last `count` lines with numbers are changed; empty if they are not one a frame."""
+    """Return a text with changes in its last `count` lines of numbers; empty if frames and lines differ in number."""
     lines = whole.splitlines(keepends=True)
     at = [number - 1 for number in table.numbers_of_lines[-count:]]
     apart = table.delimiter or r"\s+"
@@ -203,7 +203,7 @@ def _in_lines(whole: str, table: Table, count: int, rows: NDArray[np.intp], chan
 
 
 def _like(cell: str, value: float) -> str:
-    """Write a number as a cell is written: its decimals, its decimal comma, its exponent."""
+    """Return a number as text, in the format of a cell: decimals, decimal comma, exponent."""
     mantissa, exponent, _ = cell.lower().replace(",", ".").partition("e")
     decimals = len(mantissa.partition(".")[2])
     if not decimals and value.is_integer():
@@ -214,7 +214,7 @@ def _like(cell: str, value: float) -> str:
 
 
 def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> bytes:
-    """Return arrays of NPZ, NPY or a pickle with changed ones; what does not change keeps its bytes in an NPZ."""
+    """Return an NPZ, NPY or pickle file with changed arrays; other members of an NPZ keep their bytes."""
     file = io.BytesIO()
     if data[:6] == b"\x93NUMPY":
         np.save(file, change("", np.load(io.BytesIO(data), allow_pickle=False)))
@@ -240,7 +240,7 @@ def _in_arrays(data: bytes, source: str, change: Callable[[str, Any], Any]) -> b
 
 
 def _in_tree(value: Any, change: Callable[[str, Any], Any], name: str = "") -> Any:
-    """Change the arrays of nested dicts and lists."""
+    """Return nested dicts and lists with changed arrays; `name` is the key of the value."""
     if isinstance(value, dict):
         return {key: _in_tree(one, change, str(key)) for key, one in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Remedies for what checks reject: each is kept where it lessens what checks over time reject."""
+"""Remedies for findings of checks; a remedy is kept only if it reduces the findings of checks over time."""
 
 from __future__ import annotations
 
@@ -16,41 +16,42 @@ from posekit.skeleton import JOINTS, LIMB_SEGMENTS, NAMES, SIDES, other_side, se
 from posekit.validators.motion.sides import SIDE_PAIRS
 from posekit.validators.report import Report, rank_of
 
-#: Times that all remedies are tried in turn.
+#: Number of times that all remedies are tried in turn.
 ROUNDS: Final = 3
-#: Findings of other checks that one of a cause is worth.
+#: Weight of a finding that explains findings of other checks, such as a jump; other findings have weight one.
 CAUSE_WEIGHT: Final = 3
-#: Strengths of smoothing, least first.
+#: Strengths of smoothing (dimensionless), smallest first.
 STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
-#: Frames before and after those that tremble or are too fast that are smoothed with them.
+#: Numbers of frames before and after a rejected span that are smoothed with it.
 AROUND_FRAMES: Final = (0, 3, 10)
-#: Share of the largest displacement that remains of a step that lasts.
+#: Minimum ratio of final to largest displacement of a step of the whole body that lasts.
 LASTING_SHARE: Final = 0.5
-#: Share of the largest displacement below which a body that stepped aside and back is where it was.
+#: Displacements below this share of the largest displacement are treated as zero: the body has stepped back.
 SAME_PLACE_SHARE: Final = 0.15
-#: Frames before and after a span over which a length may have drifted there.
+#: Number of frames before and after a rejected span in which lengths are corrected, too.
 RAMP_FRAMES: Final = 6
-#: Share of a length below which it has not drifted.
+#: Relative deviation of a length below which it is not corrected.
 SEEN_SHARE: Final = 2e-3
-#: Largest shift, metres: a body that is farther from the ground is not meant to stand on it.
+#: Largest shift to the ground, metres: a body that is farther away is treated as not standing on it.
 MOST_SHIFT_METRES: Final = 0.5
-#: Distance inside its bound to which a body is lifted or lowered.
+#: Distance inside its bound to which a body is lifted or lowered, metres.
 CLEARANCE_METRES: Final = 2e-6
 FEET_AND_HEAD: Final = ("toe", "heel", "eye", "ear")
-#: Points that are exchanged with a pair of joints.
+#: Parts of names of the points that are exchanged together with a pair of joints.
 PARTS_OF_PAIRS: Final = {"ankle": ("ankle", "toe", "heel"), "shoulder": ("shoulder", "eye", "ear")}
-#: Points by which each foot is held, the best first.
+#: Points that are tried for measuring the slide of each foot, in this order.
 FOOT_POINTS: Final = tuple((NAMES.index(f"{side}_toe"), NAMES.index(f"{side}_ankle")) for side in SIDES)
 
-#: From a clip and what is rejected of it to clips that may be better.
+#: Function of a clip and its report; it yields candidates for a better clip.
 Remedy = Callable[[Clip, Report], Iterator[Clip]]
 
 
 def mended(clip: Clip, *, filled: bool = False) -> Clip:
-    """Undo what checks reject.
+    """Return a clip with fewer findings.
 
-    Remedies of labels and single frames are tried first, then postures are made legal, then all remedies are tried:
-    wrong postures tremble, and their feet slide. If `filled`, the rejected frames are interpolated before.
+    First the remedies for order, labels and jumps are tried; then rejected postures are replaced; then all remedies
+    are tried, because wrong postures also cause trembling and sliding; then rejected postures are replaced again. If
+    `filled`, all rejected frames are interpolated at the start.
     """
     if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
@@ -76,13 +77,13 @@ def _mended_over_time(clip: Clip, remedies: Sequence[tuple[str, Remedy]]) -> Cli
 
 
 def _count(report: Report) -> int:
-    """Count rejected frames check by check; one of a cause, which hides others, as several."""
+    """Return the weighted number of rejected frames, summed over checks; see `CAUSE_WEIGHT`."""
     pairs = np.unique(np.stack([report.findings["check"], report.findings["row"]]), axis=1)
     return sum(1 if rank_of(report.checks[k]) else CAUSE_WEIGHT for k in pairs[0])
 
 
 def _numbers(report: Report, check: str, place: str, column: str = "value") -> Array:
-    """Return a number of the findings of a check at a place (T,); 0 in frames without any."""
+    """Return a column of the findings of a check at a place (T,); 0 in frames without a finding."""
     found, out = report.findings, np.zeros(len(report))
     if check in report.checks and place in report.places:
         mine = (found["check"] == report.checks.index(check)) & (found["place"] == report.places.index(place))
@@ -91,7 +92,7 @@ def _numbers(report: Report, check: str, place: str, column: str = "value") -> A
 
 
 def _reorder(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Put frames in the order of their times or, where these are in order, of the motion; fill gaps in time."""
+    """Sort frames by their times; if the times are in order, reorder frames as the motion suggests, or fill gaps."""
     if not rejected(report, "timing").any():
         return
     if (np.diff(clip.time) < 0).any():
@@ -106,7 +107,7 @@ def _reorder(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _exchange(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Exchange right and left: the pairs that are named, in their frames, or everything in all frames."""
+    """Exchange right and left: the rejected pairs in the rejected frames, or all points in all frames."""
     pairs = rejected(report, "swap", places=SIDE_PAIRS)
     if not pairs.any():
         return
@@ -125,7 +126,7 @@ def _exchanged_order(parts: Sequence[str]) -> Ints:
 
 
 def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Give drifting segments of limbs the lengths that they have elsewhere; the joints behind them move along."""
+    """Give drifting segments the median length of the other frames; joints farther out on the limb move along."""
     bad = rejected(report, "drift", places=[segment_name(one) for one in LIMB_SEGMENTS])
     if not bad.any() or isinstance(clip, RobotClip):
         return
@@ -140,9 +141,9 @@ def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Undo lasting displacements of the whole body: no frames lie between to interpolate.
+    """Undo sudden displacements of the whole body that last, so that interpolation cannot remove them.
 
-    The body goes on where it went before, and as many frames as possible stay.
+    The frames before or after the displacement are shifted, such that as many frames as possible stay.
     """
     bad = _numbers(report, "teleport", "body") != 0
     if not bad.any():
@@ -163,13 +164,13 @@ def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _most_stay(aside: Array) -> Array:
-    """Return the shift (T, 3) that undoes displacements, such that as many frames as possible stay."""
+    """Return the shift (T, 3) that undoes displacements `aside` (T, 3), with as many zero rows as possible."""
     _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
     return np.asarray(aside[where[np.argmax(count)]] - aside)
 
 
 def _interpolate(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Interpolate frames that stand still, jumps of joints, and jumps of the body."""
+    """Interpolate frozen frames, and frames or single joints that jump."""
     still, jumps = rejected(report, "frozen", "repeated"), rejected(report, "teleport", places=JOINTS)
     if still.any():
         yield clip.interpolated(still)
@@ -183,7 +184,7 @@ def _interpolate(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Smooth trembling, and motion that is too fast, by as little as helps most; more if it comes again."""
+    """Smooth points that tremble or are too fast; strengths start higher in clips that were smoothed before."""
     checks = ["jitter", "speed", "acceleration", "jerk", "joint-velocity"]
     if rejected(report, "teleport").sum() > 1:  # several jumps near each other are trembling
         checks.append("teleport")
@@ -195,7 +196,7 @@ def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Lift and lower the body by what it is below or above the ground, evenly or frame by frame."""
+    """Lift a body that is below the ground and lower one that floats, by one shift a span or frame by frame."""
     up = clip.motion.up_vector
     low, high = (_numbers(report, check, "lowest") for check in ("penetration", "floating"))
     beyond = [_numbers(report, check, "lowest", "margin") for check in ("penetration", "floating")]
@@ -217,9 +218,9 @@ def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _hold(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Move the body along the ground against the slide of standing feet, evenly or frame by frame.
+    """Move the body along the ground against the slide of a standing foot, evenly or frame by frame.
 
-    The frames after the slide go on from where it then ends, or those before it lead to where it begins.
+    All frames after the slide are shifted by its total, or all frames before it, whichever are fewer.
     """
     up = clip.motion.up_vector
     bad = rejected(report, "sliding", "skating", places=[f"{side}_foot" for side in SIDES])
@@ -242,7 +243,7 @@ def _hold(clip: Clip, report: Report) -> Iterator[Clip]:
     yield from (clip.shifted(_most_stay(np.cumsum(step, axis=0))) for step in (even, slow))
 
 
-#: In the order in which they are tried: order and labels first, then single frames, then spans.
+#: Remedies in the order in which they are tried: order and labels first, then single frames, then spans.
 REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
     ("reordered", _reorder),
     ("exchanged", _exchange),
@@ -253,5 +254,5 @@ REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
     ("shifted", _shift),
     ("held", _hold),
 )
-#: Number of the first remedies, of what breaks single frames.
+#: Number of the remedies that are tried before rejected postures are replaced.
 N_CAUSES: Final = 5

@@ -1,4 +1,4 @@
-"""`repair`: a motion nearby that passes, in the user's own file, and what was invented for it."""
+"""`repair`: find a nearby motion that passes all checks, write it in the user's file, and report invented frames."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from posekit.settings import ValidateSettings, stated
 from posekit.skeleton import JOINTS
 from posekit.validators.report import Report, joined, plural
 
-#: Times that a motion is repaired again: postures can tremble that time does not, and a file rounds.
+#: Maximum number of rounds of repair: replaced postures can tremble, and a file rounds.
 ROUNDS: Final = 4
-#: Change of a frame that counts, metres or radians.
+#: Change of a frame above which it counts as changed, metres or radians.
 SEEN: Final = 5e-6
-#: Start of the note of what is left.
+#: Start of the note about remaining findings.
 LEFT: Final = "left: "
-#: Sentences about remedies.
+#: Notes about remedies.
 SAID: Final = {
     "reordered": "frames put in order",
     "lengthened": "lengths of limbs restored",
@@ -48,18 +48,18 @@ SAID: Final = {
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Repaired(Record):
-    """A repaired motion, or the repaired files of a folder.
+    """Result of a repair of one motion, or of the files of a folder.
 
     Parameters
     ----------
     motion : Motion or None
-        The repaired motion, with the frames that passed as they were; None for several files.
+        The repaired motion; None for several files. Frames that passed are unchanged.
     before, report : Report
-        Reports about the given motion, and about the repaired one as it is read again.
+        Reports about the given motion, and about the repaired motion as it is read from its file.
     notes : tuple of str
-        Invented frames and remaining defects, one sentence each.
+        Changes, invented frames and remaining defects, one sentence each.
     data : bytes
-        The repaired file with all that is the user's own; empty if the motion is written anew.
+        Contents of the repaired file, with the user's names and columns; empty if `posekit.save` writes the motion.
     """
 
     motion: Motion | None
@@ -72,7 +72,7 @@ class Repaired(Record):
         return list(self.notes)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the repaired motion: in the format of its own file with the file's own names and columns.
+        """Write the repaired motion; if the format is that of its file, with the names and columns of that file.
 
         Raises
         ------
@@ -115,24 +115,23 @@ def repair(
     profile: str | None = None,
     ground: str | float | None = None,
 ) -> Repaired:
-    """Find a motion near the given one that passes all checks.
+    """Find a motion near the given motion that passes all checks.
 
-    Over time, frames are put in order, sides exchanged back, lengths of limbs restored, jumps and frozen frames
-    interpolated, trembling smoothed by as little as helps, the body shifted to the ground, and standing feet held. Then
-    each posture that is rejected is pushed inside its bounds by the shortest steps, else brought toward the nearest
-    good frames, as far as it must. A first frame from which the body jumps, such as a T-pose, is replaced by one from
-    which the motion goes on as it does after it.
+    Defects over time are removed first: frames are put in order, right and left exchanged back, lengths of limbs
+    restored, jumps and frozen frames interpolated, trembling smoothed, the body shifted to the ground, and standing
+    feet held in place. Then each rejected posture is pushed inside its bounds by the shortest steps; if that fails,
+    it is moved toward the nearest good frames until it passes. A first frame from which the body jumps, such as a
+    T-pose, is replaced by extrapolation.
 
-    Frames that need no change stay as they are, byte for byte in BVH files and in tables. A file that is written is
-    judged as it is read again.
+    Frames that need no change stay, byte for byte in BVH files and in tables. A written file is read again and judged.
 
     Parameters
     ----------
     source : path, sequence of path, Motion or array
         A file, a folder, a motion, or an array as `posekit.validate` takes it; an array is motion if `rate` is given.
     target : path, optional
-        File to write; for a folder or several files a new folder of files of the same names, in which valid files are
-        copied unchanged.
+        File to write. For a folder or several files: a new folder, which gets files of the same names; valid files
+        are copied unchanged.
     urdf, settings, layout, unit, up, rate, person, checks, ranges, profile, ground
         As in `posekit.validate`.
 
@@ -179,7 +178,7 @@ def _opened(path: Path, facts: dict[str, Any]) -> Motion:
 
 
 def _written(done: Repaired, path: Path, judge: Judge, facts: dict[str, Any]) -> Repaired:
-    """Write a repaired motion, and judge the file as it is read again."""
+    """Write a repaired motion, and return it with the report about the written file."""
     done.save(path)
     if done.motion is None or done.report is done.before or not _same_format(done.motion, path):
         return done
@@ -188,7 +187,7 @@ def _written(done: Repaired, path: Path, judge: Judge, facts: dict[str, Any]) ->
 
 
 def _with_left(notes: Sequence[str], report: Report) -> tuple[str, ...]:
-    """Return notes with the spans of a report that are not valid."""
+    """Return notes, followed by a note about the invalid spans of a report."""
     left = [str(span) for span in report.spans if span.verdict == "invalid"]
     more = f"; {len(left) - 3} more" if len(left) > 3 else ""
     own = [note for note in notes if not note.startswith(LEFT)]
@@ -198,7 +197,7 @@ def _with_left(notes: Sequence[str], report: Report) -> tuple[str, ...]:
 def _folder(
     files: Sequence[Path], target: str | PathLike[str] | None, judge: Judge, facts: dict[str, Any]
 ) -> Repaired:
-    """Repair files into a new folder; a file that cannot be read or written is named."""
+    """Repair files into a new folder; files that cannot be read or written are named in the notes."""
     folder = None if target is None else new_folder(target)
     names = names_below(str(path) for path in files)
     done: list[Repaired] = []
@@ -227,7 +226,7 @@ def _folder(
 
 
 def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
-    """Repair every recording of a motion, until it passes as its file is read again."""
+    """Repair every recording of a motion in rounds, until the motion passes as it is read from its file."""
     before = judge.report(motion)
     if before.ok.all():
         return Repaired(motion=motion, before=before, report=before, notes=(_changed(0, len(motion)),))
@@ -267,7 +266,7 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
 
 
 def _joined(clips: Sequence[Clip], motion: Motion) -> Motion:
-    """Return repaired recordings one after the other."""
+    """Return repaired recordings as one motion."""
     parts = [clip.as_motion() for clip in clips]
     if len(parts) == 1:
         return parts[0]
@@ -280,7 +279,7 @@ def _joined(clips: Sequence[Clip], motion: Motion) -> Motion:
 def _in_its_file(
     before: Motion, after: Motion, clips: Sequence[Clip], facts: dict[str, Any]
 ) -> tuple[bytes, list[str]]:
-    """Return a motion's own file with what was repaired, empty if it cannot be kept, and what does not follow."""
+    """Return the repaired file, empty if its format cannot be kept, and notes about contents that were not changed."""
     if isinstance(before.document, Bvh):
         options = Options(**{name: facts.get(name, "") for name in ("layout", "unit", "up")})
         return in_bvh(clips[0], before.document, options) if len(after) == len(before) else b"", []
@@ -292,7 +291,7 @@ def _in_its_file(
 
 
 def _told(given: Clip, clip: Clip, *, several: bool) -> list[str]:
-    """Return one note for each kind of change and of invented frames, with its clip if there are several."""
+    """Return notes about changes and invented frames, preceded by the name of the clip if there are several."""
     rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
     moved = np.nan_to_num(clip.state - given.state[rows])
     changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
