@@ -877,7 +877,7 @@ def crawling(forward: float, rises: tuple[float, float] = (0.0, 0.0)) -> Any:
         (0.61, (0.3, 0.0), "", "+z", "+z is up by the ground: the lowest joint stays level along it"),
         (1.0, (0.04, 0.5), "", "+y", "+y is up by the ground"),
         (1.0, (0.21, 0.1), "", "+z", "+z is up by the ground"),
-        (1.0, (0.19, 0.1), "", "", "which axis is up is not known"),
+        (1.0, (0.19, 0.1), "", "", "the up axis is not known"),
         (0.0, (0.0, 0.0), "+z", "+z", "the person is lying in most frames if +z is up"),
         (0.61, (0.0, 0.0), "+z", "+z", ""),
         (0.0, (0.0, 0.0), "-x", "-x", "the person is upside down in most frames if -x is up"),

@@ -32,7 +32,7 @@ def numbers(values: Any) -> Array:
 
 
 def has_layout(given: Any, layout: str | None) -> bool:
-    """Tell whether the points of an array (T, J, 3) follow a layout: one that is named, or others than the figure's.
+    """Return whether an array (T, J, 3) follows a layout: a stated one, or one of other points than the figure's.
 
     Raises
     ------

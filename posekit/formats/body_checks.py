@@ -14,7 +14,7 @@ from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Flags, Ints, u
 from posekit.motion import Motion
 from posekit.skeleton import JOINT, JOINTS, SIDES
 
-#: Metres in each unit that can be stated.
+#: Metres in each unit of length that a user or a file can state.
 METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 #: Words for units in files, in lower case.
 UNIT_WORDS: Final = {
@@ -31,32 +31,32 @@ LIMB_SHARES: Final = {
     **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
     **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
 }
-#: Statures of nearly all who are recorded: a body of 67 is one of inches, and no toddler in centimetres.
+#: Statures of most recorded people: a body 67 units tall is in inches, not a toddler of 67 cm.
 USUAL_METRES: Final = (1.2, 2.2)
-#: Statures by which a unit is recognised: of a toddler or a small robot, and of a giant.
+#: Smallest and largest stature by which a unit is recognised: a toddler or a small robot, and a giant.
 BODY_METRES: Final = (0.4, 2.5)
-#: Statures that are read as metres: they are nearer to a body in metres than in another unit.
+#: Smallest and largest stature that is read as metres; in any other unit the body would be further from a person.
 POSSIBLE_METRES: Final = (0.2, 5.0)
 
-#: Component of the mean direction from ankles to shoulders along an axis above which a body stands along it.
+#: Minimum cosine between the mean direction from ankles to shoulders and the axis along which a body stands.
 CLEAR_UP_SHARE: Final = 0.7
 #: Rise of the lowest joint along an axis: below the first the ground is level (an ankle's rise in a step), above the
 #: second it is not (more than from a crouch to the tips of the toes).
 FLAT_METRES, STEEP_METRES = 0.15, 0.6
-#: Ratio of rises by which one axis is level more clearly than all others.
+#: Minimum ratio of the rise along another axis to the rise along the axis of a level ground.
 CLEAR_RATIO: Final = 2.0
-#: Share by which a distance between rigid neighbours may leave its range in other frames, share that both come to
-#: at most (a torso's distances vary by 7 %, those along limbs by more), and number of neighbours that are compared.
+#: Rigid neighbours of a point: share by which their distance may leave its range in other frames; largest sum of this
+#: share and of the range itself (a torso's distances vary by 7 %, distances along limbs by more); their number.
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
-#: Share by which a stated rate and the times must differ to be a contradiction.
+#: Relative difference between a stated rate and the rate of the times above which they contradict each other.
 RATE_DISAGREES: Final = 0.1
-#: Distance of a root from the origin that float32 and rounding leave.
+#: Distance from the origin below which a root is at the origin: float32 and rounding leave 0.1 mm.
 ROUNDING_METRES: Final = 1e-4
-#: Rounding of times that is noted, seconds.
+#: Smallest rounding error of times, in seconds, that a note mentions.
 NOTED_SECONDS: Final = 1e-4
-#: Share by which limbs of both sides may differ in length in an order of points that fits.
+#: Largest relative difference between the lengths of right and left limbs in the right order of points.
 SIDES_SHARE: Final = 0.25
-#: Distance of a stated middle from the middle of its two joints, share of a leg's length, in an order that fits.
+#: Largest distance of a middle point from the middle of its two joints, as a share of the leg, in the right order.
 MIDDLE_SHARE: Final = 0.25
 
 
@@ -101,8 +101,8 @@ def points_motion(
     up_by_custom : str
         Axis that points up by the format's custom.
     partial : bool
-        Whether files of this format are of markers, of which some sets have no joints: these are read without joints,
-        with a warning.
+        Whether files of this format can hold markers without joints. Such a file is read without joints, with a
+        warning.
     **fields
         Further fields of `Motion`.
 
@@ -148,7 +148,7 @@ def points_motion(
 def _layout_of(
     points: Array, names: Sequence[str], source: str, options: Options, layout: Layout | None, partial: bool
 ) -> Layout:
-    """Return the stated layout, or the one that names or points fit; an empty one for markers without joints."""
+    """Return the stated layout, or the layout that the names or the points fit; an empty layout for markers alone."""
     if options.layout:
         layout = load_layout(options.layout)
         if layout.kind != "points":
@@ -198,7 +198,7 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
 
 
 def _misfit(layout: Layout, points: Array) -> float:
-    """Return the misfit of a layout: limbs of unequal sides, and stated middles off their place; 1 at the bounds."""
+    """Return the largest of a layout's errors (unequal limbs, misplaced middle points), each divided by its bound."""
     found = layout.gather(points[:, : len(layout.points)])
     if not set(LIMBS) <= set(found):
         return np.inf
@@ -226,7 +226,7 @@ def _apart(a: Array, b: Array) -> float:
 
 
 def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: Options) -> None:
-    """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing one.
+    """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing point.
 
     A point whose three coordinates are the same number in some frames and others in the rest is missing there (zeros,
     -1, 999), unless it keeps its distances from its neighbours: it is a root at the origin. One that is zero in all
@@ -252,7 +252,7 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
 
 
 def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
-    """Tell in which frames (T,) a point of the trunk has its usual distances from its rigid neighbours.
+    """Return the frames (T,) in which a point of the trunk has its usual distances from its rigid neighbours.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> A
 
 
 def _check_depth(body: Array, source: str) -> None:
-    """Refuse frames of which one coordinate is one constant for all joints: the points are not in space."""
+    """Refuse points whose x, y or z is the same number for all joints in all frames: they are not in space."""
     known = body[np.isfinite(body).all(axis=-1)]
     if len(body) > 1 and len(known) > len(body) * 4:
         for k in range(3):
@@ -298,7 +298,7 @@ def _check_depth(body: Array, source: str) -> None:
 
 
 def stature(body: Array) -> float:
-    """Return the stature of joints (T, 14, 3) by the median limb's share of it, in their unit; NaN without a limb."""
+    """Return the stature of joints (T, 14, 3), in their unit: median limb length over its share; NaN without limbs."""
     statures = [
         _apart(body[:, JOINT[f"{side}_{start}"]], body[:, JOINT[f"{side}_{end}"]]) / share
         for (start, end), share in LIMB_SHARES.items()
@@ -308,7 +308,7 @@ def stature(body: Array) -> float:
 
 
 def body_unit(body: Array, stated: str, options: Options) -> tuple[str, float]:
-    """Find the unit of joints (T, 14, 3): the stated one, unless a body has its size only in another.
+    """Find the unit of joints (T, 14, 3): the stated unit, or another if only that makes the body human-sized.
 
     Returns
     -------
@@ -341,7 +341,7 @@ def body_unit(body: Array, stated: str, options: Options) -> tuple[str, float]:
 
 
 def stands_along(body: Array) -> str:
-    """Return the axis along which shoulders lie above hips and hips above ankles, over all frames; empty if none is."""
+    """Return the axis along which shoulders lie above ankles (or hips) on average; empty if no axis is clear."""
     shoulders = body[:, [JOINT["right_shoulder"], JOINT["left_shoulder"]]].mean(axis=1)
     ankles = body[:, [JOINT["right_ankle"], JOINT["left_ankle"]]].mean(axis=1)
     hips = body[:, [JOINT["right_hip"], JOINT["left_hip"]]].mean(axis=1)
@@ -357,9 +357,9 @@ def stands_along(body: Array) -> str:
 
 
 def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: Options) -> str:
-    """Find the axis that points up of joints (T, 14, 3): the stated one, else how bodies stand, the ground, the custom.
+    """Find the up axis of joints (T, 14, 3): stated, or by how bodies stand, or by level ground, or by convention.
 
-    A stated axis that bodies contradict stays, with a warning; so does one found that points against the custom.
+    A stated axis that bodies contradict is kept with a warning. An axis found against the convention is a warning, too.
     """
     if stated and stated not in UP_AXES:
         raise refusal("", "up", shown(stated), f"one of {', '.join(UP_AXES)}", "give it with --up")
@@ -389,12 +389,12 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
         options.note(f"{best} is up by the ground: the lowest joint stays level along it")
         return best
     if not custom:
-        options.note("which axis is up is not known: nobody stands, and no ground is level (--up)")
+        options.note("the up axis is not known: nobody stands, and no ground is level (--up)")
     return custom
 
 
 def _rise(body: Array, clip: Ints | None, up: str) -> float:
-    """Return the rise of the lowest joint along an axis, from the 5th to the 95th percentile; median over clips."""
+    """Return the range (5th to 95th percentile) of the lowest joint's height along an axis, median over clips."""
     lowest = np.fmin.reduce(body @ up_vector(up), axis=1)
     spreads = []
     for index in [0] if clip is None else np.unique(clip):
@@ -420,7 +420,7 @@ def times(
     clip: Ints | None = None,
     frame: Ints | None = None,
 ) -> Array | None:
-    """Return seconds of each frame: the file's times, else the user's rate or the file's; None if none is known.
+    """Return the time of each frame (T,), seconds: the file's times, or those of a rate; None if neither is known.
 
     Contradictions between times and rates are added to the warnings. Rows of one frame are alternative postures.
     """
@@ -444,7 +444,7 @@ def times(
     used = options.rate or stated
     if used is None:
         if frames > 1:
-            options.note("the file says no times and no rate above 0 (--rate)")
+            options.note("the file has no times and no rate above 0 (--rate)")
         return None
     first = np.concatenate([[True], np.diff(clip) != 0])
     number = np.arange(frames) - np.flatnonzero(first)[np.cumsum(first) - 1]
@@ -452,7 +452,7 @@ def times(
 
 
 def _unrounded(time: Array, stated: float | None, options: Options) -> Array:
-    """Return even times (T,) if only rounding to at most 6 decimals makes a file's uneven: 0.017, 0.033, 0.05."""
+    """Return evenly spaced times (T,) if a file's times, as 0.017, 0.033, 0.05, are even except for rounding."""
     digits = next((d for d in range(7) if np.array_equal(np.round(time, d), time)), None)
     if digits is None or len(time) < 3 or not time[-1] > time[0]:
         return time

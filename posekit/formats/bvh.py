@@ -27,21 +27,21 @@ MAX_JOINTS: Final = 2000
 MAX_DEPTH: Final = 250
 #: Largest length, position or angle that is read, in any unit.
 LARGEST_VALUE: Final = 1e9
-#: Channel in lower case to whether it rotates, and its axis.
+#: For each channel, in lower case: whether it is a rotation, and its axis 0 to 2.
 KINDS: Final = ("position", "rotation")
 CHANNELS: Final = {f"{a}{kind}": (kind == "rotation", k) for kind in KINDS for k, a in enumerate("xyz")}
 
 #: Metres in a unit of the CMU database, inches times 0.45 (mocap.cs.cmu.edu, FAQs): also in its BVH conversions.
 CMU_METRES: Final = 0.0254 / 0.45
 UNITS: Final = {**METRES, "0.45 in": CMU_METRES}
-#: Metres along the bones between the two ends of a body that are farthest apart: skeletons of CMU, LAFAN1 and
-#: Bandai-Namco have 1.9 to 2.3.
+#: Usual length of the longest chain of bones between two ends of a skeleton, metres: CMU, LAFAN1 and Bandai-Namco
+#: have 1.9 to 2.3.
 CHAIN_METRES: Final = 2.0
-#: Metres along the bones of a small child, and of a giant.
+#: Length of this chain in a small child and in a giant, metres.
 CHAIN_BOUNDS: Final = (0.9, 4.5)
-#: Frames that the unit is found from.
+#: Number of frames from which the unit is found.
 FRAMES_SAMPLED: Final = 200
-#: Share of the largest offset below which an offset tells nothing about its position channels.
+#: Offsets below this share of the largest offset are not compared with their position channels.
 SMALL_OFFSET_SHARE: Final = 1e-3
 _MOTION: Final = re.compile(r"^[ \t]*MOTION[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
 _HEAD: Final = re.compile(r"\s*Frames\s*:\s*(\S+)\s+Frame\s*Time\s*:\s*(\S+)", re.IGNORECASE)
@@ -51,7 +51,7 @@ _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", re.ASC
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Bvh:
-    """A BVH file as it stands: joints and End Sites in the file's order, parents first.
+    """Contents of a BVH file: joints and End Sites in the file's order, parents first.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Bvh:
     sites : tuple of bool (P,)
         True for End Sites.
     frame_time : float
-        Seconds from frame to frame; NaN if the file says none.
+        Seconds from frame to frame; NaN if the file states no valid number.
     values : array (T, C)
         The channels of all joints one after the other, file's unit and degrees.
     frames : int
@@ -109,7 +109,7 @@ def parse(data: bytes, source: str) -> Bvh:
     head = _HEAD.match(document, motion.end())
     if head is None:
         line = document.count("\n", 0, motion.end()) + 2
-        raise refusal(source, f"line {line}", "others", "Frames: and Frame Time:", "add both after MOTION")
+        raise refusal(source, f"line {line}", "no head", "Frames: and Frame Time:", "add both after MOTION")
     if not (head[1].isascii() and head[1].isdigit() and 0 < int(head[1][:13]) < 10**12):
         raise refusal(source, "Frames", shown(head[1]), "a positive whole number")
     seconds = float(head[2]) if _NUMBER.fullmatch(head[2]) else np.nan
@@ -131,7 +131,7 @@ def parse(data: bytes, source: str) -> Bvh:
 
 
 def _hierarchy(document: str, source: str) -> list[Any]:
-    """Read joints as [name, parent, offset, channels, is End Site], word by word and never by recursion."""
+    """Read joints as [name, parent, offset, channels, is End Site], word by word, without recursion."""
     tokens = list(_TOKEN.finditer(document))
     words = [token.group() for token in tokens]
     joints: list[Any] = []
@@ -244,7 +244,7 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
 
 
 def holds(document: Bvh, motion: Motion) -> bool:
-    """Tell whether a motion is still that of the document that it came from."""
+    """Return whether the joints of a motion are still exactly those of the file that it was read from."""
     if motion.joints is None or len(motion) != len(document.values):
         return False
     layout = motion.layout if motion.layout.endswith(".toml") else ""
@@ -253,7 +253,7 @@ def holds(document: Bvh, motion: Motion) -> bool:
 
 
 def with_values(document: Bvh, values: Array) -> Bvh:
-    """Return the file with other values (T, C): numbers that stay the same keep their text, byte for byte."""
+    """Return the file with other values (T, C); unchanged numbers keep their text, byte for byte."""
     if values.shape != document.values.shape:
         raise refusal("", "values", f"shape {values.shape}", f"{document.values.shape}", "keep the frames")
     head = _HEAD.match(document.text, _MOTION.search(document.text).end())  # type: ignore[union-attr]
@@ -306,7 +306,7 @@ def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) 
 
 
 def positions_are_absolute(document: Bvh) -> bool:
-    """Tell whether position channels stand in place of the offsets, or are added to them.
+    """Return whether position channels replace the offsets; otherwise they are added to the offsets.
 
     The format's notes add a joint's position channels to its offset. MotionBuilder, Blender and data sets made with
     them (LAFAN1, Bandai-Namco) write the whole position into the channels, beside the same offset. Joints below
@@ -327,7 +327,7 @@ def positions_are_absolute(document: Bvh) -> bool:
 
 
 def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[str, float]:
-    """Find the unit by the longest chain of bones, which no posture changes."""
+    """Find the unit by the length of the longest chain of bones, which does not depend on the posture."""
     length = _longest_chain(points[:: max(1, len(points) // FRAMES_SAMPLED)], document.parents)
     unit = min(UNITS, key=lambda name: abs(np.log(max(length * UNITS[name] / CHAIN_METRES, 1e-300))))
     metres = length * UNITS[unit]
@@ -340,9 +340,9 @@ def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[
 
 
 def _longest_chain(points: Array, parents: tuple[int, ...]) -> float:
-    """Return the longest way along the bones between two ends of the tree, median over frames.
+    """Return the length of the longest chain of bones between two ends of the tree, median over frames.
 
-    A root that has one child alone is a place in the world and no part of the body.
+    A root with a single child is a point of the world, not of the body, and does not count.
     """
     count = len(parents)
     children = np.bincount([parent for parent in parents if parent >= 0], minlength=count)

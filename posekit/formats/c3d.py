@@ -78,7 +78,7 @@ def parse(data: bytes, source: str) -> C3d:
     Raises
     ------
     InputError
-        If it is none, holds no points, is cut off, or states more than it holds.
+        If the data are no C3D file, hold no points, are cut off, or state more frames than they hold.
     """
 
     def damaged(field: str, got: str, expected: str) -> InputError:
@@ -123,7 +123,7 @@ def parse(data: bytes, source: str) -> C3d:
 
 
 def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
-    """Decode 32-bit floats; DEC's (85) have their halves exchanged and four times the value."""
+    """Decode 32-bit floats; floats of DEC (85) have exchanged halves and four times the value."""
     if processor != 85:
         return np.frombuffer(data, ">f4" if processor == 86 else "<f4").astype(np.float32)
     words = np.frombuffer(data, "<u2").astype(np.uint32).reshape(-1, 2)
@@ -131,13 +131,13 @@ def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
 
 
 def _numbers(parameters: dict[str, Any], name: str) -> list[float]:
-    """Return the numbers of a parameter; none if it is absent or a text."""
+    """Return the numbers of a parameter; an empty list if it is absent or a text."""
     found = parameters.get(name)
     return found.tolist() if isinstance(found, np.ndarray) else []
 
 
 def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width: int, damaged: Any) -> int:
-    """Return the number of frames; a header counts to 65,535, and longer files say so in one of three other ways."""
+    """Return the number of frames: the header counts to 65,535; longer files state it in one of three parameters."""
     count = last - first + 1
     if count < 1:
         raise damaged("header", f"frames {first} to {last}", "the last not before the first")
@@ -190,7 +190,7 @@ def _parameters(data: bytes, place: int, processor: int, damaged: Any) -> dict[s
             found.append((group, name, value))
         if not offset:
             break
-        taken(start + offset - 2 - place)  # 0, or what the format's later versions add
+        taken(start + offset - 2 - place)  # usually 0 bytes
     for group, name, _ in found:
         if group not in groups:
             raise damaged("parameters", f"{shown(name)} in no group", "a group of each parameter")
@@ -243,9 +243,7 @@ def with_points(data: bytes, document: C3d, points: Array) -> bytes:
     placed = values.reshape(frames, -1)[:, : 4 * count].reshape(frames, count, 4)
     moved = np.isfinite(points).all(axis=-1) & (points != document.points).any(axis=-1)
     numbers = points[moved] / document.scale
-    whole = document.kind.endswith(
-        "i2"
-    )  # posekit reads the file again, and says what a clipped number breaks
+    whole = document.kind.endswith("i2")  # the repaired file is judged again, which finds clipped numbers
     placed[moved, :3] = np.clip(np.round(numbers), -32768, 32767) if whole else numbers
     placed[moved, 3] = np.maximum(placed[moved, 3], 0)  # a point that was not seen is known now
     values.reshape(frames, -1)[:, : 4 * count] = placed.reshape(frames, -1)

@@ -29,7 +29,7 @@ from posekit.settings import UNITS
 
 Fields = Mapping[str, Any]
 
-#: Names of each field in use, upper or lower case, with or without underscores.
+#: Known names of each field; case and underscores do not count.
 FIELDS: Final = {
     "words for K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix",
     "K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix mtx k m",
@@ -60,7 +60,7 @@ LEAST_UPRIGHT: Final = 0.8
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a document has intrinsics, in itself or one level below, or a field that is called so."""
+    """Return whether a document has intrinsics or a field with such a name, at its top or one level below."""
     if isinstance(document, list):
         return any(isinstance(one, Mapping) and _suffixes(one) for one in document[:1])
     if not isinstance(document, Mapping):
@@ -127,7 +127,7 @@ def read(document: Any, path: str | Path, options: Options) -> dict[str, Pinhole
 
 
 def _camera(fields: Fields, path: str | Path, name: str, suffix: str, unit: str, up: str) -> PinholeCamera:
-    """Make one camera of its fields; those of several cameras have its suffix."""
+    """Make one camera; among the fields of several cameras, its own have the suffix."""
     place = f"{cut(name)}."
     K = _numbers(_value(fields, "K", suffix), path, f"{place}K", 9).reshape(3, 3)
     given = _value(fields, "distortion", suffix)
@@ -158,7 +158,7 @@ def _camera(fields: Fields, path: str | Path, name: str, suffix: str, unit: str,
 
 
 def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
-    """Tell the unit of the cameras' positions by their distance from the origin."""
+    """Find the unit of the cameras' positions from their distances to the origin."""
     poses = [as_numbers(_value(one, "translation")) for one in entries]
     farthest = max((float(np.linalg.norm(t)) for t in poses if t is not None and t.size == 3), default=0.0)
     if farthest <= METRES_UP_TO or not np.isfinite(farthest):
@@ -177,7 +177,7 @@ def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
 
 
 def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Array | None, Array | None]:
-    """Return R and t; neither if one is missing: ROS calls its rectification R."""
+    """Return R and t; None for both if t is missing, as ROS calls its rectification R."""
     t = _value(fields, "translation", suffix)
     given = [_value(fields, name, suffix) for name in ("matrix of rotation", "rotation")]
     arrays = [_numbers(one, path, f"{place}R") for one in given if one is not None]
@@ -224,7 +224,7 @@ def _up_of_pictures(turns: list[Any], cameras: list[PinholeCamera]) -> str:
 
 
 def _numbers(value: Any, path: str | Path, field: str, count: int | None = None) -> Array:
-    """Return numbers as a flat array: of lists, of arrays, or of OpenCV's object with rows, cols and data."""
+    """Return the numbers of a list, an array, or OpenCV's object with rows, cols and data, as a flat array."""
     data = value.get("data") if isinstance(value, Mapping) else value
     array = Node(data, path, field).array().ravel()
     declared = array.size
@@ -248,13 +248,13 @@ def _suffixes(fields: Fields) -> list[str]:
 
 
 def _is_intrinsic(value: Any) -> bool:
-    """Tell whether a value is a 3x3 matrix with 0, 0, 1 below: no projection matrix, rotation or table."""
+    """Return whether a value is a 3x3 matrix with the last row 0, 0, 1, unlike projection matrices and rotations."""
     array = as_numbers(value.get("data") if isinstance(value, Mapping) else value)
     return array is not None and array.size == 9 and bool((array.ravel()[6:] == [0, 0, 1]).all())
 
 
 def _value(fields: Fields, field: str, *suffixes: str) -> Any:
-    """Return the first field of the names in use with the first suffix that is there; None if there is none."""
+    """Return the value of a field under the first of its known names and suffixes that the file has; None if absent."""
     by_key = {plain(str(key)): value for key, value in fields.items()}
     named = (plain(alias + suffix) for suffix in suffixes or ("",) for alias in FIELDS[field].split())
     value = next((by_key[name] for name in named if name in by_key), None)

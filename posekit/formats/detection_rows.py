@@ -16,27 +16,27 @@ from posekit.formats.options import Options
 from posekit.geometry import Array, Ints
 from posekit.skeleton import HEAD_POINTS
 
-#: Share of the numbers of a film's pictures that a detector lists at least, in steps of their common divisor; pictures
-#: of a collection have numbers far apart.
+#: Minimum share of a film's pictures that a detector lists, where picture numbers count in their common divisor;
+#: pictures of a collection have numbers far apart.
 DENSE: Final = 0.5
-#: Largest range of the numbers in a film, per listed picture; above it they are not picture numbers.
+#: Largest ratio of the range of picture numbers to the number of pictures; above it they do not count pictures.
 MOST_SPREAD: Final = 20
 #: Median motion of a person between pictures of a film, in units of the square root of the body's area; between
 #: unrelated photographs it is about 1 and more.
 FILM_MOTION: Final = 0.5
-#: Pictures in which the motion is measured.
+#: Largest number of pictures in which this motion is measured.
 MOST_COMPARED: Final = 200
 #: A picture whose size is not known.
 UNKNOWN: Final = (math.nan, math.nan)
 #: Size of nose, eyes and ears against the whole body that stands for a layout without them, as Human3.6M's: where the
 #: head's points belong it is smaller, in a wrong order larger.
 HEADLESS_SHARE: Final = 0.385
-#: Ratio of two orders' shares from which the smaller one is right.
+#: Minimum ratio of the head's size in a wrong order of points to its size in the right order.
 CLEAR_RATIO: Final = 1.17
 
 
 class Rows:
-    """People as a file lists them: in any order, of pictures with labels.
+    """People that a file lists in any order, each in a picture with a label.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Rows:
         label : object
             The picture.
         points : array (K, 3)
-            Pixels, or fractions of the picture, and confidences, NaN where there is none. A point with confidence 0 is
+            Pixels, or fractions of the picture, and confidences, NaN if not known. A point with confidence 0 is
             missing wherever it lies; so is one at the origin or at (-1, -1), and one that is known in part.
         person : object
             The file's number of the person; anything else is unknown.
@@ -88,7 +88,7 @@ class Rows:
         self.people.append((self.picture(label), points, int(person) if whole else -1))
 
     def seen(self) -> tuple[list[str], Array, Ints]:
-        """Return labels, points (N, K, 3) and numbers (N,) of people of whom a point is known; NaN for missing points.
+        """Return labels, points (N, K, 3) and numbers (N,) of people with a known point; NaN for missing points.
 
         Raises
         ------
@@ -208,7 +208,7 @@ def _head_share(points: Array, layout: Layout) -> float:
 
 
 def _in_pixels(rows: Rows, held: list[str], points: Array, options: Options) -> Array:
-    """Turn fractions of the picture into pixels where its size is known; leave them where it is not."""
+    """Turn fractions of the picture into pixels; without the picture's size they stay fractions."""
     known = points[~np.isnan(points[..., 0])]
     if rows.kind == "openpose" and len(known) and np.abs(known).max() <= 1 and known.min() < 0:
         points, known = (points + 1) / 2, (known + 1) / 2  # --keypoint_scale 4: from -1 to 1
@@ -222,7 +222,7 @@ def _in_pixels(rows: Rows, held: list[str], points: Array, options: Options) -> 
 
 
 def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tuple[bool, dict[str, int]]:
-    """Tell whether the pictures are of a film, and give each its frame; left-out pictures keep their place."""
+    """Return whether the pictures form a film, and each picture's frame by its label; absent pictures leave gaps."""
     labels = list(rows.pictures)
     numbers = _numbers(rows, labels)
     if numbers is None:
@@ -251,7 +251,7 @@ def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tup
 
 
 def _numbers(rows: Rows, labels: list[str]) -> NDArray[np.int64] | None:
-    """Return the number in each picture's label that tells all apart; None if there is none."""
+    """Return a number from each picture's label, different for all pictures; None if the labels have no such number."""
     found = [[int(one) for one in re.findall(r"\d{1,15}", label)] for label in labels]
     widths = {len(one) for one in found}
     if len(widths) == 1 and widths != {0}:
@@ -266,7 +266,7 @@ def _numbers(rows: Rows, labels: list[str]) -> NDArray[np.int64] | None:
 
 
 def _moves_little(frame: Ints, points: Array) -> bool:
-    """Tell whether somebody is about where somebody was in the picture before, in the median over pictures."""
+    """Return whether, in most pictures, a person is near the place of a person in the picture before."""
     moved = []
     for number in np.unique(frame)[1 : MOST_COMPARED + 1]:
         before, now = points[frame == number - 1], points[frame == number]
@@ -282,7 +282,7 @@ def _moves_little(frame: Ints, points: Array) -> bool:
 
 
 def _times(stated: Array, film: bool, options: Options) -> Array | None:
-    """Return the times of all pictures (F,), those left out put between the others; None if the file has none."""
+    """Return the times of all pictures (F,), interpolated for absent pictures; None if the file has no times."""
     known = np.isfinite(stated)
     if not known.any() or not film:
         if film and options.rate is None and len(stated) > 1:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: From the URDF's axes to x left, y up, z forward.
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-#: Axes of the three angles of a joint.
+#: Axes of the three angles of a joint, in their order: x, z, y.
 AXIS_ORDER: Final = (0, 2, 1)
 
 
@@ -55,7 +55,7 @@ NODES: Final = _nodes()
 
 
 def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
-    """Return a figure of the person's lengths, and its tree over one recording.
+    """Return a figure with the person's lengths, and the root and angles of its tree in each frame of a recording.
 
     Stored configurations of the figure are used unchanged; otherwise they are computed from the joints in closed
     form. An unknown angle keeps the value of the nearest frame that has it; one that is never known stands at zero, or
@@ -207,7 +207,7 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
 
 
 def _block(k: int, steps: Array, depth: int) -> list[str]:
-    """Spell a node and what hangs on it; the tree is 6 deep."""
+    """Write a node and its descendants as lines of BVH; the tree is 6 levels deep."""
     tab, node = "\t" * depth, NODES[k]
     x, y, z = np.round(steps[k], 8) + 0.0
     turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in AXIS_ORDER)

@@ -35,7 +35,7 @@ _FLOAT, _UINT16 = 5126, 5123
 
 
 class _Glb:
-    """A glTF document that grows, and its numbers."""
+    """A glTF document and its buffer of numbers, both appended to while a body is written."""
 
     def __init__(self) -> None:
         self.document: dict[str, Any] = {
@@ -79,7 +79,7 @@ class _Glb:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write one recording as GLB: a body that moves.
+    """Write one recording as GLB: a body of capsules and its animation.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
 
 
 def _turns(angles: Array) -> Array:
-    """Return each node's rotation as quaternions (T, 21, 4), x, y, z, w, with no change of sign along time."""
+    """Return each node's rotation as quaternions (T, 21, 4), x, y, z, w, with continuous signs over time."""
     turns = quaternion_from_rotation(euler_rotation(angles))
     back = np.einsum("tji,tji->tj", turns[1:], turns[:-1]) < 0
     turns[1:] *= np.where(np.cumsum(back, axis=0) % 2 == 1, -1.0, 1.0)[..., None]

@@ -34,22 +34,22 @@ POINTS: Final = (
     *("new_joints", "xyz", "arr_0", ""),
 )
 NAMES: Final = ("joint_names", "names", "keypoint_names", "point_names", "marker_names", "labels")
-#: Columns of caliscope's triangulated points, of which 0 to 32 are MediaPipe's (mprib/caliscope).
+#: Columns of Caliscope's triangulated points; points 0 to 32 are MediaPipe's (mprib/caliscope).
 CALISCOPE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
-#: Columns of the recording or person of a row.
+#: Names of columns that hold the recording or the person of a row.
 PEOPLE: Final = ("clip", "person", "person_id", "track_id", "subject")
 FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a document holds points in space."""
+    """Return whether a document holds points in space."""
     if isinstance(document, Table):
         return set(CALISCOPE_COLUMNS) <= set(document.names) or bool(_wide_columns(document.names))
     return isinstance(document, Mapping) and _key(document) is not None
 
 
 def _key(document: Held) -> str | None:
-    """Return the name of the array of points, or of the only array that could be one."""
+    """Return the name of the array of points: a known name, or the only array (T, P, 3) or (T, P, 4)."""
     arrays = {
         name: value.ndim
         for name, value in document.items()
@@ -125,7 +125,7 @@ def _shaped(values: Any, path: str, key: str) -> Array:
 
 
 def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Ints]:
-    """Return the recording and the number of each frame, where a file has them."""
+    """Return the index of the recording and the number of each frame, if the file has them."""
     found = {}
     for key, most in (("clip", clips), ("frame", 2**53)):
         values = np.asarray(document.get(key, ()))
@@ -138,7 +138,7 @@ def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Int
 
 
 def _times(held: Held, clip: Ints | None, frames: int, path: str) -> tuple[float | None, Array | None]:
-    """Return the file's rate and times; recordings that have each their own rate have times made of it."""
+    """Return the file's rate and times; if each recording has its own rate, times are computed from the rates."""
     time, rate = time_and_rate(held)
     if time is not None and len(time) != frames:
         raise refusal(path, "time", f"{len(time)} of them", f"{frames} numbers", "correct the file")
@@ -158,7 +158,7 @@ def _word(document: Held, key: str, known: Mapping[str, str], path: str) -> str:
 
 
 def _wide_columns(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the points whose three coordinates are among the columns of a table, and their columns."""
+    """Return the columns x, y, z of each point that has all three, by the point's name."""
     found = columns_of_points(names).items()
     return {name: [axes[axis] for axis in "xyz"] for name, axes in found if set("xyz") <= set(axes)}
 
@@ -205,7 +205,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
 
 
 def _caliscope(table: Table, path: str, count: int) -> tuple[Array, Ints]:
-    """Return points (T, P, 3) of a table with a row a frame and point, and the first row of each frame."""
+    """Return points (T, P, 3) of a table with one row per frame and point, and the first row of each frame (T,)."""
     frame, index, *axes = (table.checked(name) for name in CALISCOPE_COLUMNS)
     used = np.flatnonzero((index >= 0) & (index < count) & np.isfinite(frame))
     if len(np.unique(np.stack([frame, index], axis=1)[used], axis=0)) < len(used):
@@ -216,7 +216,7 @@ def _caliscope(table: Table, path: str, count: int) -> tuple[Array, Ints]:
 
 
 def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write a motion as NPZ without pickles, nothing lost: points, configurations, times, clips, frames, axes."""
+    """Write a whole motion as NPZ without pickles: points, configurations, times, clips, frames, axes."""
     arrays: dict[str, Any] = {
         "time": motion.time,
         "frame": np.asarray(motion.frame, dtype=np.int64),
@@ -240,7 +240,7 @@ def _clip_names(motion: Motion) -> tuple[str, ...]:
 
 
 def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
-    """Return a motion's columns, a row a frame: time, clip if there are several, ``neck_x``, …, or its q by names."""
+    """Return columns with one row per frame: time, clip if there are several, ``neck_x``, …, or q by its names."""
     clip = np.asarray(motion.clip)
     columns: dict[str, NDArray[Any]] = {}
     if not motion.in_time and len(motion) > 1:

@@ -18,13 +18,13 @@ from posekit.files import text, write_bytes
 #: Bytes of JSON that are parsed or written: in memory a parsed document takes about ten times as many.
 MAX_JSON_BYTES: Final = 500_000_000
 
-#: Bytes of a file that somebody may have edited by hand, whose keys are checked for repetition: it costs a tenth.
+#: Largest size in bytes of a file that is checked for repeated keys, as people edit small files by hand.
 MAX_BY_HAND: Final = 1_000_000
 
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Pause the collection of cyclic garbage: documents of millions of lists have none, and it takes half the time."""
+    """Pause cyclic garbage collection, which takes half of the time to parse or write millions of lists."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -28,7 +28,7 @@ TIME: Final = ("time", "timestamp", "seconds", "times")
 PERSON: Final = ("person", "personid", "track", "trackid", "individual")
 #: Parts of a point, in their order in arrays.
 COORDS: Final = ("x", "y", "sure")
-#: Named points that a row a picture has at least.
+#: Minimum number of points in a table with one row per picture.
 LEAST_POINTS: Final = 4
 
 
@@ -72,7 +72,7 @@ def read(table: Table, path: str | Path, options: Options) -> Detections:
 
 
 def _deeplabcut(table: Table, rows: Rows) -> None:
-    """Columns (scorer[, individuals], bodyparts, coords); an empty cell is a missing point."""
+    """Read DeepLabCut's columns (scorer[, individuals], bodyparts, coords); an empty cell is a missing point."""
     rows.kind = "deeplabcut"
     cells = [table.parted(line) for line in table.lines]
     levels = {row[0]: row for row in cells[: len(DEEPLABCUT_LEVELS)] if row[0] in DEEPLABCUT_LEVELS}
@@ -88,7 +88,7 @@ def _deeplabcut(table: Table, rows: Rows) -> None:
     for k in range(lead, len(coords)):
         part = columns.setdefault(individuals[k], {}).setdefault(levels["bodyparts"][k], {})
         part.setdefault("sure" if coords[k] == "likelihood" else coords[k], k - lead)
-    # Unique points of a project have another set of names than the individuals: they are nobody.
+    # Points outside all individuals have other names, and belong to no person.
     most = max(columns.values(), key=len)
     rows.names = tuple(most)
     labels = [rows.picture("/".join(row[:lead])) for row in body]
@@ -100,7 +100,7 @@ def _deeplabcut(table: Table, rows: Rows) -> None:
 
 
 def _stacked(parts: Mapping[str, Mapping[str, Any]], column: Callable[[Any], Array], count: int) -> Array:
-    """Return points and confidences (T, P, 3) of columns by point and part; NaN where there is none."""
+    """Return x, y and confidence (T, P, 3) from columns by point and part; NaN without a column."""
     points = np.full((count, len(parts), len(COORDS)), np.nan)
     for k, part in enumerate(parts.values()):
         for axis, name in enumerate(COORDS):
@@ -110,7 +110,7 @@ def _stacked(parts: Mapping[str, Mapping[str, Any]], column: Callable[[Any], Arr
 
 
 def _caliscope(table: Table, rows: Rows) -> None:
-    """Read pixels that each camera saw of one person; times are seconds of a clock."""
+    """Read the pixels of one person in each camera's picture; times are seconds of a clock."""
     rows.kind, rows.by_camera = "mediapipe", True
     rows.names = load_layout("mediapipe_33").points
     data = {ours: table.checked(name) for name, ours in CALISCOPE.items()}
@@ -145,6 +145,6 @@ def _row_a_picture(table: Table, rows: Rows) -> None:
 
 
 def _column(table: Table, wanted: Sequence[str]) -> Any:
-    """Return the name of the first column that is called as wanted; None if there is none."""
+    """Return the first column whose name is one of the wanted names; None if no column has one."""
     words = {plain(name): name for name in reversed(table.names)}
     return next((words[one] for one in wanted if one in words), None)

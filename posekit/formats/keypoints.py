@@ -28,12 +28,12 @@ OPENPOSE_POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
 #: Fields of a person's landmarks in MediaPipe's frames.
 LANDMARKS: Final = ("pose_landmarks", "poseLandmarks", "landmarks")
 N_LANDMARKS: Final = 33
-#: Pixels that a picture may have a side.
+#: Largest width or height of a picture, pixels.
 LARGEST_SIDE: Final = 10**6
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document, or a folder of them, holds key points in pictures."""
+    """Return whether a JSON document, or a folder of JSON files, holds key points in pictures."""
     if isinstance(document, Path):
         return any(True for _ in document.glob("*.json"))
     return bool(_kind(document))
@@ -75,7 +75,7 @@ def _counted(name: str) -> list[tuple[int, str]]:
 
 
 def _kind(document: Any) -> str:
-    """Name the kind of a document; empty if it holds no key points."""
+    """Return the name of a document's format; empty if it holds no key points."""
     if isinstance(document, dict):
         if isinstance(document.get("annotations"), list):
             holders = (*_dicts(document["annotations"]), *_dicts(document.get("categories")))
@@ -120,7 +120,7 @@ def _add(root: Node, rows: Rows, label: str) -> None:
 
 
 def _coco(root: Node, rows: Rows, label: str) -> None:
-    """Read annotations: ``{"images": […], "annotations": […], "categories": […]}``."""
+    """Read COCO's annotations: ``{"images": […], "annotations": […], "categories": […]}``."""
     rows.film = None
     named: dict[Any, str] = {}
     listed = list(root.at("images", []).list())
@@ -139,7 +139,7 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
         for one in _dicts(root.value.get("categories"))
         if isinstance(one.get("keypoints"), list)
     }
-    # Animals and objects have points, too.
+    # Categories can be animals or objects: the category with shoulders is the person.
     category = [str(one.value.get("category_id")) for one in people]
     used = [names[key] for key in category if key in names] or list(names.values())
     rows.names = next((one for one in used if "shoulder" in " ".join(one).lower()), used[0] if used else ())
@@ -199,7 +199,7 @@ def _instance(one: Node, rows: Rows, label: str) -> None:
         got = f"{points.shape[1]} coordinates a point"
         raise one.at("keypoints").refused("two, pixels", "save the predictions of a 2D model", got)
     sure = one.at("keypoint_scores").array(len(points), unknown=True)
-    # MMPose puts a point without a positive score at -1 of the crop (mmpose/codecs/utils/post_processing.py).
+    # MMPose writes -1 of the crop for a point without a positive score (mmpose/codecs/utils/post_processing.py).
     values = np.column_stack([points, np.where(sure <= 0, 0.0, sure)])
     rows.add(label, values, one.value.get("track_id"))
 
@@ -261,12 +261,12 @@ def _time(frame: Node) -> float:
 
 
 def _size(holder: Any, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:
-    """Return width and height that an object states."""
+    """Return the width and height in an object, or the known size if it has none."""
     sides = (holder.get("width"), holder.get("height")) if isinstance(holder, dict) else (None, None)
     if all(isinstance(side, int | float) and 0 < side < LARGEST_SIDE for side in sides):
         return float(sides[0]), float(sides[1])  # type: ignore[arg-type]
     return known
 
 
-#: Readers of a document by its kind.
+#: Reader of each format by its name.
 KINDS: Final = dict(coco=_coco, results=_results, mmpose=_mmpose, openpose=_openpose, mediapipe=_mediapipe)

@@ -24,12 +24,12 @@ LANDMARKS: Final = (*POINTS, *MIDDLES)
 PARTS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 LIMBS: Final = tuple(f"{side}_{part}" for part in PARTS for side in SIDES)
 
-#: Points of a file by our name.
+#: A file's points for each of posekit's names.
 Placed = dict[str, tuple[str, ...]]
 
 #: Place of the built-in figure's pelvis on the line from the middle of the shoulders (0) to that of the hips (1).
 PELVIS_SHARE: Final = 0.8200545021161334
-#: Its neck from the middle of the shoulders, shares of that line: forward, left, up in their and the pelvis' frame.
+#: The figure's neck from the middle of the shoulders, as shares of that line's length: forward, left, up.
 NECK_OFFSET: Final = (0.06720811867953341, 0.0, -0.002995656796876607)
 
 
@@ -63,7 +63,7 @@ class Layout:
 
     @property
     def sources(self) -> dict[str, tuple[str, ...]]:
-        """Landmarks and feet to the file's names."""
+        """The file's names for each landmark and foot point."""
         return {**self.landmarks, **self.feet}
 
     def gather(self, points: Array, names: Sequence[str] = ()) -> dict[str, Array]:
@@ -127,7 +127,7 @@ class Layout:
             Of `posekit.skeleton.NAMES`, in that order.
         points : array (T, K, 3)
         derived : tuple of str
-            The joints that no point of the file is.
+            Joints that were placed between others, as the file has no point for them.
         """
         found = self.gather(points, names)
         for name, middle in _middles(found).items():
@@ -184,7 +184,7 @@ def _neck(found: Mapping[str, Array]) -> Array:
 
 
 def plain(name: str) -> str:
-    """Reduce a name to what is compared: lower-case letters and digits, without a prefix that ends in a colon."""
+    """Return the lower-case letters and digits of a name, without a prefix that ends in a colon, for comparison."""
     return re.sub(r"[\W_]+", "", name.rpartition(":")[2].casefold())
 
 
@@ -319,7 +319,7 @@ def by_names(names: Sequence[str], source: str) -> Layout:
 
 
 def _by_habit(names: Sequence[str]) -> Layout | None:
-    """Read names as animation programs build them: a common prefix, a side, a part of the body."""
+    """Read names that animation programs build: a common prefix, a side, a part of the body."""
     habits = _built_in("animation").fields
     prefix = _common_prefix(names)
     found: dict[tuple[str, str], str] = {}
@@ -346,7 +346,7 @@ def _by_habit(names: Sequence[str]) -> Layout | None:
 
 
 def _common_prefix(names: Sequence[str]) -> str:
-    """Return what most names begin with, up to a separator: ``Bip01_``, ``Character1_``, ``J_Bip_``."""
+    """Return the longest prefix of most names that ends in a separator: ``Bip01_``, ``Character1_``, ``J_Bip_``."""
     starts = {name[: match.end()] for name in names for match in re.finditer(r"[_ .-]", name)}
     common = [start for start in starts if 2 * sum(name.startswith(start) for name in names) > len(names)]
     return max(common, key=len, default="")

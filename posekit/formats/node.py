@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from posekit.errors import InputError, cut, nearest, one_line, refusal, shown
 from posekit.geometry import FARTHEST_COORDINATE, Array
 
-#: Default of a field that has to be there.
+#: Default of a field that is required.
 MISSING: Final = object()
 
 
@@ -54,7 +54,7 @@ class Node:
         return shown(self.value.tolist() if isinstance(self.value, np.ndarray | np.generic) else self.value)
 
     def at(self, key: str | int, default: Any = MISSING) -> Node:
-        """Return a member; a missing or null one has the default, and is refused if there is none."""
+        """Return a member of an object or list; the default replaces a missing or null one, which is else refused."""
         place = f"{self.place}[{key}]" if isinstance(key, int) else f"{self.place}.{cut(key)}".lstrip(".")
         value = self.value[key] if isinstance(key, int) else self.object().get(key)
         if value is None and default is MISSING:
@@ -62,7 +62,7 @@ class Node:
         return Node(default if value is None else value, self.source, place)
 
     def has(self, key: str) -> bool:
-        """Tell whether an object has a member that is not null."""
+        """Return whether an object has a member that is not null."""
         return self.object().get(key) is not None
 
     def object(self, names: Iterable[str] = (), remedy: str = "") -> Mapping[str, Any]:
@@ -154,7 +154,7 @@ def as_numbers(value: Any) -> Array | None:
             return array.astype(np.float64)
     except (ValueError, TypeError, OverflowError):
         return None
-    kinds = "iufb" if array is value else "iuf"  # true and false are no numbers in JSON
+    kinds = "iufb" if array is value else "iuf"  # JSON's true and false are not numbers
     return array.astype(np.float64) if array.dtype.kind in kinds else None
 
 
@@ -197,7 +197,7 @@ def known_points(points: Array, names: Sequence[str]) -> dict[str, Any]:
 
 @contextmanager
 def undamaged(source: str | Path, schema: str) -> Iterator[None]:
-    """Refuse a file whose parts do not fit together: programs alone write it, so it was cut or changed."""
+    """Turn errors of Python while a file is read into the refusal of a damaged file."""
     try:
         yield
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:

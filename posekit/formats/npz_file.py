@@ -47,7 +47,7 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # NumPy's about headers of earlier versions
+            warnings.simplefilter("ignore")  # NumPy warns of headers of its earlier versions
             if data[:2] == b"PK":
                 return _zip(data, source)
             if data[:6] == b"\x93NUMPY":
@@ -87,7 +87,7 @@ LAST_CHARACTER: Final = 0x10FFFF
 
 
 def _npy(file: io.BytesIO, source: str) -> Any:
-    """Read an array; one of objects by the restricted unpickler."""
+    """Read an array; the restricted unpickler reads an array of objects."""
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file, max_header_size=100_000)
@@ -104,7 +104,7 @@ def _npy(file: io.BytesIO, source: str) -> Any:
 
 
 def _named(found: Any) -> dict[str, Any]:
-    """Name what a pickle holds: a dict as it is, a dict of one dict as that, anything else unnamed."""
+    """Return the named arrays of a pickle: its dict, the only dict in its dict, or its one array under ``""``."""
     found = _plain_array(found)
     while isinstance(found, list | tuple) and len(found) == 1 and isinstance(found[0], dict):
         found = found[0]
@@ -142,7 +142,7 @@ class _Pending:
         self.kind, self.spec = kind, spec
 
     def build(self, state: Any, file: io.BytesIO) -> Any:
-        """Take the state and return the object itself, a data type still pending."""
+        """Return the array of a pickle's state; a data type returns itself, as its state is only the byte order."""
         if self.kind == "dtype":
             if state[2] is not None or state[3] is not None or state[1] not in ("<", ">", "=", "|"):
                 raise pickle.UnpicklingError("a compound data type")
@@ -232,7 +232,7 @@ class _Plain(pickle._Unpickler):
         return self.names[module, name]
 
     def load_build(self) -> None:
-        """Give the object on the stack its state."""
+        """Set the state of the object on the stack (instruction BUILD)."""
         state, target = self.stack.pop(), self.stack[-1]
         if not isinstance(target, _Pending):
             raise pickle.UnpicklingError("a state of an object that has none")
@@ -267,7 +267,7 @@ def _resolved(found: Any) -> Any:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """Unpack zlib, by which joblib compresses, and look at the first instruction."""
+    """Unpack the zlib compression of joblib, and refuse data that do not begin as a pickle."""
     if data[:1] == b"x":
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(data, MAX_BYTES)
@@ -302,7 +302,7 @@ def _torch(archive: zipfile.ZipFile, member: str, source: str) -> Any:
 
     def tensor(values: NDArray[Any], offset: int, size: Any, stride: Any, *_: Any) -> NDArray[Any]:
         shape, steps = (tuple(map(operator.index, given)) for given in (size, stride))
-        width = values.itemsize  # NumPy refuses steps that leave the storage
+        width = values.itemsize  # NumPy refuses strides that leave the storage
         strides = [step * width for step in steps]
         return np.ndarray(shape, values.dtype, values.tobytes(), offset * width, strides).copy()
 

@@ -1,4 +1,4 @@
-"""`open`: read any file once, recognise its container, then the first reader that its content fits."""
+"""`open`: read any file once, recognise its container, then the first reader that fits its content."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "yaml": ("file_storage:parse_yaml", (".yaml", ".yml")),
     "xml": ("file_storage:parse_xml", (".xml",)),
 }
-#: First bytes by which a file with another ending is recognised.
+#: Containers by the first bytes of a file whose ending is not known.
 STARTS: Final = {
     **{b"HIERARCHY": "bvh", b"PathFileType": "table", b"{": "json", b"[": "json", b"PAR1": "parquet"},
     **{b"PK\x03\x04": "arrays", b"\x93NUMPY": "arrays"},
 }
 READERS: Final[dict[str, tuple[str, ...]]] = {
-    # container: modules whose `looks_like(document)` is asked in this order, and whose `read(document, path, options)`
-    # makes the object
+    # container: modules in the order in which `looks_like(document)` is called; the first that returns True reads it
+    # with `read(document, path, options)`
     "json": ("view_file", "postures_file", "result_file", "report_file", "cameras_file", "keypoints"),
     "arrays": (
         *("view_file", "postures_file", "result_file", "report_file", "cameras_file"),
@@ -48,11 +48,11 @@ READERS: Final[dict[str, tuple[str, ...]]] = {
     "xml": ("cameras_file",),
     "folder": ("keypoints",),  # a folder's document is its Path; `parsed` reads one of its files
 }
-#: Containers whose files hold one thing.
+#: Containers with a single reader, which reads every file.
 ONE_CONTENT: Final = ("bvh", "c3d")
-#: Endings of pictures and films, which detectors read.
+#: Endings of pictures and films: detectors read them, posekit does not.
 PICTURES: Final = ".png .jpg .jpeg .tif .tiff .webp .bmp .gif .heic .mp4 .mov .avi".split()
-#: Endings of files with bodies that other programs show.
+#: Endings of files that posekit writes for other programs and does not read.
 WRITTEN_ONLY: Final = (".glb", ".gltf")
 
 

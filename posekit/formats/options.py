@@ -15,7 +15,7 @@ UNITS: Final = ("m", "cm", "mm", "in")
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Facts about a file that its user gives; an empty field is found in the file or from its values.
+    """Facts about a file that its user states; posekit finds the facts of empty fields in the file.
 
     The unit and the axis may be in upper case, an axis without its sign is the positive one, and the rate may be text
     such as ``"30 Hz"``.
@@ -68,16 +68,16 @@ class Options:
             object.__setattr__(self, "rate", rate)
 
     def note(self, assumption: str) -> None:
-        """Add an assumption."""
+        """Add an assumption to the notes."""
         self.notes.append(assumption)
 
     def warn(self, contradiction: str) -> None:
-        """Add a contradiction."""
+        """Add a contradiction to the warnings."""
         self.warnings.append(contradiction)
 
 
 def facts_of(**given: Any) -> dict[str, Any]:
-    """Return the facts that are given, not None, checked and spelled as in `Options`."""
+    """Return the facts that are not None, checked and spelled as in `Options`."""
     stated = {name: fact for name, fact in given.items() if fact is not None}
     options = Options(**stated)
     return {name: getattr(options, name) for name in stated}

@@ -24,12 +24,12 @@ CONFIGURATION_FIELDS: Final = ("schema", "configuration_names", "q", "robot", "t
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document or NPZ arrays state one of the schemas."""
+    """Return whether a JSON document or NPZ arrays state one of the schemas."""
     return schema_of(document).startswith(("posekit.postures/", "posekit.configurations/"))
 
 
 def read(document: Any, path: str | Path, options: Options) -> Motion:
-    """Read postures; without times they are not a recording.
+    """Read postures; a file without times and rate is no recording.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ REPORT_SCHEMA: Final = "posekit.report/2"
 ROWS: Final = {"clip": np.intp, "frame": np.intp, "time": np.float64, "incomplete": np.bool_}
 #: Arrays with one entry a frame and check.
 TABLES: Final = {"margins": np.float64, "silent": np.bool_}
-#: Columns of the findings that are whole numbers; the others are numbers.
+#: Columns of the findings that are whole numbers.
 FINDINGS: Final = {"row": np.intp, "check": np.intp, "place": np.intp}
 NUMBERS: Final = ("value", "lower", "upper", "margin")
 TEXTS: Final = ("files", "names", "checks", "units", "places", "notes", "warnings", "refused")
@@ -39,7 +39,7 @@ MAPPINGS: Final = ("messages", "not_asked", "settings")
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document, NPZ arrays or a Parquet table hold a report."""
+    """Return whether a JSON document, NPZ arrays or a Parquet table hold a report."""
     return schema_of(document).startswith("posekit.report/")
 
 
@@ -95,12 +95,12 @@ def write_npz(path: str | Path, report: Report) -> None:
 
 
 def write_csv(path: str | Path, report: Report, *, clips: bool = False) -> None:
-    """Write the table of findings, or that of clips, as CSV."""
+    """Write the table of findings, or the table of clips, as CSV."""
     write_bytes(path, csv_text(_table(report, clips)).encode())
 
 
 def write_parquet(path: str | Path, report: Report, *, clips: bool = False) -> None:
-    """Write the table of findings, everything else in its metadata; or that of clips."""
+    """Write the table of findings with the rest of the report in its metadata, or the table of clips."""
     from posekit.formats.parquet import packed_table
 
     about = {}
@@ -113,7 +113,7 @@ def write_parquet(path: str | Path, report: Report, *, clips: bool = False) -> N
 
 
 def _table(report: Report, clips: bool) -> dict[str, NDArray[Any]]:
-    """Return the columns of the table of clips, or of that of findings."""
+    """Return the columns of the table of clips, or of the table of findings."""
     from posekit.validators.report import clip_rows
 
     return columns_of_rows(clip_rows(report)) if clips else report.table()
@@ -125,7 +125,7 @@ def write_md(path: str | Path, report: Report) -> None:
 
 
 def _about(report: Report) -> dict[str, Any]:
-    """Return everything that is not an array."""
+    """Return the fields that are not arrays."""
     about: dict[str, Any] = {"schema": REPORT_SCHEMA}
     about |= {name: list(getattr(report, name)) for name in TEXTS}
     return about | {name: plain(dict(getattr(report, name))) for name in MAPPINGS}

@@ -30,21 +30,21 @@ from posekit.skeleton import HEAD_POINTS, JOINTS
 
 RESULT_SCHEMA: Final = "posekit.result/3"
 EARLIER_SCHEMA: Final = "posekit.result/2"
-#: Tables of a recovery by the first word of their columns' names, as ``frames.time``; the survivors' have no such word.
+#: Tables of a recovery by the first word of their columns' names: ``frames.time``. Columns of survivors have none.
 TABLES: Final = {"": Survivors, "frames": Frames, "answer": Answer, "path": Paths}
-#: Columns that are lengths (1), or numbers a length (-1).
+#: Power of length of each column that has one: metres (1), or pixels per metre (-1).
 POWERS: Final = {"joints": 1, "head": 1, "radius": 1, "scale": -1, "answer.joints": 1, "path.joints": 1}
 
 
 class Column(NamedTuple):
-    """Shape of a row's value (None: number of frames, or size of q), and the value of a row that is not known."""
+    """Shape of a row's value (None: number of frames, or size of q), and the value of an unknown row."""
 
     shape: tuple[int | None, ...] = ()
     empty: Any = np.nan
 
 
 def _declared(key: str) -> dict[str, Any]:
-    """Return what the fields of the tables declare, by their names in files: columns a shape, lists an entry."""
+    """Return the metadata with this key of the tables' fields, by their names in files: ``shape`` or ``entry``."""
     return {
         f"{table}.{one.name}".lstrip("."): one.metadata
         for table, kind in TABLES.items()
@@ -60,12 +60,12 @@ COLUMNS: Final = {
     "path.probability": Column(),
     "path.joints": Column((None, len(JOINTS), 3)),
 }
-#: Columns that are there even if they say nothing.
+#: Columns that every file has, even if all of their values are empty.
 NEEDED: Final = (
     *("joints", "q", "probability"),
     *(name for name in COLUMNS if name.startswith(("frames.", "answer."))),
 )
-#: Lists with an entry a frame, and the entry that says nothing.
+#: Lists with an entry per frame, and the empty entry.
 LISTS: Final = {name: one["entry"] for name, one in _declared("entry").items()}
 #: Fields of a frame's ``camera`` and ``root`` that are lengths.
 CAMERA_LENGTHS: Final = ("f", "position")
@@ -76,7 +76,7 @@ ABOUT: Final = ("unit", *MAPPINGS, "source", "joint_names", "configuration_names
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document, NPZ arrays or a Parquet table hold a result."""
+    """Return whether a JSON document, NPZ arrays or a Parquet table hold a result."""
     return schema_of(document).startswith("posekit.result/")
 
 
@@ -121,7 +121,7 @@ def write_npz(path: str | Path, recovery: Recovery) -> None:
 
 
 def write_parquet(path: str | Path, recovery: Recovery) -> None:
-    """Write a result as a table of the survivors, everything else in its metadata."""
+    """Write a result as a table of the survivors, with the rest of the result in its metadata."""
     from posekit.formats.parquet import packed_table
 
     frame = recovery.survivors.frame
@@ -139,7 +139,7 @@ def write_parquet(path: str | Path, recovery: Recovery) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Turn mappings, sequences and arrays into what JSON spells, with None for NaN."""
+    """Turn mappings, sequences and arrays into dicts and lists for JSON, with None for NaN."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -152,7 +152,7 @@ def plain(value: Any) -> Any:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """Part the name of a column or a list into its table and its field: ``frames.time``, but ``joints``."""
+    """Split a name in files into table and field; the table of ``joints`` is "", of ``frames.time`` "frames"."""
     table, dot, field = name.partition(".")
     return (table, field) if dot else ("", name)
 
@@ -164,7 +164,7 @@ def _held(recovery: Recovery, name: str) -> Any:
 
 
 def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
-    """Return the columns of all tables by name, metres; columns of the survivors that say nothing are left out."""
+    """Return the columns of all tables by name, metres; survivors' columns with only empty values are left out."""
     found = {}
     for name, column in COLUMNS.items():
         if (held := _held(recovery, name)) is not None:
@@ -177,7 +177,7 @@ def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
 
 
 def _about(recovery: Recovery) -> dict[str, Any]:
-    """Return everything that is not an array."""
+    """Return the fields that are not arrays."""
     about = {"schema": RESULT_SCHEMA, **plain({name: getattr(recovery, name) for name in ABOUT})}
     about |= {"frames": {"pictures": list(recovery.frames.pictures)}, "answer": {}}
     for name in LISTS:
@@ -359,7 +359,7 @@ def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Rec
 
 
 def _values(arrays: Node, name: str, rows: int | None, frames: int | None) -> NDArray[Any]:
-    """Return the array of a column; numbers that are not known have the value that says nothing."""
+    """Return the array of a column, with its empty value in place of NaN."""
     node, (shape, empty) = arrays.at(name), COLUMNS[name]
     if empty == "":
         return np.asarray(node.value)

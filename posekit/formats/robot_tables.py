@@ -24,36 +24,36 @@ from posekit.motion import Motion
 ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
 COUNTS: Final = ("frame", "index", "frame#", "")
-#: Layouts of files in the order in which they are tried: a simulator's file may have arrays of the root, too.
+#: Layouts of files in the order in which they are tried; a simulator's file may also have arrays of the root.
 LAYOUTS: Final = tuple(
     f"robot_{kind}" for kind in "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
 )
 
-#: Difference of the median lean by which one order of a quaternion lets the robot stand and the other does not.
+#: Minimum difference of the median lean in degrees between two orders of a quaternion for one to be wrong.
 LEAN_DEGREES: Final = 20.0
-#: Difference of the median lean below which both orders let the robot stand alike.
+#: Difference of the median lean in degrees below which the robot stands equally in both orders.
 SAME_LEAN_DEGREES: Final = 1.0
-#: Way of the root along the ground from which its direction is compared with the robot's heading.
+#: Minimum path of the root along the ground, metres, for its direction to be compared with the robot's heading.
 TRAVEL_METRES: Final = 0.3
-#: Difference of the angles between heading and travel by which one order is chosen.
+#: Minimum difference, degrees, of the angle between heading and path for one order to be chosen.
 HEADING_DEGREES: Final = 60.0
-#: Median lean above which a robot does not stand.
+#: Median lean in degrees above which a robot does not stand.
 STANDING_DEGREES: Final = 60.0
-#: Length below which a quaternion is unknown; deviations from length 1 that are noted, and that are refused.
+#: Length below which a quaternion is unknown; deviation from length 1 above which it is noted, and refused.
 ZERO_LENGTH, UNIT_LENGTH_ERROR, NO_QUATERNION = 1e-6, 0.01, 0.25
-#: Angle that 1 % of all values must exceed to be degrees: more than a turn in radians.
+#: Angles are degrees if 1 % of them exceed this number, which is more than a turn in radians.
 DEGREES_FROM: Final = 7.0
-#: Median height of a root below which its place is in the unit.
+#: Median height of a root below which its position is in each unit.
 HEIGHTS: Final = {"m": 10.0, "cm": 300.0, "mm": np.inf}
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether arrays or a table hold a robot's motion."""
+    """Return whether arrays or a table hold a robot's motion."""
     return _layout_of(_columns(document)) is not None
 
 
 def _columns(document: Any) -> Mapping[str, Any]:
-    """Return arrays by name: of a table with names the table by each, of one without its numbers under ``""``."""
+    """Return arrays by name; a table with names is returned under each name, numbers without names under ``""``."""
     if not isinstance(document, Table):
         both = isinstance(document, Mapping) and getattr(document.get("joints"), "ndim", 0) == 3
         return document if isinstance(document, Mapping) and not both else {}
@@ -77,9 +77,9 @@ def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
 
 def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
     """Return the arrays or columns that a part of a layout names; empty if they are not all there."""
-    if "arrays" in part:  # the first of several names
+    if "arrays" in part:  # the first known name
         return [name for name in part["arrays"] if getattr(columns.get(name), "ndim", 0) > 1][:1]
-    if "each" in part:  # one a coordinate
+    if "each" in part:  # a name per coordinate
         return list(part["each"]) if set(part["each"]) <= set(columns) else []
     by_axis: dict[str, str] = {}
     for name in columns:
@@ -94,7 +94,7 @@ def _labels(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> tuple[str, 
 
 
 def _whole(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> str | None:
-    """Return the array that holds root and joints; those of joints must be wider than their names by the root."""
+    """Return the name of the array that holds root and joints; it has 7 columns more than there are joint names."""
     wide = len(_labels(parts, columns)) + len(ROOT_NAMES)
     for name in parts["whole"]["arrays"]:
         values = columns.get(name)
@@ -110,7 +110,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     Raises
     ------
     InputError
-        If arrays are missing or of other shapes, or a quaternion is none.
+        If arrays are missing or have other shapes, or a quaternion has another length than 1.
     """
     columns = _columns(document)
     if isinstance(document, Table) and "" in columns:
@@ -141,7 +141,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     labels, joints = _named(labels, joints, order or _order(parts, columns, joints.shape[1]), options)
     robot = options.urdf or str(about.get("robot", "")) or _robot_of(labels)
     if not robot:
-        options.note("which robot it is the file does not say (--urdf)")
+        options.note("the file does not name the robot (--urdf)")
     return Motion(
         q=np.hstack([place, turn, joints]),
         q_names=(*(ROOT_NAMES if place.shape[1] else ()), *labels) if labels else (),
@@ -156,7 +156,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
 
 
 def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> tuple[Layout, str]:
-    """Return the layout of the file, and the name of a stated order of its joints."""
+    """Return the layout of the file's arrays, and the name of the order of joints that the user states."""
     stated = load_layout(options.layout) if options.layout else None
     if stated is not None and stated.kind not in ("robot-file", "robot"):
         raise refusal(path, "layout", shown(options.layout), "a layout of a robot", "choose another layout")
@@ -176,7 +176,7 @@ def _joints_alone(table: Table) -> dict[str, Any]:
 
 
 def _without_counter(values: Array, options: Options) -> dict[str, Array]:
-    """Return rows of place, quaternion and joints; a first column of frame numbers or seconds is taken off."""
+    """Return rows of position, quaternion and joints without a first column of frame numbers or seconds."""
     first, whole = values[:, 0], values[np.isfinite(values).all(axis=1)]
     even = len(first) > 2 and first[0] == 0 and np.allclose(np.diff(first), first[1], rtol=1e-3, atol=2e-6)
     if not even or not first[1] > 0 or not len(whole):
@@ -192,7 +192,7 @@ def _without_counter(values: Array, options: Options) -> dict[str, Array]:
 def _of_whole(
     parts: Mapping[str, Any], columns: Mapping[str, Any]
 ) -> tuple[Array, Array, Array, tuple[str, ...]]:
-    """Part rows of place, quaternion and joints; those of another root than a free flyer are joints."""
+    """Split rows into position, quaternion, joints and their names; without a free-flying root all are joints."""
     labels, root = _labels(parts, columns), len(ROOT_NAMES)
     values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
     if labels[:root] == ROOT_NAMES:
@@ -205,7 +205,7 @@ def _of_whole(
 def _of_parts(
     parts: Mapping[str, Any], columns: Mapping[str, Any], path: str, options: Options
 ) -> tuple[Array, Array, Array, tuple[str, ...]]:
-    """Return the root's place (T, 3), its rotation (T, 3 or 4), joints (T, K), and names."""
+    """Return the root's position (T, 3), its rotation (T, 3 or 4), the joints (T, K) and their names."""
     joint_part, labels = parts["joints"], _labels(parts, columns)
     names = {part: _names(parts[part], columns) for part in ("position", "rotation")}
     if "arrays" in joint_part:
@@ -251,7 +251,7 @@ def _joint_name(name: str) -> str:
 
 
 def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | None]:
-    """Return the file's times and its rate, where it has them."""
+    """Return the file's times (T,) and its rate; None for what it lacks."""
     name = next((name for name in columns if name.lower() in TIMES), None)
     key = next((name for name in RATES if name in columns), None)
     rate = np.empty(0) if key is None else np.ravel(_value(columns, key))
@@ -260,7 +260,7 @@ def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | Non
 
 
 def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:
-    """Return the layout of unnamed joints: of simulators breadth first, unless the bodies are depth first.
+    """Return the layout of unnamed joints; a simulator's joints are breadth first, unless its bodies are depth first.
 
     Breadth first, the first two bodies are the left and right hip, equally far from the root.
     """
@@ -276,7 +276,7 @@ def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> 
 def _named(
     labels: tuple[str, ...], joints: Array, order: str, options: Options
 ) -> tuple[tuple[str, ...], Array]:
-    """Name unnamed joints by a layout's order, and bring those of a G1 into its own, with zeros where they lack."""
+    """Name unnamed joints by a layout's order; joints of a G1 are sorted, and its missing joints are 0."""
     names = load_layout(order).fields["joints"] if order and not labels else ()
     if len(names) == joints.shape[1] and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
         options.note(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
@@ -309,7 +309,7 @@ def _radians(joints: Array, unit: str, options: Options) -> Array:
 
 
 def _metres(place: Array, unit: str, up: str, options: Options) -> Array:
-    """Return the root's place in metres; its height tells centimetres and millimetres."""
+    """Return the root's position in metres; its height shows whether the file has centimetres or millimetres."""
     heights = np.abs(place[:, "xyz".index(up[1])])
     height = float(np.nanmedian(heights)) if np.isfinite(heights).any() else 0.0
     found = next(name for name, most in HEIGHTS.items() if height < most or name == "mm")
@@ -381,7 +381,7 @@ def _lean(q: Array, axis: int = 2) -> float:
 
 
 def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
-    """Return the order by which the robot stands, or else heads where it travels."""
+    """Return the order of quaternions in which the robot stands or, if it stands in both, heads along its path."""
     lean = {name: min(_lean(q), _lean(q, 1)) for name, q in both.items()}
     first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
     off = {name: _off_heading(q, place) for name, q in both.items()}
@@ -389,12 +389,12 @@ def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
     reading = "the root's quaternion is read as"
     if lean[second] - lean[first] <= LEAN_DEGREES and off[other] - off[ahead] > HEADING_DEGREES:
         (options.note if ahead == first else options.warn)(
-            f"{reading} {', '.join(ahead)}: the robot stands by both; it heads {off[ahead]:.0f} degrees from its way "
-            f"by this, {off[other]:.0f} by the other"
+            f"{reading} {', '.join(ahead)}: the robot stands in both orders; it heads {off[ahead]:.0f} degrees off "
+            f"its path in this order, {off[other]:.0f} in the other"
         )
         return ahead
     if lean[second] - lean[first] > SAME_LEAN_DEGREES:
-        by = f"the robot leans {lean[first]:.0f} degrees by this order, {lean[second]:.0f} by the other"
+        by = f"the robot leans {lean[first]:.0f} degrees in this order, {lean[second]:.0f} in the other"
         options.note(f"{reading} {', '.join(first)}: {by}")
         return first
     options.note(f"{reading} x, y, z, w, by convention: the robot stands upright with both orders")
@@ -413,7 +413,7 @@ def _off_heading(q: Array, place: Array) -> float:
 
 
 def _standing(q: Array, stated: str, options: Options) -> str:
-    """Return the stated axis, or the one along which the robot stands in most frames; +z if it stands along none."""
+    """Return the stated up axis, or the axis along which the robot stands in most frames; +z if it does not stand."""
     for axis, name in ((2, "+z"), (1, "+y"), (0, "+x")):
         if _lean(q, axis) < STANDING_DEGREES:
             if name != (stated or "+z"):

@@ -32,7 +32,7 @@ WRITERS: Final[dict[str, dict[str, str]]] = {
     "Report": {f".{kind}": f"report_file:write_{kind}" for kind in ("json", "csv", "npz", "parquet", "md")},
     "dict": {f".{kind}": f"cameras_file:write_{kind}" for kind in ("toml", "json")},
 }
-#: Formats of points or of the figure: a robot's joints are placed first.
+#: Formats of points or of the figure; a robot's configurations become points first.
 POINT_FORMATS: Final = (".trc", ".c3d", ".bvh", ".glb")
 
 
@@ -88,7 +88,7 @@ def with_points(motion: Motion) -> Motion:
     Raises
     ------
     InputError
-        If it is not known which robot it is, or the robot is not a humanoid or has other joints.
+        If the robot is not known, or the robot is not a humanoid or has other joints.
     """
     if not motion.robot or motion.q is None:
         remedy = "give it with --urdf" + (

@@ -25,9 +25,9 @@ from posekit.geometry import FARTHEST_COORDINATE, Array, rotation_from_vector
 if TYPE_CHECKING:
     from posekit.motion import Motion
 
-#: Joints of the body, which SMPL, SMPL+H and SMPL-X have alike and first.
+#: Number of joints of the body; they are the first joints of SMPL, SMPL+H and SMPL-X.
 N_JOINTS: Final = 22
-#: Names of the angles and of the root's place; WHAM's are in the world and, without this word, in the camera.
+#: Names of the angles and of the root's position; WHAM's names without ``world`` are in the camera frame.
 _ANGLES: Final = (
     "pose_world poses pose root_orient+pose_body global_orient+body_pose fullpose smpl_poses".split()
 )
@@ -35,12 +35,12 @@ _PLACES: Final = ("trans_world", "trans", "transl", "translation", "Th", "smpl_t
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether arrays are the angles of a body model."""
+    """Return whether arrays hold the angles of a body model."""
     return bool(_angles(document)[1])
 
 
 def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return the arrays of a body model, also those of a dict in a dict, and the names of its angles."""
+    """Return the arrays of a body model, at the top or in an inner dict, and the names of its angles."""
     inner = document.values() if isinstance(document, Mapping) else ()
     for arrays in (document, *inner):
         if isinstance(arrays, Mapping) and any(name in arrays for name in _PLACES):
@@ -66,7 +66,7 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
         raise refusal(path, keys[0], got, expected, "correct the file")
     poses = np.concatenate(parts, axis=1)
     place = np.asarray(document[next(name for name in _PLACES if name in document)], dtype=np.float64)
-    place = place / document.get("smpl_scaling", 1.0)  # AIST++: units of the place in a metre
+    place = place / document.get("smpl_scaling", 1.0)  # AIST++: units of the position per metre
     if place.shape != (len(poses), 3) or not len(poses):
         raise refusal(path, "trans", f"shape {place.shape}", f"({len(poses)}, 3)", "correct the file")
     used = poses[:, : 3 * N_JOINTS].reshape(len(poses), N_JOINTS, 3)
@@ -87,7 +87,7 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
 
 
 def _rest(document: Mapping[str, Any], options: Options) -> Array:
-    """Return the joints at rest (22, 3): the file's own, or the mean shape's."""
+    """Return the joints at rest (22, 3), metres: from the file, or of the mean shape."""
     own = np.asarray(document.get("J", document.get("joints_rest", ())))
     if own.ndim == 2 and own.shape[0] >= N_JOINTS and own.shape[1] == 3:
         options.note("joints at rest are the file's own")

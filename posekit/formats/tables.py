@@ -1,4 +1,4 @@
-"""Tables of text: CSV, TSV, TRC, MOT and the like, parted into rows of cells. No column is interpreted here."""
+"""Tables of text: CSV, TSV, TRC, MOT and the like, split into rows of cells. No column is interpreted here."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from posekit.geometry import Array, Ints
 
 #: Rows of names before the numbers: DeepLabCut has 4.
 MAX_HEAD_ROWS: Final = 10
-#: Points in all frames of a table with a row a point.
+#: Largest number of points in a table with one row per point.
 MAX_POINTS: Final = 30_000_000
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 #: Columns of a point by its name and a coordinate or confidence: ``nose_x``, ``nose.score``.
@@ -28,12 +28,12 @@ _OF_POINT: Final = re.compile(
 )
 #: Cells that hold no value, in lower case.
 MISSING: Final = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"})
-#: Names of columns of times, and their unit in seconds; None for any unit, which the steps tell.
+#: Names of columns of times, and their unit in seconds; None if the steps between the times give the unit.
 TIMES: Final = {
     **{"time": 1.0, "times": 1.0, "t": 1.0, "time_s": 1.0, "timestamp_s": 1.0, "timestamp": None},
     **{"timestamps": None, "time_ms": 1e-3, "timestamp_ms": 1e-3, "time_us": 1e-6, "timestamp_us": 1e-6},
 }
-#: Largest step between the frames of a film, seconds.
+#: Largest step between two frames, seconds: a larger step of timestamps is in ms, µs or ns.
 LARGEST_STEP: Final = 2.0
 
 
@@ -65,7 +65,7 @@ class Table:
         return table
 
     def parted(self, line: str) -> list[str]:
-        """Part a line into stripped cells; quotes are taken off."""
+        """Split a line into cells without surrounding spaces and quotes."""
         if not self.delimiter:
             return line.split()
         if '"' in line:
@@ -88,7 +88,7 @@ class Table:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns: the last row before the numbers; empty if there is none."""
+        """Names of the columns: the last row before the numbers; empty without such a row."""
         return tuple(self.head[-1] if self.head else ())
 
     @cached_property
@@ -113,18 +113,18 @@ class Table:
 
     @cached_property
     def columns(self) -> dict[str, Any]:
-        """Cells by the name of their column; the first column of a name."""
+        """Cells by the name of their column; of two columns with one name, the first."""
         columns = zip(*self.cells, strict=True) if self.cells else ([] for _ in self.names)
         named = list(zip(self.names, columns, strict=True))
         return dict(reversed(named))
 
     @cached_property
     def numbers(self) -> Array:
-        """All cells of a table of text as numbers (N, C), NaN where a cell holds none."""
+        """All cells of a table of text as numbers (N, C), NaN for other cells."""
         return numbers([cell for row in self.cells for cell in row]).reshape(len(self.cells), -1)
 
     def column(self, name: str) -> Array:
-        """Return a column as numbers (N,), NaN where a cell holds none."""
+        """Return a column as numbers (N,), NaN for other cells."""
         values = np.asarray(self.columns[name])
         known = values.dtype.kind in "iufb"
         return values.astype(np.float64) if known else numbers(self.texts(name))
@@ -134,7 +134,7 @@ class Table:
         return [str(value) for value in self.columns[name]]
 
     def checked(self, name: str) -> Array:
-        """Return a column as numbers (N,), or refuse a cell that is neither a number nor empty."""
+        """Return a column as numbers (N,), NaN for empty cells; refuse other cells."""
         if not self.lines:
             return self.column(name)
         lines = self.numbers_of_lines[len(self.head) :]
@@ -142,7 +142,7 @@ class Table:
 
 
 def parse(data: bytes, source: str) -> Table:
-    """Part a table of text into lines and find its delimiter: tab, semicolon, comma, else white space."""
+    """Split a table of text into lines and find its delimiter: tab, semicolon, comma, else white space."""
     lines = text(data, source).splitlines()
     pairs = [(number, line) for number, line in enumerate(lines, 1) if line.strip(" ,;\t\r")]
     if not pairs:
@@ -154,7 +154,7 @@ def parse(data: bytes, source: str) -> Table:
 
 
 def numbers(cells: list[str]) -> Array:
-    """Turn cells into numbers (N,), NaN for those that hold none; commas as decimal points are understood."""
+    """Turn cells into numbers (N,), NaN for other cells; decimal commas are understood."""
     try:
         return np.array(cells, dtype=np.float64)
     except ValueError:
@@ -162,7 +162,7 @@ def numbers(cells: list[str]) -> Array:
 
 
 def checked(cells: list[str], source: str, place: Callable[[int], str]) -> Array:
-    """Turn cells into numbers (N,), or refuse one that is neither a number nor empty, by its place in the file."""
+    """Turn cells into numbers (N,), NaN for empty cells; refuse another cell by its place in the file."""
     values = numbers(cells)
     for k in np.flatnonzero(~np.isfinite(values)).tolist():
         if cells[k].casefold() not in MISSING:
@@ -180,7 +180,7 @@ def _number(cell: str) -> float:
 
 
 def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the columns of each point by ``x``, ``y``, ``z`` and ``sure``, its confidence."""
+    """Return the columns of each point by part: ``x``, ``y``, ``z`` and ``sure``, the confidence."""
     found: dict[str, dict[str, str]] = {}
     for column in names:
         if match := _OF_POINT.fullmatch(column):
@@ -189,7 +189,7 @@ def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
 
 
 def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[NDArray[Any], Ints, Array]:
-    """Gather a table with a row a point into one with a row a frame.
+    """Gather a table with one row per point into an array with one row per frame.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[
 
 
 def seconds(name: str, time: Array) -> Array:
-    """Return times (T,) in seconds by the name of their column; steps of over 2 s have the unit ms, µs or ns."""
+    """Return times (T,) in seconds; the name of their column gives the unit, or, for timestamps, their steps do."""
     unit = TIMES[name.casefold()]
     if unit is None:
         step = float(np.nanmedian(np.abs(np.diff(time)))) if np.isfinite(time).sum() > 1 else 0.0

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from posekit.motion import Motion
 
 MAX_POINTS: Final = 10_000
-#: Share of a step by which a frame may lie beside its place in an even sequence of times.
+#: Largest deviation of a frame's time from an even sequence of times, as a share of the step.
 UNEVEN_STEP_SHARE: Final = 0.1
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a table is TRC, MOT or STO by its first lines."""
+    """Return whether a table is TRC, MOT or STO by its first lines."""
     if not isinstance(document, Table) or not document.lines:
         return False
     return document.lines[0].lstrip().startswith("PathFileType") or _end_of_header(document) is not None
@@ -49,7 +49,7 @@ def read(document: Table, path: str, options: Options) -> Motion:
     Raises
     ------
     InputError
-        If the header is none, or a row is cut off.
+        If there is no header, or a row is incomplete.
     """
     end = _end_of_header(document)
     return _read_trc(document, path, options) if end is None else _read_mot(document, end, path, options)
@@ -97,7 +97,7 @@ def _read_trc(table: Table, path: str, options: Options) -> Motion:
 
 
 def _title_cells(table: Table, line: str) -> list[str]:
-    """Part a line of the header; some files have spaces there where the rows have tabs."""
+    """Split a line of the header; some files have spaces in it and tabs in their rows."""
     cells = table.parted(line)
     if table.delimiter == "\t" and len(cells) > 1:
         cells = [one for cell in cells for one in re.split(r"\s{2,}", cell)]
@@ -107,7 +107,7 @@ def _title_cells(table: Table, line: str) -> list[str]:
 
 
 def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
-    """Return the markers' names: usually one for three columns; some files have one for each, some doubled tabs."""
+    """Return the markers' names: usually one per three columns; some files have one per column, or doubled tabs."""
     every_third = tuple(cells[::3])
     if all(every_third) and not any(cells[1::3]) and not any(cells[2::3]):
         return every_third
@@ -118,7 +118,7 @@ def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
 
 
 def _rows(table: Table, start: int, width: int, path: str) -> Array:
-    """Return the rows (T, width) after the header; missing cells at the end are markers that were not seen."""
+    """Return the rows (T, width) after the header; missing cells at the end of a row are unseen markers."""
     cells: list[str] = []
     for k in range(start, len(table.lines)):
         row = table.parted(table.lines[k])
@@ -147,7 +147,7 @@ def _whole(text: str) -> int | None:
 
 
 def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
-    """Read OpenSim's inverse kinematics: angles of a body model, which has no URDF unless one is given."""
+    """Read the angles of OpenSim's inverse kinematics; the body model is known if the user states a URDF."""
     header = " ".join(table.lines[:end]).lower()
     names = table.parted(table.lines[end + 1]) if end + 1 < len(table.lines) else []
     if not names or names[0].casefold() != "time":
@@ -205,7 +205,7 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
 
 
 def one_recording(motion: Motion, format: str) -> Array:
-    """Return the points (T, J, 3) of a motion, or refuse it for a format that holds one recording of points."""
+    """Return the points (T, J, 3) of a motion; refuse one without points or with several recordings."""
     if motion.joints is None:
         got = "configurations without points"
         raise refusal(motion.source, "", got, f"points for {format}", "write csv or npz, or give --urdf")
@@ -216,13 +216,13 @@ def one_recording(motion: Motion, format: str) -> Array:
 
 
 def seconds(motion: Motion) -> Array:
-    """Return the times of a motion; frames a thirtieth of a second apart if they are not known."""
+    """Return the times of a motion, seconds; unknown times are 1/30 s apart."""
     time = np.asarray(motion.time)
     return time if np.isfinite(time).all() else np.arange(len(motion)) / 30.0
 
 
 def even_step(motion: Motion, format: str) -> float:
-    """Return the seconds from frame to frame; refuse uneven times for a format that has no others."""
+    """Return the seconds from frame to frame; refuse uneven times, which the format cannot hold."""
     time = seconds(motion)
     if len(time) == 1:
         return 1 / 30

@@ -32,7 +32,7 @@ FIGURE_FIELDS: Final = ("lengths", "shoulders", "stature", "head_points")
 
 
 def looks_like(document: Any) -> bool:
-    """Tell whether a JSON document states the schema, or has the fields of a view without it."""
+    """Return whether a JSON document states the schema, or has a view's fields without a schema."""
     if not isinstance(document, dict):
         return False
     schema = schema_of(document)
@@ -128,7 +128,7 @@ def check_schema(root: Node, *schemas: str) -> str:
 
 
 def camera_from(node: Node, unit: str) -> CameraModel:
-    """Make a camera of its fields, as a view, a result or a header of live key points spells them.
+    """Make a camera from its fields in a view, in a result or in a header of live key points.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def _head_points(node: Node, unit: str) -> dict[str, Array] | None:
 
 
 def _refuse_objects(image: Node) -> None:
-    """Refuse the view of an object that is not a person: none of its points is a joint of a body."""
+    """Refuse the view of another object than a person: a view without any joint of a body."""
     names = image.object()
     if len(names) > 1 and not any(name in POINTS for name in names):
         raise image.refused("the joints of a person", "recover another articulated object with --linkage")
