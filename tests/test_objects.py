@@ -255,6 +255,45 @@ def test_impossible_objects_are_refused(segments, message):
         Linkage.from_names(name="x", segments=segments)
 
 
+def test_points_are_those_that_segments_name(tmp_path):
+    rod = Linkage.from_names(name="rod", segments={"a-b": 5.0, "b-c": 3.0})
+    assert rod.points == ("a", "b", "c") and rod.segment("c-b") == 1
+    file = tmp_path / "rod.toml"
+    file.write_text('schema = "posekit.linkage/1"\n[segments]\na-b = 5\nb-c = 3\n')
+    read = load_linkage(file)
+    assert (read.name, read.points, read.segments) == ("rod", rod.points, rod.segments)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[segments]\na-b = 5\n", "schema: got null"),
+        ('schema = "posekit.linkage/1"\n[segments]\na-b = "long"\n', "fields of posekit.linkage/1"),
+        ('schema = "posekit.linkage/1"\nwidth = 2\n[segments]\na-b = 5\n', "width"),
+        ("[segments\n", "expected a TOML file"),
+    ],
+)
+def test_files_that_are_no_linkage_are_refused(text, message, tmp_path):
+    file = tmp_path / "rod.toml"
+    file.write_text(text)
+    with pytest.raises(posekit.InputError, match=message):
+        load_linkage(file)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_flips_are_given_for_all_frames_or_each(count):
+    rod = chain([5.0, 3.0])
+    image = np.tile([[0.0, 0.0], [30.0, 0.0], [30.0, 20.0]], (2, 1, 1))
+    hands = [{"p0-p1": "p0"}] * count
+    if count == 2:
+        each, all_ = (recover_object(rod, image, scale=10.0, nearer=one) for one in (hands, hands[0]))
+        np.testing.assert_array_equal(each.points, all_.points)
+        assert (each.flips[:, 0] == 1).all() and len(each.points) == 4
+    else:
+        with pytest.raises(posekit.InputError, match=r"nearer: got 3 frames"):
+            recover_object(rod, image, scale=10.0, nearer=hands)
+
+
 @pytest.mark.parametrize("text", ["", "nothing", "-3", "stature:", "closure:0", "closure,height"])
 def test_impossible_scales_are_refused(text):
     with pytest.raises(posekit.InputError, match="scale"):

@@ -282,7 +282,8 @@ def load_linkage(name: str | Path) -> Linkage:
     try:
         return Linkage.from_names(**{"name": Path(name).stem} | table)
     except (AttributeError, TypeError, ValueError) as error:
-        raise refusal(name, "", shown(str(error)), "the fields of posekit.linkage/1", "correct it") from None
+        got = str(error).rpartition("() ")[2].removeprefix("got ")
+        raise refusal(name, "", got, "the fields of posekit.linkage/1", "correct it") from None
 
 
 #: Distance (metres) from all joints below which the base or the end of a limb is not a separate point.
