@@ -235,3 +235,25 @@ def test_options_win_over_set_and_set_over_a_file(run: Any, tmp_path: Path) -> N
 )
 def test_small_probabilities_are_printed_as_a_bound(value: float, text: str) -> None:
     assert probability(value) == text
+
+
+@pytest.mark.parametrize(
+    ("pair", "name", "value"),
+    [
+        ("infer=false", "infer", False),
+        ("infer=True", "infer", True),
+        ("refine=none", "refine", None),
+        ("refine=FALSE", "refine", False),
+        ("length-deviation = 0.02", "length_deviation", 0.02),
+        ("coverage=1", "coverage", 1.0),
+        ("checks=rigid-parts,collision", "checks", ["rigid-parts", "collision"]),
+    ],
+)
+def test_set_reads_the_kind_of_its_field(
+    pair: str, name: str, value: object, run: Any, tmp_path: Path
+) -> None:
+    code, _, err = run("recover", "walk.json", "-o", str(tmp_path / "a.json"), "--set", pair)
+    assert code == 0, err
+    found = posekit.open(tmp_path / "a.json").settings[name]
+    assert (list(found) if isinstance(value, list) else found) == value
+    assert (found is value) or not isinstance(value, bool | None)

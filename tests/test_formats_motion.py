@@ -198,22 +198,26 @@ def test_the_unit_of_bvh_is_told_by_the_body(tmp_path: Path, unit: str) -> None:
     assert np.abs(posekit.open(tmp_path / "walk.bvh").rotated("+z").joints - motion.joints).max() < 1e-5
 
 
-def test_position_channels_may_stand_in_place_of_offsets(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [False, True])
+def test_position_channels_may_stand_in_place_of_offsets(tmp_path: Path, every: bool) -> None:
     text = bvh_of(walking(4), tmp_path)
     plain = posekit.open(tmp_path / "walk.bvh")
     head, rows = text.split("Frame Time: 0.0333333333\n")
     lines = head.split("\n")
-    at = next(k for k, line in enumerate(lines) if "JOINT RightArm" in line)
-    offset = lines[at + 2].split()[1:]
-    lines[at + 3] = lines[at + 3].replace("CHANNELS 3 ", "CHANNELS 6 Xposition Yposition Zposition ")
     joints = [line.split()[1] for line in lines if "JOINT" in line or "ROOT" in line]
-    column = 3 + 3 * joints.index("RightArm")
     cells = [row.split() for row in rows.strip().split("\n")]
-    rows = "\n".join(" ".join([*row[:column], *offset, *row[column:]]) for row in cells)
+    for name in reversed(joints[1:] if every else ["RightArm"]):
+        at = next(k for k, line in enumerate(lines) if line.split()[-1:] == [name])
+        offset = lines[at + 2].split()[1:]
+        lines[at + 3] = lines[at + 3].replace("CHANNELS 3 ", "CHANNELS 6 Xposition Yposition Zposition ")
+        column = 3 + 3 * joints.index(name)
+        cells = [[*row[:column], *offset, *row[column:]] for row in cells]
+    rows = "\n".join(" ".join(row) for row in cells)
     (tmp_path / "absolute.bvh").write_text("\n".join(lines) + "Frame Time: 0.0333333333\n" + rows)
     motion = posekit.open(tmp_path / "absolute.bvh")
     assert np.abs(motion.joints - plain.joints).max() < 1e-12
     assert any("in place of the offsets" in note for note in motion.notes)
+    assert not any("in place of the offsets" in note for note in plain.notes)
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,28 @@ def test_constraints_that_fix_the_scale_find_it(rows: Rows) -> None:
     assert len(within) == 4
 
 
+@pytest.mark.parametrize("number", [0, 1])
+def test_angles_of_taylors_objects_are_between_neighbouring_segments(number: int) -> None:
+    one = taylor_objects.constrained_objects()[number]
+    segments = {frozenset(ends) for ends in one.linkage.segments}
+    middles = [b for _, b, _ in one.triples]
+    assert len(middles) == len(set(middles)) == (4 if one.constraint == "closure" else len(one.points) - 2)
+    for a, b, c in one.triples:
+        assert {frozenset((a, b)), frozenset((b, c))} <= segments and a != c
+    rng = np.random.default_rng(number)
+    for points in [one.points, *(one.random_posture(rng) for _ in range(5))]:
+        ends = np.array(one.linkage.segments)
+        apart = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+        assert apart == pytest.approx(one.linkage.lengths)
+        flat = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        assert flat[2] < 1e-9 * flat[0] or one.constraint == "closure"
+        found = taylor_objects.joint_angles(points, one.triples)
+        for (a, b, c), angle in zip(one.triples, found, strict=True):
+            u, v = points[a] - points[b], points[c] - points[b]
+            cosine = u @ v / np.linalg.norm(u) / np.linalg.norm(v)
+            assert np.cos(np.radians(angle)) == pytest.approx(cosine, abs=1e-9)
+
+
 def test_sensitivity_predicts_the_spread_of_noisy_pictures() -> None:
     one = taylor_objects.constrained_objects()[0]
     s, rng = 600 / float(np.linalg.norm(np.ptp(one.points[:, :2], axis=0))), np.random.default_rng(1)

@@ -49,6 +49,7 @@ def test_key_points_lie_at_the_projections_of_the_walk(folder: Path) -> None:
     camera, walk = cameras["cam_01"], posekit.open(folder / "walk.npz")
     assert isinstance(camera, PinholeCamera) and isinstance(walk, Motion)
     assert camera.R is not None and camera.t is not None
+    assert camera.R[0, 2] == pytest.approx(0, abs=1e-9) and camera.R[1, 2] < -0.9  # level; z is up
     world = walk.points(("right_wrist", "left_ankle"))[:36:3]
     turned = world @ np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]).T  # y up to z up
     pixels = camera.project(turned @ camera.R.T + camera.t)
