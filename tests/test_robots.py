@@ -100,6 +100,8 @@ def g1() -> Robot:
         (text(link("a", '<box size="0 0 0"/>')), "positive size"),
         (text(link("a", "<box/>")), "positive size"),
         (text(link("a", "<ball/>")), "one of box"),
+        (text(link("a", '<mesh filename="x.stl" scale="1 1 0"/>')), "scale 0"),
+        (text(link("")), "a printable name"),
         (text(link("a", '<mesh filename="../x.stl"/>')), "no such file"),
         (text(link("a", '<mesh filename="http://h/x.stl"/>')), "package://"),
         (
@@ -194,6 +196,31 @@ def test_meshes_come_from_package_directories_alone(tmp_path: Path) -> None:
     urdf.write_text(text(link("a", '<mesh filename="ok.stl"/>')))
     with pytest.raises(InputError, match="1,000,000 triangles"):
         load_robot(urdf)
+
+
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.obj", f"mtllib /etc/passwd\n{CORNERS}f 1 2 3\n", "a file beside the mesh"),
+        ("a.obj", f"{CORNERS}f {'1 2 3 ' * 20_000}\n", "a line of 120,002 bytes"),
+        ("a.obj", f"{CORNERS.replace('v 1', 'v nan')}f 1 2 3\n", "coordinates up to"),
+        ("a.dae", "<COLLADA><node><instance_node/></node></COLLADA>", "nodes that place other nodes"),
+        ("a.dae", '<!DOCTYPE a [<!ENTITY b "c">]><COLLADA/>', "DOCTYPE"),
+        ("a.txt", CORNERS, "a mesh (.stl, .obj, .dae)"),
+    ],
+)
+def test_meshes_that_harm_a_native_reader_are_refused(
+    tmp_path: Path, name: str, content: str, words: str
+) -> None:
+    """They hang the reader, or have it open other files."""
+    (tmp_path / name).write_text(content)
+    (tmp_path / "arm.urdf").write_text(text(link("a", f'<mesh filename="{name}"/>')))
+    with pytest.raises(InputError) as caught:
+        load_robot(tmp_path / "arm.urdf")
+    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("flat", [False, True])

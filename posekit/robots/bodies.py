@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
@@ -20,6 +21,8 @@ Kind = Literal["collision", "visual"]
 
 #: Bytes of all meshes of a robot: about two million triangles of STL.
 MAX_MESHES_BYTES: Final = 100_000_000
+#: Largest length of a line of an OBJ file, bytes. The time to triangulate a face grows with the square of its corners.
+MAX_LINE: Final = 65_536
 #: Bytes of the header of a binary STL file, which ends with the number of triangles, and of one triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50
 
@@ -68,7 +71,7 @@ def build_bodies(
         if isinstance(mesh, coal.BVHModelBase):
             # coal accepts NaN silently.
             ok = mesh.num_tris > 0 and (np.abs(mesh.vertices()) <= MAX_NUMBER).all()
-            got, expected = "a mesh without triangles or too large", f"coordinates up to {MAX_NUMBER:g} m"
+            got, expected = "a mesh without triangles, or with NaN", f"coordinates up to {MAX_NUMBER:g} m"
             need(source, ok, place, got, expected, "export it again")
     return geometry
 
@@ -113,7 +116,7 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
 
 
 def _check_mesh_file(path: Path) -> int:
-    """Return the size of a mesh file; refuse files that would exhaust a native reader."""
+    """Return the size of a mesh file, bytes. Refuse files that would exhaust a native reader or lead it elsewhere."""
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
     ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
     expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"
@@ -125,7 +128,16 @@ def _check_mesh_file(path: Path) -> int:
         got = f"{declared:,} triangles in {size:,} bytes"
         check(ok, "", got, "an STL file", "export the mesh again")
     if suffix == ".dae":
-        parse_xml(data.decode("utf-8", "replace"), path)
+        tags = [part.tag for part in parse_xml(data.decode("utf-8", "replace"), path).iter()]
+        nested = any(tag.endswith("instance_node") for tag in tags)
+        check(not nested, "", "nodes that place other nodes", "a mesh", "export it with its nodes resolved")
+    if suffix == ".obj":
+        longest = max(map(len, data.splitlines()), default=0)
+        check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
+    # The native reader goes by the content: it opens the material library that a file of any suffix names.
+    for library in re.findall(rb"^[ \t]*mtllib[ \t]*(.*?)\s*$", data, re.MULTILINE):
+        plain = re.fullmatch(rb"(\./)?\w[\w. -]*", library)
+        check(plain, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")
     return size
 
 

@@ -174,8 +174,10 @@ def _check_tree(robot: Element, check: Need) -> None:
     """Refuse repeated and unprintable names, and links and joints that are not one tree."""
     for kind in _KEPT:
         for name, times in Counter(part.get("name", "") for part in robot.findall(kind)).items():
-            got, good = f"{kind} {shown(name)} {times} times", times == 1 and name and name.isprintable()
-            check(good, "", got, "printable names, each once", "rename or remove the others")
+            got = f"{kind} {shown(name)} {times} times"
+            check(times == 1, "", got, "each name once", "rename or remove the others")
+            good = name and name.isprintable()
+            check(good, "", f"a {kind} named {shown(name)}", "a printable name", "rename it")
     known = {link.get("name", "") for link in robot.findall("link")}
     parents: dict[str, str] = {}
     for joint in robot.findall("joint"):
@@ -263,3 +265,5 @@ def _check_link(link: Element, check: Need) -> None:
             got = f"a {shape.tag} with {attribute} {shown(shape.get(attribute))}"
             least = min(numbers(shape, attribute), default=0)
             check(least > 0, place, got, f"a positive {attribute}", "correct it")
+        flat = shape.tag == "mesh" and 0.0 in numbers(shape, "scale", "1 1 1")
+        check(not flat, place, "a mesh of scale 0", "another scale", "correct it")
