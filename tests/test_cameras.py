@@ -77,7 +77,7 @@ def test_both_lifts_have_the_length_and_project_onto_the_point(camera):
     start, end = points(2), points(3)
     length = np.linalg.norm(end - start, axis=-1)
     image = camera.project(end)
-    lift = camera.lift(start, image, length, tolerance=0.0)
+    lift = camera.lift(start, camera.rays(image), length, tolerance=0.0)
     found = np.linalg.norm(lift.points - start[..., None, :], axis=-1)
     np.testing.assert_allclose(
         found[lift.valid], np.broadcast_to(length[..., None], found.shape)[lift.valid], atol=1e-9
@@ -97,10 +97,10 @@ def test_a_segment_that_is_too_short_has_no_end_and_a_tangent_one(camera):
     origin, direction = camera.rays(camera.project(end))
     offset = start - origin
     height = np.linalg.norm(offset - np.einsum("ni,ni->n", offset, direction)[:, None] * direction, axis=1)
-    lift = camera.lift(start, camera.project(end), height * 0.9, tolerance=0.0)
+    lift = camera.lift(start, camera.rays(camera.project(end)), height * 0.9, tolerance=0.0)
     assert not lift.valid.any()
     np.testing.assert_allclose(lift.excess, 0.1 * height, atol=1e-9)
-    near = camera.lift(start, camera.project(end), height, tolerance=1e-9)
+    near = camera.lift(start, camera.rays(camera.project(end)), height, tolerance=1e-9)
     assert near.valid[:, 0].all()
     assert not near.valid[:, 1].any()
 
@@ -338,6 +338,6 @@ def test_a_segment_along_the_image_has_one_end_wherever_it_lies(camera, aside):
         [aside + rng.uniform(size=200), -aside + rng.uniform(size=200), np.full(200, 2.0)]
     )
     end = start + length[:, None] * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(200)])
-    lift = camera.lift(start, camera.project(end), length, tolerance=0.0)
+    lift = camera.lift(start, camera.rays(camera.project(end)), length, tolerance=0.0)
     assert lift.valid.tolist() == [[True, False]] * 200
     np.testing.assert_allclose(lift.points[:, 0], end, atol=1e-9 * (1 + aside))

@@ -109,8 +109,9 @@ def test_the_true_branch_is_the_one_that_lifts_the_truth() -> None:
     camera, view = LeeChenCamera(f=0.05), builtin_view("seq2")
     for truth, image, code in zip(view.truth, view.image, true_branch(view.truth), strict=True):
         for joint in range(1, len(JOINTS)):
-            length = np.linalg.norm(truth[joint] - truth[PARENTS[joint]])
-            ends = camera.lift(truth[PARENTS[joint]], image[joint], np.asarray(length), tolerance=1e-9).points
+            length = np.asarray(np.linalg.norm(truth[joint] - truth[PARENTS[joint]]))
+            rays = camera.rays(image[joint])
+            ends = camera.lift(truth[PARENTS[joint]], rays, length, tolerance=1e-9).points
             away = np.linalg.norm(ends - truth[joint], axis=-1)
             if np.ptp(away) > 1e-6:
                 assert code[joint - 1] == str(int(np.argmin(away)))

@@ -105,7 +105,10 @@ def test_levels_are_those_of_all_8192_leaves() -> None:
         grown_leaves: dict[tuple[int, ...], Array] = {}
         for code, places in leaves.items():
             lift = camera.lift(
-                places[PARENTS[joint]], view.image[0, joint], np.asarray(lengths[name]), tolerance=1e-3
+                places[PARENTS[joint]],
+                camera.rays(view.image[0, joint]),
+                np.asarray(lengths[name]),
+                tolerance=1e-3,
             )
             for bit in range(2):
                 if lift.valid[bit]:

@@ -65,21 +65,21 @@ class Camera(Record):
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
         return np.zeros_like(direction), direction
 
-    def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
+    def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
         """Find the ends of segments: see `meet_sphere`.
 
         Parameters
         ----------
         start : array (F, ..., 3)
             Known ends, camera frame, metres.
-        pixel : array (F, ..., 2)
-            Image points of the other ends; their axes broadcast against those of `start`.
+        rays : pair of arrays broadcastable to (F, ..., 3)
+            `rays` of the image points of the other ends.
         length : array broadcastable to (F, ...)
             Lengths, metres.
         tolerance : float
             Metres by which a segment may be too short for its image.
         """
-        return meet_sphere(*self.rays(pixel), start, length, tolerance=tolerance)
+        return meet_sphere(*rays, start, length, tolerance=tolerance)
 
 
 def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float) -> Lift:

@@ -62,12 +62,12 @@ class ScaledOrthographicCamera(Camera):
         origin = np.concatenate([place, np.zeros_like(place[..., :1])], axis=-1)
         return origin, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
 
-    def lift(self, start: Array, pixel: Array, length: Array, *, tolerance: float) -> Lift:
+    def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
         r"""Find the ends of segments: the start's depth plus or minus :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}`.
 
         (Taylor 2000, eq. 2.) Nothing is behind this camera.
         """
-        place = self.normalize(pixel)
+        place = rays[0][..., :2]
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
         sizes = np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1)
         rounding = BOUND_ROUNDING * (length + sizes)

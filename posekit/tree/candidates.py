@@ -113,11 +113,13 @@ class Candidates:
         table[:, HEAD_COLUMN:-1] = head
         state, excess = np.zeros((frames, HEAD_COLUMN), dtype=np.int8), np.zeros((frames, HEAD_COLUMN))
         table[:, 0] = root
+        origin, direction = camera.rays(image)
         unseen = np.asarray(np.isnan(image).any(axis=2))
         for joints in GENERATIONS:
             start = np.stack([table[:, FIRST[PARENTS[j]] : FIRST[PARENTS[j] + 1]] for j in joints], axis=1)
             length = lengths[:, [joint - 1 for joint in joints], None]
-            lift = camera.lift(start, image[:, joints, None], length, tolerance=slack)
+            rays = origin[:, joints, None], direction[:, joints, None]
+            lift = camera.lift(start, rays, length, tolerance=slack)
             found = np.where(lift.valid, OPEN, BEHIND)
             found[..., 1][lift.valid[..., 0] & ~lift.valid[..., 1]] = COINCIDENT
             found[(lift.excess > slack) & ~lift.valid.any(axis=-1)] = NO_SOLUTION
