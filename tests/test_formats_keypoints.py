@@ -297,6 +297,19 @@ def test_unrelated_photographs_are_no_film(tmp_path: Path) -> None:
     assert not posekit.open(dumped(tmp_path / "numbered.json", people)).film
 
 
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [("time", 0.04), ("timestamp", 0.04), ("timestamp", 40), ("timestamp", 40_000), ("timestamp_us", 40_000)],
+)
+def test_timestamps_have_the_unit_of_their_steps(tmp_path: Path, name: str, step: float) -> None:
+    document = json.loads(mediapipe(tmp_path).read_text())
+    for k, frame in enumerate(document["frames"]):
+        del frame["timestamp_ms"]
+        frame[name] = 1e6 + k * step
+    found = posekit.open(dumped(tmp_path / "times.json", document))
+    assert found.time is not None and np.diff(found.time) == pytest.approx(0.04, rel=1e-5)
+
+
 def test_times_of_the_file_win_over_the_rate(tmp_path: Path) -> None:
     found = posekit.open(mediapipe(tmp_path), rate=60)
     with pytest.warns(UserWarning, match="times are 25 frames a second, not 60"):

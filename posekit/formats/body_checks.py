@@ -139,8 +139,7 @@ def points_motion(
     time = times(len(points), time, rate, options, clip, frame)
     fields.setdefault("in_world", not _is_rooted(body))
     if not fields["in_world"]:
-        remark = "every frame is relative to its own hips: nothing is known of the ground and of travel"
-        options.note(remark)
+        options.note("every frame is relative to its own hips: ground and travel are not known")
     fields |= {"source": source, "layout": layout.name, "notes": options.notes, "warnings": options.warnings}
     return Motion(joints=joints, joint_names=placed, time=time, up=up, unit=unit, **fields)
 

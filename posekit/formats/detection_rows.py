@@ -13,6 +13,7 @@ from posekit.errors import cut, refusal
 from posekit.following.detections import FARTHEST_PIXEL, FRACTIONS_UP_TO, Detections
 from posekit.formats.layout import Layout, by_names, by_order, load_layout
 from posekit.formats.options import Options
+from posekit.formats.tables import seconds
 from posekit.geometry import Array, Ints
 from posekit.skeleton import HEAD_POINTS
 
@@ -288,10 +289,9 @@ def _times(stated: Array, film: bool, options: Options) -> Array | None:
         if film and options.rate is None and len(stated) > 1:
             options.note("the frame rate is not known; give it with --rate")
         return None
-    steps = np.diff(stated[known]) / np.diff(np.flatnonzero(known))
     time = stated.copy()
-    if len(steps) and float(np.median(steps)) > 2:  # a "timestamp" in milliseconds
-        time, steps = time * 1e-3, steps * 1e-3
+    time[known] = seconds("timestamp", stated[known])
+    steps = np.diff(time[known]) / np.diff(np.flatnonzero(known))
     if (steps <= 0).any():
         options.warn("times of the pictures do not ascend: they are not used")
         return None

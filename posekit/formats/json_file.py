@@ -128,14 +128,9 @@ def _pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[s
 def nullable(values: NDArray[Any] | float) -> Any:
     """Turn an array into nested lists, or a number into a float, with None for NaN."""
     array = np.asarray(values)
-    if array.dtype.kind != "f":
+    if array.dtype.kind != "f" or not np.isnan(array).any():
         return array.tolist()
-    unknown = np.isnan(array)
-    if not unknown.any():
-        return array.tolist()
-    boxed = array.astype(object)
-    boxed[unknown] = None
-    return boxed.tolist()
+    return np.where(np.isnan(array), None, array).tolist()  # type: ignore[call-overload]
 
 
 def _too_large(path: str | Path) -> InputError:
