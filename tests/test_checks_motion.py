@@ -218,6 +218,15 @@ def test_a_walk_out_of_balance_doubts_the_rate() -> None:
         assert "about 60 Hz would fit" in warning
 
 
+def test_gestures_that_are_far_too_fast_or_slow_doubt_the_rate() -> None:
+    joints, time = gesture(6.0), np.arange(180) / RATE
+    noisy = joints + np.random.default_rng(0).normal(0, 0.005, joints.shape)
+    assert not judged(joints, time=time).warnings and not judged(noisy, time=time).warnings
+    for factor, rate in ((0.25, 60), (4.0, 15)):
+        (warning,) = judged(joints, time=factor * time).warnings
+        assert "joints change their speed" in warning and f"about {rate} Hz would fit" in warning
+
+
 def test_a_walk_that_stays_in_place_is_said_to_be_on_a_treadmill() -> None:
     joints = pendulum_walk()
     time = np.arange(len(joints)) / 60.0

@@ -139,9 +139,8 @@ class Judgement(Record):
             half = (upper - lower) / 2
         bounded = np.isfinite(half) & (half > 0)
         size = np.abs(np.where(np.isfinite(lower), lower, upper))
-        return np.asarray(
-            self.margin / np.select([bounded, np.isfinite(size) & (size > 0)], [half, size], 1.0)
-        )
+        scale = np.select([bounded, np.isfinite(size) & (size > 0)], [half, size], 1.0)
+        return np.asarray(self.margin / scale)
 
     @classmethod
     def stacked(cls, parts: Sequence[Judgement]) -> Judgement:

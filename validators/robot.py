@@ -58,13 +58,8 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
         raise NotAskedError("the URDF has no such limits")
     given = body.settings.angle_tolerance
     tolerance = EXACT.rigid if unit_of_q == "m" else EXACT.angle if given is None else given
-    return Judgement(
-        [names[k] for k in which],
-        factor * q[:, which],
-        factor * lower[which],
-        factor * upper[which],
-        tolerance,
-    )
+    bounds = factor * lower[which], factor * upper[which]
+    return Judgement([names[k] for k in which], factor * q[:, which], *bounds, tolerance)
 
 
 def _of(body: Body) -> tuple[Robot, Array]:

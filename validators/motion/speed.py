@@ -111,9 +111,8 @@ def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judg
     limited = np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))
     if not len(limited):
         raise NotAskedError("the URDF has no velocity limits")
-    velocity = robot.velocities(
-        line.spread(body.q), np.asarray(body.dt * np.arange(line.count), dtype=np.float64)
-    )[:, limited]
+    times: Array = body.dt * np.arange(line.count, dtype=np.float64)
+    velocity = robot.velocities(line.spread(body.q), times)[:, limited]
     first = np.full((1, len(limited)), np.nan)
     value = line.of_frames(np.abs(np.concatenate([first, velocity])) / limits[limited])
     return Judgement([names[k] for k in limited], value, upper=share)

@@ -142,10 +142,8 @@ def balance_still(
     lasting : float
         Least time for which the body is still, seconds.
     """
-    value = np.full(len(body), np.nan)
-    still = np.flatnonzero(_stands(body, slower, lasting))
-    if len(still):
-        value[still] = beyond_feet(body)[still]
+    still = _stands(body, slower, lasting)
+    value = np.where(still, beyond_feet(body), np.nan) if still.any() else np.full(len(body), np.nan)
     return Judgement(("centre_of_mass",), value, upper=beyond, tolerance=2 * body.noise)
 
 

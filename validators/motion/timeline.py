@@ -62,7 +62,7 @@ def timeline_of(body: Body) -> Timeline:
     frames = np.arange(count)
     if not body.dt > 0 or not np.isfinite(body.time).all():
         return Timeline(
-            slots=frames, count=count, place=np.zeros(count, dtype=np.intp), missing=np.full(count, np.nan)
+            slots=frames, count=count, place=np.zeros_like(frames), missing=np.full(count, np.nan)
         )
     order = np.argsort(body.time, kind="stable")
     steps = np.diff(body.time[order], prepend=body.time[order[:1]] - body.dt) / body.dt

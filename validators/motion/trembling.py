@@ -83,9 +83,7 @@ def usual_trembling(joints: Array, percents: Sequence[float] = (50.0,)) -> Array
     """Return percentiles over the frames of the median trembling of joints (T, 14, 3), early in a clip, metres."""
     rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
     known = rough[np.isfinite(rough).any(axis=1)]
-    if not len(known):
-        return np.zeros(len(percents))
-    return np.percentile(np.nanmedian(known, axis=1), percents)
+    return np.percentile(np.nanmedian(known, axis=1), percents) if len(known) else np.zeros(len(percents))
 
 
 def _windows(rough: Array) -> Array:
