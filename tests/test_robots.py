@@ -267,6 +267,9 @@ def test_roots(tmp_path: Path) -> None:
     floating = text(link("world", ""), link("a"), joint("base", "world", "a", "floating", "", z=0.0))
     robot = Robot(urdf=floating)
     assert robot.model.nq == 7 and robot.configuration_names == free.configuration_names[:7]
+    # A floating joint that another joint carries is no root.
+    carried = Robot(urdf=text(*map(link, "abc"), joint("i", "a", "b"), joint("f", "b", "c", "floating", "")))
+    assert carried.model.nq == 15 and carried.configuration_names[7:9] == ("i", "f.x")
 
 
 def test_a_pickled_robot_is_the_same() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -98,12 +98,13 @@ class Robot(Record):
     @cached_property
     def model(self) -> pin.Model:
         """Pinocchio's model. Mimicking joints have their own entries of q: see `mimics`."""
-        joints = {joint.get("name"): joint.get("type") for joint in self.tree.findall("joint")}
-        root: tuple[Any, ...] = ()
-        if not self.fixed_base and "floating" not in joints.values():
-            root = pin.JointModelFreeFlyer(), next(name for name in ROOT_NAMES if name not in joints)
+        urdf = text_with(self.tree)
         try:
-            return pin.buildModelFromXML(text_with(self.tree), *root)
+            model = pin.buildModelFromXML(urdf)
+            if self.fixed_base or _floats(model):
+                return model
+            root = next(name for name in ROOT_NAMES if not model.existFrame(name))
+            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), root)
         except (ValueError, RuntimeError) as error:
             got = f"a URDF that Pinocchio cannot read ({cut(one_line(str(error).splitlines()[0]))})"
             raise refusal(self.source, "", got, "a URDF", "correct it") from None
@@ -111,7 +112,7 @@ class Robot(Record):
     @cached_property
     def free_flyer(self) -> bool:
         """Whether the root moves freely."""
-        return len(self.model.joints) > 1 and self.model.joints[1].shortname() == "JointModelFreeFlyer"
+        return _floats(self.model)
 
     @cached_property
     def geometry(self) -> pin.GeometryModel:
@@ -420,3 +421,8 @@ def load_robot(
 def read_text(path: str | Path) -> str:
     """Read a URDF or SRDF file."""
     return text(read_bytes(path), str(path))
+
+
+def _floats(model: pin.Model) -> bool:
+    """Return whether the first joint of a model is a floating joint."""
+    return len(model.joints) > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
