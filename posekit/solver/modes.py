@@ -104,7 +104,7 @@ class Modes:
         table = np.concatenate([np.linalg.norm(image, axis=1), np.abs(length), *single], axis=1)
         out = dict(zip(RESIDUAL_NAMES, table.T, strict=True))
         if limits is not None:
-            angles = np.concatenate([r for r, _ in reference.limit_terms(limits, joints, 31)], axis=1)
+            angles = np.concatenate([r[:, :4] for r, _ in reference.limit_terms(limits, joints, 31)], axis=1)
             beyond = p["limit_weight"][:, None] * np.abs(angles)
             out |= dict(zip([f"limit {name}" for name in limits.names], beyond.T, strict=True))
         return out

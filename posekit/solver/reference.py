@@ -17,7 +17,7 @@ from posekit.body.angles import ball_branch, limb_branch
 from posekit.body.frames import trunk_frames
 from posekit.geometry import Array, Flags, Ints, cross, dot, norm, turned_near, unit
 from posekit.geometry.rotations import relative_rotation
-from posekit.skeleton import SEGMENTS
+from posekit.skeleton import LIMB_JOINTS, SEGMENTS
 from posekit.solver import limits as lim
 from posekit.solver.limits import Limits
 from posekit.solver.problem import Problem
@@ -58,6 +58,9 @@ PRECISION: Final = 1e-2
 SEGMENT_STARTS, SEGMENT_ENDS = np.sort(SEGMENTS, axis=1).T
 INCIDENCE: Final = np.eye(14)[SEGMENT_ENDS] - np.eye(14)[SEGMENT_STARTS]
 
+#: Frames of `posekit.solver.problem.PROBLEM`.
+Records = NDArray[np.void]
+
 #: Residuals (N, K), standard deviations, of postures (N, 14, 3): zero where nothing pulls.
 Pull = Callable[[Array], Array]
 
@@ -75,55 +78,55 @@ class Normal:
             np.zeros((count, width)),
             np.zeros((count, 0)),
         )
-        self.matrix, self.slopes = np.zeros((count, width, width)), np.zeros((count, 0, width))
+        self.matrix, self.slopes = np.zeros((count, width, width)), np.zeros((count, 0, width - 1))
 
-    def add(self, r: Array, along: Array, on_size: Array | float = 0.0) -> Array:
-        """Add residuals (N, K) and return their derivatives (N, K, C).
-
-        `along` (N, L, 3F) has the derivatives along the free joints, then L - K rows of curvature without a residual;
-        `on_size` (N, K) the derivatives along the size.
-        """
-        count, d = r.shape[1], np.zeros((*along.shape[:2], self.gradient.shape[1]))
-        d[..., : along.shape[2]], d[:, :count, -1] = along, on_size
+    def add(self, r: Array, d: Array) -> None:
+        """Add residuals (N, K) with derivatives (N, K, L) along the first L unknowns."""
+        part = slice(0, d.shape[2])
         self.chi2 += dot(r, r)
-        self.gradient += (r[:, None] @ d[:, :count])[:, 0]
-        self.matrix += np.swapaxes(d, 1, 2) @ d
-        return d[:, :count]
+        self.gradient[:, part] += (r[:, None] @ d)[:, 0]
+        self.matrix[:, part, part] += np.swapaxes(d, 1, 2) @ d
 
 
 def free_joints(parts: int) -> Ints:
     """Return the indices (F,) of the joints that the parts free, ascending."""
-    limbs = [k for k in range(4) if parts >> (k + 1) & 1]
-    return np.sort(
-        [*range(6 * (parts & 1)), *(joints[k] for joints in (lim.MIDDLES, lim.ENDS) for k in limbs)]
-    )
+    limbs = [joint for k in range(4) if parts >> (k + 1) & 1 for joint in LIMB_JOINTS[k][1:]]
+    return np.sort([*range(6 * (parts & 1)), *limbs])
 
 
 def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | None = None) -> Normal:
     """Return the normal equations of frames `which` (N,) at x (N, 43); chi2 is infinite where it is not defined."""
-    records = problem.records[which]
-    joints, free, trunk = x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts), parts & 1
+    records, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
+    some, trunk = np.isin(SEGMENT_ENDS, free), parts & 1
+    to_joints = np.concatenate([np.eye(14)[free], INCIDENCE[some]])[:, free]
     out = Normal(len(x), 3 * len(free) + 1)
-    r, d, behind = image_terms(records, joints)
+    off, on_place, behind = image_terms(records, joints)
+    off, on_place = off[..., free], on_place[..., free, :]
     # Robust (Geman & McClure): e / (1 + e / c^2), whose weight in the normal equations is the square of the factor.
-    error = (r * r).sum(axis=1)
+    error = (off * off).sum(axis=1)
     keep = 1 / (1 + records["robust"][:, None] * error)
-    r, d = keep[:, None] * r, keep[:, None, :, None] * d
-    out.add(r[..., free].reshape(len(x), -1), _along(d[:, :, free], np.eye(len(free))))
-    out.chi2 += ((1 - keep) * keep * error)[:, free].sum(axis=1)
+    r, d, bend = length_terms(records, x, some)
+    w = trunk * records["size_weight"]
+    out.chi2 += (keep * error).sum(axis=1) + dot(r, r) + (w * x[:, SIZE]) ** 2
+    keep = (keep * keep)[..., None]
+    on_joints, on_lines = keep * np.einsum("nkji,nkj->nji", on_place, off), r[..., None] * d
+    out.gradient[:, :-1] = (to_joints.T @ np.concatenate([on_joints, on_lines], axis=1)).reshape(len(x), -1)
+    on_joints = keep[..., None] * np.einsum("nkji,nkjl->njil", on_place, on_place)
+    on_lines = d[..., None] * d[..., None, :] + bend
+    out.matrix[:, :-1, :-1] = _laid(np.concatenate([on_joints, on_lines], axis=1), to_joints)
+    # A size that is not varied keeps a unit on the diagonal.
+    on_size = np.where(w[:, None] > 0, -records["length_weight"][:, some], 0.0)
+    shared = (to_joints[len(free) :].T @ (on_size[..., None] * d)).reshape(len(x), -1)
+    out.matrix[:, -1, :-1] = out.matrix[:, :-1, -1] = shared
+    out.matrix[:, -1, -1] = dot(on_size, on_size) + np.where(w > 0, w * w, 1.0)
+    out.gradient[:, -1] = dot(on_size, r) + w * w * x[:, SIZE]
     weight = trunk * records["root_weight"]
     out.add(np.einsum("nki,ni->nk", weight, joints[:, 0] - records["root"]), weight)
-    # A size that is not varied keeps a unit on the diagonal.
-    w = trunk * records["size_weight"][:, None]
-    out.add(w * x[:, SIZE:], np.zeros((len(x), 1, 0)), np.where(w > 0, w, 1.0))
-    some = np.isin(SEGMENT_ENDS, free)
-    r, d = length_terms(records, x, some)
-    on_size = np.where(w > 0, -records["length_weight"][:, some], 0.0)
-    out.add(r, _along(d, INCIDENCE[some][:, free]), on_size)
     if problem.limits is not None:
-        w, terms = records["limit_weight"][0], limit_terms(problem.limits, joints, parts)
-        added = [(w * r, out.add(w * r, w * d[:, :, free].reshape(*d.shape[:2], -1))) for r, d in terms]
-        out.beyond, out.slopes = (np.concatenate(one, axis=1) for one in zip(*added, strict=True))
+        terms = zip(*limit_terms(problem.limits, joints, parts), strict=True)
+        out.beyond, d = (records["limit_weight"][0] * np.concatenate(one, axis=1) for one in terms)
+        out.slopes = d[:, :, free].reshape(*d.shape[:2], -1)
+        out.add(out.beyond, out.slopes)
     if pull is not None:
         r = pull(joints)
         moved = joints[:, None] + PULL_STEP * np.eye(SIZE).reshape(-1, 14, 3)
@@ -133,16 +136,17 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
     return out
 
 
-def _along(d: Array, to_points: Array) -> Array:
-    """Return derivatives (N, RP, 3F) along joints from derivatives (N, R, P, 3) along points.
+def _laid(blocks: Array, to_joints: Array) -> Array:
+    """Return matrices (N, 3F, 3F) along F joints from blocks (N, P, 3, 3) along P points.
 
-    Points are `to_points` (P, F) times joints.
+    Points, which are joints or segments, are `to_joints` (P, F) times joints.
     """
-    laid = d[..., None, :] * to_points[:, :, None]
-    return np.asarray(laid.reshape(len(d), d.shape[1] * len(to_points), -1))
+    pairs = to_joints[:, :, None] * to_joints[:, None]
+    laid = np.tensordot(blocks, pairs, (1, 0)).transpose(0, 3, 1, 4, 2)
+    return np.asarray(laid.reshape(len(blocks), 3 * to_joints.shape[1], -1))
 
 
-def image_terms(records: NDArray[np.void], joints: Array) -> tuple[Array, Array, Flags]:
+def image_terms(records: Records, joints: Array) -> tuple[Array, Array, Flags]:
     """Return residuals (N, 2, 14) of image points, derivatives (N, 2, 14, 3), and seen joints behind the camera."""
     weight, perspective = np.swapaxes(records["image"], 1, 2), bool(records["perspective"].any())
     depth = joints[..., 2:] if perspective else np.ones((len(joints), 14, 1))
@@ -154,19 +158,16 @@ def image_terms(records: NDArray[np.void], joints: Array) -> tuple[Array, Array,
     return r, d, (weight != 0).any(axis=(1, 3)) & ~(depth[..., 0] > 0)
 
 
-def length_terms(
-    records: NDArray[np.void], x: Array, some: Flags | slice = slice(None)
-) -> tuple[Array, Array]:
-    """Return residuals (N, S) of log-lengths of some segments, and derivatives (N, 4, S, 3) along these.
+def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) -> tuple[Array, Array, Array]:
+    """Return residuals (N, S) of the log-lengths of some segments, and derivatives (N, S, 3) along these.
 
-    The last three rows are the curvature of a segment that turns, kept where it is positive.
+    The third array is the curvature (N, S, 3, 3) of a segment that turns, kept where it is positive.
     """
     line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
     square, w = dot(line, line), records["length_weight"][:, some]
     r = w * (0.5 * np.log(square) - records["log_length"][:, some] - x[:, SIZE:])
-    bend = np.sqrt(np.maximum(w * r, 0.0) / square)[:, None, :, None]
-    across = np.eye(3)[:, None] - np.moveaxis(line, -1, 1)[..., None] * (line / square[..., None])[:, None]
-    return r, np.concatenate([((w / square)[..., None] * line)[:, None], bend * across], axis=1)
+    across = np.eye(3) - line[..., None] * line[..., None, :] / square[..., None, None]
+    return r, (w / square)[..., None] * line, (np.maximum(w * r, 0.0) / square)[..., None, None] * across
 
 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
@@ -192,7 +193,7 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Arr
                 along = (moved.reshape(-1, 4, 4) - r[row, None]) / ANGLE_STEP
                 along = np.where(r[row, :, None] != 0, np.swapaxes(along, 1, 2), 0.0)
                 d[row] = _limb_slopes(limits, joints[row], R[row], limb, angles[row], along, r[row, 3])
-            yield r, d
+            yield np.pad(r, ((0, 0), (0, 1))), d
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
@@ -325,10 +326,10 @@ def descend(
         matrix[live], gradient[live] = here.matrix[live], here.gradient[live]
         r, d = there.beyond[~better], there.slopes[~better]
         met = (r != 0) & (here.beyond[bad] == 0) & np.isfinite(there.chi2[~better])[:, None]
-        before = r - (d @ step[~better, :, None])[..., 0]
+        before = r - (d @ step[~better, :-1, None])[..., 0]
         before, d = np.where(before * r > 0, 0.0, before), np.where(met[..., None], d, 0.0)
-        matrix[bad] += np.swapaxes(d, 1, 2) @ d
-        gradient[bad] += (before[:, None] @ d)[:, 0]
+        matrix[bad, :-1, :-1] += np.swapaxes(d, 1, 2) @ d
+        gradient[bad, :-1] += (before[:, None] @ d)[:, 0]
         damping[bad] *= np.where(refused[bad] | ~met.any(axis=1), 16.0, 1.0)
         refused[live] = ~better
     return x, here.chi2, damping
@@ -346,15 +347,14 @@ def information(problem: Problem, which: Ints, x: Array, known: Array, parts: in
     H[:, :-1, :-1] += np.repeat(place, 3, axis=1)[:, None] * np.eye(3 * len(free))
     some = np.isin(SEGMENT_ENDS, free[free >= 6])
     line, ends = INCIDENCE[some] @ joints, joints[:, SEGMENT_ENDS[some]]
-    weight = p["image"][:, SEGMENT_ENDS[some]]
     ray = ends if problem.perspective else np.broadcast_to([0.0, 0.0, 1.0], ends.shape)
     turn = ray - (dot(ray, line) / dot(line, line))[..., None] * line
     depth = np.abs(ends[..., 2]) if problem.perspective else 1.0
-    noise = np.sqrt((weight**2).sum(axis=(2, 3)) / 2 / dot(line, line))
+    noise = np.sqrt((p["image"][:, SEGMENT_ENDS[some]] ** 2).sum(axis=(2, 3)) / 2 / dot(line, line))
     size = norm(turn)
     info = known[2] * noise / norm(ray) / depth / np.where(size > 0, size, 1.0)
-    d = _along((np.sqrt(info)[..., None] * turn)[:, None], INCIDENCE[some][:, free])
-    H[:, :-1, :-1] += np.swapaxes(d, 1, 2) @ d
+    turns = info[..., None, None] * turn[..., None] * turn[..., None, :]
+    H[:, :-1, :-1] += _laid(turns, INCIDENCE[some][:, free])
     return H
 
 
