@@ -169,6 +169,35 @@ def test_noise_keeps_the_truth():
     assert off.min() < 0.3 * size
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["coplanar", "collinear", "perpendicular"])
+def test_noise_keeps_the_truth_of_a_shape(kind, seed):
+    rng = np.random.default_rng(seed)
+    flat = np.array([[0, 0, 0], [3, 0, 0], [3, 2, 0], [1, 4, 0], [0.5, 2, 0]], dtype=float)
+    if kind == "collinear":
+        flat = np.array([[0, 0, 0], [1, 1, 0], [2, 0, 0], [3, 2, 0], [4, 0, 0]], dtype=float)
+    points = flat @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+    names = [f"p{k}" for k in range(len(points))]
+    segments = {
+        pair: float(np.linalg.norm(points[k + 1] - points[k]))
+        for k, pair in enumerate(itertools.pairwise(names))
+    }
+    shape = {
+        "coplanar": {"coplanar": [names]},
+        "perpendicular": {"perpendicular": [("p0-p1", "p1-p2")]},
+        "collinear": {"collinear": [names[::2]]},
+    }[kind]
+    linkage = Linkage.from_names(name="flat", segments=segments, points=names, **shape)
+    size = float(linkage.lengths.max())
+    image = (points[:, :2] + 0.002 * size * rng.normal(size=(5, 2))) * 50.0
+    found = recover_object(linkage, [image], scale=50.0, tolerance=(0.02 * size, 0.02 * size))
+    exact = recover_object(linkage, [points[:, :2] * 50.0], scale=50.0)
+    true = points - points[0]
+    for one, within in ((found, 0.35 * size), (exact, 1e-6)):
+        off = np.abs(one.points - one.points[:, :1] - true).max(axis=(1, 2))
+        assert off.min() < within
+
+
 def test_human_of_taylor_has_its_flips():
     human = load_linkage("taylor_human")
     rng = np.random.default_rng(0)

@@ -102,8 +102,11 @@ def test_engines_take_the_same_steps(kind, parts):
 
 
 @compiled
-def test_engines_find_the_same_modes(monkeypatch):
-    problem = observed(length_deviation=0.02, size_deviation=0.02)
+@pytest.mark.parametrize("hidden", [(), ("left_wrist", "right_ankle")])
+def test_engines_find_the_same_modes(monkeypatch, hidden):
+    image = IMAGE + 2.0 * NOISE
+    image[:2, [JOINTS.index(name) for name in hidden]] = np.nan
+    problem = observed(image=image, length_deviation=0.02, size_deviation=0.02)
     fast = solve(problem)
     monkeypatch.setattr(engine, "compiled", None)
     engine._warn_once.cache_clear()
