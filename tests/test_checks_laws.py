@@ -9,7 +9,7 @@ import pytest
 
 import posekit
 from posekit.motion import Motion
-from tests.test_checks_motion import RATE, gesture, judged
+from tests.test_checks_motion import RATE, gesture, judged, lengthened
 from tests.test_checks_motion_laws import PLANTS, findings
 
 FIGURE = posekit.load_figure()
@@ -59,3 +59,17 @@ def test_the_nearest_bent_frame_shows_which_way_a_hinge_bends(
     found = {frame: numbers[0] for (frame, _, _), numbers in findings(report).items()}
     assert list(found) == ([] if first is None else list(range(first, first + 4)))
     assert list(found.values()) == pytest.approx([-15.0] * len(found), abs=0.5)
+
+
+@pytest.mark.parametrize("hidden", [slice(0, 2), slice(1, 2), slice(1, 4), slice(57, 59), slice(118, 120)])
+def test_a_hidden_joint_hides_the_defects_of_its_own_frames_alone(hidden: slice) -> None:
+    joints = lengthened(gesture())
+    seen = {key: numbers for key, numbers in findings(judged(joints)).items() if key[1] == "drift"}
+    left = np.ones(len(joints), dtype=bool)
+    left[hidden] = False
+    joints[hidden, 8] = np.nan
+    found = findings(judged(joints))
+    expected = {key: numbers for key, numbers in seen.items() if left[key[0]]}
+    assert expected and {key for key in found if key[1] == "drift" and left[key[0]]} == expected.keys()
+    for key, numbers in expected.items():
+        assert found[key] == pytest.approx(numbers, abs=1e-3)

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import posekit
-from posekit.cameras import PinholeCamera
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
 from posekit.skeleton import JOINTS, other_side
@@ -175,6 +175,25 @@ def test_unsure_points_outside_the_picture_are_not_seen(place: float, seen: bool
     image = view_of(points, layout="coco_17", camera=CAMERA).image
     assert bool(np.isfinite(image[0, JOINTS.index("left_wrist")]).all()) is (seen or confidence > 0.5)
     assert np.isfinite(image[0, JOINTS.index("right_wrist")]).all()
+
+
+def test_a_photograph_that_does_not_fit_leaves_the_others() -> None:
+    truth = random_views(3, np.random.default_rng(2), distance=(4.0, 5.0)).truth
+    image = truth[..., :2] * 200.0
+    image[1] *= 5  # every segment is too long for its scale
+    lengths = dict(posekit.load_figure().lengths)
+    seen = posekit.View(
+        camera=ScaledOrthographicCamera(scale=200.0), image=image, time=np.arange(3.0), lengths=lengths
+    )
+    found = posekit.recover(seen)
+    assert [len(found[k]) > 0 for k in range(3)] == [True, False, True]
+    assert found.frames.reason[1].startswith("scale: got 200; expected at least ")
+    assert (found.frames.reason[0], found.frames.reason[2]) == ("", "")
+    for k in (0, 2):
+        alone = posekit.recover(seen.take([k]))
+        np.testing.assert_allclose(alone.survivors.joints, found[k].joints, atol=1e-9)
+    with pytest.raises(posekit.InputError, match="expected at least"):
+        posekit.recover(seen.take([1]))
 
 
 # Objects
