@@ -332,6 +332,30 @@ def test_points_that_are_no_joints_keep_their_columns(
         assert len(after.split(b".")) == len(before.split(b"."))
 
 
+@pytest.mark.parametrize("gap", ["", "NaN", "-"])
+def test_gaps_of_a_table_are_filled_in_place(clean: posekit.Motion, tmp_path: Path, gap: str) -> None:
+    path, target = tmp_path / "given.csv", tmp_path / "repaired.csv"
+    head = ["time", *(f"{name}_{axis}" for name in JOINTS for axis in "xyz")]
+    joints = np.asarray(clean.joints).reshape(FRAMES, -1)
+    cells = [[f"{k / RATE:.6f}", *(f"{v:.6f}" for v in row)] for k, row in enumerate(joints)]
+    column = head.index("right_wrist_x")
+    for row in cells[40:43]:
+        row[column : column + 3] = [gap] * 3
+    path.write_text("\n".join([",".join(head), *map(",".join, cells)]) + "\n")
+    assert posekit.validate(path, up="+z").ok.sum() == FRAMES - 3
+    done = repair(path, target, up="+z")
+    assert posekit.validate(target, up="+z").ok.all(), done.notes
+    old, new = path.read_text().splitlines(), target.read_text().splitlines()
+    assert [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b] == [41, 42, 43]
+    for k in (41, 42, 43):
+        row = new[k].split(",")
+        assert (
+            row[:column] + row[column + 3 :] == old[k].split(",")[:column] + old[k].split(",")[column + 3 :]
+        )
+        given = joints[k - 1, 3 * JOINT["right_wrist"] :][:3]
+        np.testing.assert_allclose([float(one) for one in row[column : column + 3]], given, atol=0.01)
+
+
 def test_a_robots_pickle_keeps_its_keys_and_says_what_does_not_follow(tmp_path: Path) -> None:
     robot = posekit.load_figure()
     count = len(robot.configuration_names) - 7

@@ -236,7 +236,8 @@ def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:
 
 def _clip_names(motion: Motion) -> tuple[str, ...]:
     count = int(np.max(np.asarray(motion.clip))) + 1
-    return tuple(motion.clips[k] if k < len(motion.clips) else str(k) for k in range(count))
+    numbered = [str(k) for k in range(count)] if count > 1 else [""]
+    return (*motion.clips, *numbered[len(motion.clips) :])[:count]
 
 
 def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:

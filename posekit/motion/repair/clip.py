@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, Final, Self
 
 import numpy as np
@@ -369,15 +369,10 @@ class RobotClip(Clip):
         """Return the configurations (T, nq) of a recording."""
         return np.array(motion.q)
 
-    @cached_property
-    def robot(self) -> Any:
-        """The robot, or the figure, to which the configurations belong."""
-        return self.validator.robot
-
     @property
     def entries(self) -> Sequence[str]:
         """Names of the entries of q."""
-        return tuple(self.robot.configuration_names)
+        return tuple(self.validator.robot.configuration_names)
 
     def as_motion(self) -> Motion:
         """Return the clip as a motion of configurations."""
@@ -386,9 +381,8 @@ class RobotClip(Clip):
     def points(self) -> Array:
         """Return the points (T, P, 3) in the order of `NAMES`, metres; feet are the ends of the soles."""
         head = np.full((len(self), len(POINTS) - len(JOINTS), 3), np.nan)
-        return np.concatenate(
-            [self.robot.points(self.state), head, sole_points(self.robot, self.state)], axis=1
-        )
+        robot = self.validator.robot
+        return np.concatenate([robot.points(self.state), head, sole_points(robot, self.state)], axis=1)
 
     def placed(self) -> Flags:
         """Return whether the configuration of each frame (T,) is known."""
@@ -396,11 +390,11 @@ class RobotClip(Clip):
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
         """Return configurations (n, nq) a share (n,) of the geodesic from `start` to `end`."""
-        model = self.robot.model
+        model = self.validator.robot.model
         steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
         steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
         out = [pin.integrate(model, q, step) for q, step in zip(start, steps, strict=True)]
-        return np.asarray(self.robot.with_mimics(np.array(out).reshape(start.shape)))
+        return np.asarray(self.validator.robot.with_mimics(np.array(out).reshape(start.shape)))
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
         """Return configurations (n, nq) a share (n,) of the way from `start` to `end`."""
@@ -413,18 +407,19 @@ class RobotClip(Clip):
     def shifted(self, by: Array) -> Self:
         """Return the clip with the root moved by the vector `by` (T, 3), metres; a fixed root stays."""
         out = self.state.copy()
-        if self.robot.free_flyer:
+        if self.validator.robot.free_flyer:
             out[:, :3] += by
         return replace(self, state=out)
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
         """Smooth each entry of q in the frames in which it is loose (T, nq)."""
         out = self.state.copy()
-        if self.robot.free_flyer:  # quaternions whose signs agree can be smoothed component by component
+        # Quaternions whose signs agree can be smoothed component by component.
+        if self.validator.robot.free_flyer:
             turn = out[:, 3:7]
             turn[1:] *= np.cumprod(np.where((turn[1:] * turn[:-1]).sum(axis=1) < 0, -1.0, 1.0))[:, None]
         out = smoothed(out, loose, strength)
-        if self.robot.free_flyer:
+        if self.validator.robot.free_flyer:
             out[:, 3:7] = unit(out[:, 3:7])
         return replace(self, state=np.where(loose.any(axis=1, keepdims=True), out, self.state))
 
@@ -434,11 +429,11 @@ class RobotClip(Clip):
 
     def rest(self) -> Array:
         """Return the neutral configuration (nq,)."""
-        return np.asarray(self.robot.neutral)
+        return np.asarray(self.validator.robot.neutral)
 
     def laid(self, state: Array, rows: Ints) -> Array:
         """Return configurations (n, nq) with the root replaced by the root of some frames (n,)."""
-        root = 7 if self.robot.free_flyer else 0
+        root = 7 if self.validator.robot.free_flyer else 0
         return np.concatenate([self.state[rows, :root], state[:, root:]], axis=1)
 
     def pushed(self, rows: Ints, report: Report) -> Array:
@@ -446,7 +441,7 @@ class RobotClip(Clip):
 
         The root stays, and so do joints that do not move in the recording: its file may have no column for them.
         """
-        robot, model = self.robot, self.robot.model
+        robot, model = self.validator.robot, self.validator.robot.model
         lower, upper = robot.lower + INSIDE_LIMITS, robot.upper - INSIDE_LIMITS
         settings = self.validator.settings
         made_up = MADE_UP_METRES if robot.bodies == "capsules" and not settings.strict else 0.0

@@ -46,7 +46,8 @@ def in_own_file(
     """Return the user's table or arrays with the numbers that a repair changed.
 
     Columns are recognised by their numbers: a column, or the mean of two markers' columns, equals an entry of the
-    motion times a factor. Such a column changes as its entry does; all other columns and all names stay.
+    motion times a factor. Such a column changes as its entry does; all other columns and all names stay. Gaps of a
+    column are filled; gaps of the two markers of one joint are not.
 
     Parameters
     ----------
@@ -65,7 +66,6 @@ def in_own_file(
         A sentence about arrays that may depend on the configurations and were not changed.
     """
     groups = _groups(before, after)
-    steps = [np.nan_to_num(new - old[rows]) for old, new, _ in groups]
     stale: list[str] = []
 
     def change(columns: Array, names: list[str]) -> Array:
@@ -74,11 +74,15 @@ def in_own_file(
         if angles:
             out[:, angles] += _turned(before, after, rows)
             free = np.delete(free, angles)
-        for (old, _, kind), step in zip(groups, steps, strict=True):
+        for old, new, kind in groups:
             found, factor = _columns_of(columns[:, free], old, *kind)
+            entries = [entry for _, entry in found]
             for place, entry in found:
-                moving = np.abs(step[:, entry]) > TINY
-                out[moving, free[place]] += factor * step[moving, entry]
+                step = new[:, entry] - old[rows, entry]
+                filled = np.isnan(step) & np.isfinite(new[:, entry]) & (entries.count(entry) == 1)
+                out[filled, free[place]] = factor * new[filled, entry]
+                moving = np.abs(step) > TINY
+                out[moving, free[place]] += factor * step[moving]
             free = np.delete(free, [place for place, _ in found])
         if len(free) > len(names) / 2 and before.q is not None:
             stale.extend(dict.fromkeys(names))

@@ -51,12 +51,15 @@ def mended(clip: Clip, *, filled: bool = False) -> Clip:
 
     First the remedies for order, labels and jumps are tried; then rejected postures are replaced; then all remedies
     are tried, because wrong postures also cause trembling and sliding; then rejected postures are replaced again. If
-    `filled`, all rejected frames are interpolated at the start.
+    `filled`, all rejected frames, and unknown points of the other frames, are interpolated at the start.
     """
     if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
     if filled:
-        clip = clip.interpolated(binary_dilation(~clip.validator.check(clip.as_motion()).ok))
+        report = clip.validator.check(clip.as_motion())
+        clip = clip.interpolated(binary_dilation(report.invalid))
+        whole = clip.interpolated(~report.ok)
+        clip = replace(whole, state=np.where(np.isfinite(clip.state), clip.state, whole.state))
     for remedies in (REMEDIES[:N_CAUSES], REMEDIES):
         clip = _mended_over_time(clip, remedies).legal()
     return clip

@@ -244,8 +244,7 @@ def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
             whole = [clip.following(first) for clip, first in zip(clips, whole, strict=True)]
             after = _joined(clips, now)
             data, lost = _in_its_file(now, after, clips, facts)
-            pairs, several = zip(given, whole, strict=True), len(whole) > 1
-            notes = [note for one, clip in pairs for note in _told(one, clip, several=several)]
+            notes = [note for one, clip in zip(given, whole, strict=True) for note in _told(one, clip)]
             refused = f"the columns of {Path(motion.source).name} cannot hold the repair; joints are written"
             held = [(after, b"", [refused] if data else [])]
             if data:
@@ -281,8 +280,7 @@ def _in_its_file(
 ) -> tuple[bytes, list[str]]:
     """Return the repaired file, empty if its format cannot be kept, and notes about contents that were not changed."""
     if isinstance(before.document, Bvh):
-        options = Options(**{name: facts.get(name, "") for name in ("layout", "unit", "up")})
-        return in_bvh(clips[0], before.document, options) if len(after) == len(before) else b"", []
+        return in_bvh(clips[0], before.document, Options(**facts)) if len(after) == len(before) else b"", []
     if not Path(before.source).is_file():
         return b"", []
     of_clip = [np.flatnonzero(before.clip == index) for index in np.unique(np.asarray(before.clip))]
@@ -290,8 +288,8 @@ def _in_its_file(
     return in_own_file(before.source, before, after, np.concatenate(rows))
 
 
-def _told(given: Clip, clip: Clip, *, several: bool) -> list[str]:
-    """Return notes about changes and invented frames, preceded by the name of the clip if there are several."""
+def _told(given: Clip, clip: Clip) -> list[str]:
+    """Return notes about changes and invented frames, preceded by the name of the clip if it has one."""
     rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
     moved = np.nan_to_num(clip.state - given.state[rows])
     changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
@@ -313,7 +311,7 @@ def _told(given: Clip, clip: Clip, *, several: bool) -> list[str]:
     if not isinstance(clip, RobotClip) and not clip.mirrored:
         way = np.linalg.norm(moved[:, : len(JOINTS)], axis=-1).max(initial=0.0)
         notes.append(f"joints moved by up to {100 * way:.3g} cm")
-    return [f"{clip.motion.clips[0]}: {note}" for note in notes] if several else notes
+    return [f"{clip.motion.clips[0]}: {note}" for note in notes] if any(clip.motion.clips) else notes
 
 
 def _changed(count: int, frames: int) -> str:
