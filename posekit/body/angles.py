@@ -32,13 +32,13 @@ STRAIGHT_LIMB_SINE: Final = 1e-10
 #: Violation of limits for which a free angle is not turned: below the tolerance of the range check.
 NEGLIGIBLE_VIOLATION_RADIANS: Final = 1e-5
 
-#: Difference of violations below which two branches tie, as both do if the hinge is the worst.
+#: Difference of violations below which two branches tie, radians; they differ by rounding if the hinge is the worst.
 TIED_ANGLES_RADIANS: Final = 1e-8
 
 #: Angles of a whole limb: three of its ball joint and one of its hinge.
 N_LIMB_ANGLES: Final = 4
 
-#: Plane of elevation (radians) at which the turn of an arm is cut: behind the back, on the other arm's side.
+#: Plane of elevation at which the turn of an arm jumps, radians: behind the back, on the other arm's side.
 SEAM: Final = np.radians(-115.0)
 
 HIP_FLEXIONS: Final = tuple(DOFS.index(f"{side}_hip.flexion") for side in SIDES)
@@ -108,7 +108,7 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Limits of all 22 angles. They choose among the branches; a free angle is turned into them.
+        Limits of all 22 angles. They decide among the branches; a free angle is set inside its limits.
     head_offsets : array (5, 3)
         From the neck to the head's points, head link's frame, metres.
     middle_pelvis : bool
@@ -178,9 +178,9 @@ class ClosedForm:
 
     @cached_property
     def _choosing(self) -> Limits:
-        """Limits that choose among branches: hip flexions against the spine, of which the pelvis has an unknown part.
+        """Limits that decide among branches; with a pelvis between the hips, hip flexion includes pelvis flexion.
 
-        Turning the hips about their own line changes no other angle of a leg.
+        The share of the pelvis is unknown. Turning the hips about the line between them changes only hip flexion.
         """
         if not self.middle_pelvis:
             return self.limits
@@ -223,7 +223,7 @@ def ball_angles(R: Array, limits: Limits) -> Array:
 
 
 def ball_branch(R: Array, branch: int = 0) -> Array:
-    """Return the three angles (N, 3) of rotations (N, 3, 3) in one Euler branch; the first has cos beta >= 0."""
+    """Return the three angles (N, 3) of rotations (N, 3, 3) in one Euler branch; branch 0 has cos beta >= 0."""
     alpha, beta = direction_branches(-R[:, :, 2])[branch].T
     # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
     x, y, _ = into_ball(R[:, :, 0], alpha, beta).T
@@ -231,7 +231,7 @@ def ball_branch(R: Array, branch: int = 0) -> Array:
 
 
 def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
-    """Return the four angles (N, 4) of limbs in the branch whose cos beta and epsilon are not negative.
+    """Return alpha, beta, gamma and epsilon (N, 4), radians, in the branch with cos beta >= 0 and epsilon >= 0.
 
     Parameters
     ----------
@@ -292,9 +292,9 @@ def _upper_angles(upper: Array, limits: Limits) -> Array:
 
 
 def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
-    r"""Return elevation, plane and turn of an arm without rotation (N,), radians.
+    r"""Return elevation, plane of elevation, and turn of an arm without axial rotation (N,), radians.
 
-    The turn is the twist of the swing-twist decomposition less what an arm gathers when it is carried around the
+    The turn is the twist of the swing-twist decomposition less the twist of an arm that is carried around the
     vertical: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)
     - (1 - \cos e)(90^\circ - p)`.
     """

@@ -66,7 +66,10 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
 
 
 def trunk_frames(points: Array, middle_pelvis: bool = False) -> tuple[Array, Array]:
-    """Return the frames of torso and hips (N, 3, 3) of postures (N, 14 or more, 3); see `hips_frame` for the pelvis."""
+    """Return R_cam_torso and R_cam_hips (N, 3, 3) of postures (N, 14 or more, 3).
+
+    `middle_pelvis` tells whether the pelvis is between the hips: see `hips_frame`.
+    """
     hips = (*HIPS, "neck") if middle_pelvis else HIPS
     torso_points, hips_points = ([points[:, JOINT[joint]] for joint in part] for part in (TORSO, hips))
     return torso_frame(*torso_points), hips_frame(*hips_points)

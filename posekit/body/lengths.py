@@ -110,7 +110,7 @@ def segment_lengths(joints: Array) -> dict[str, float]:
 
 
 def shoulders_are_behind(joints: Array) -> bool | None:
-    """Tell on which side of the line from neck to pelvis the shoulders of postures (N, 14, 3) lie; None if unseen.
+    """Return whether the shoulders of postures (N, 14, 3) lie behind the line from neck to pelvis; None if unknown.
 
     Lengths do not distinguish a torso from its mirror image.
     """
@@ -174,7 +174,7 @@ def hips_points(lengths: Lengths) -> Array:
 
 
 def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: float = 3.0) -> bool:
-    r"""Tell whether uncertain lengths distinguish a torso from its mirror image.
+    r"""Return whether uncertain lengths distinguish a torso from its mirror image.
 
     The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. Small
     errors of the lengths change :math:`f^2`, and so the deviation of f is that of :math:`f^2` over :math:`2 f`.
@@ -343,9 +343,9 @@ def middle_neck(lengths: Lengths) -> dict[str, float]:
 
 
 def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Return depth, radius and place across of right and left shoulder, and the square of their place forward.
+    """Return height below the neck, distance from the spine and leftward position of right and left shoulder, metres.
 
-    The square is negative if the six distances fit into no space.
+    The third value is the square of their forward position, negative if the six distances contradict each other.
     """
     right = _apex("neck", "right_shoulder", "pelvis", lengths)
     left = _apex("neck", "left_shoulder", "pelvis", lengths)
@@ -362,7 +362,7 @@ def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, f
 
 
 def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, float]:
-    """Return the third corner of a triangle: its place along the line start-end, and its distance from that line."""
+    """Return the position of a triangle's corner along the line from start to end, and its distance from that line."""
     base, near, far = (
         lengths[f"{a}-{b}"] if f"{a}-{b}" in lengths else lengths[f"{b}-{a}"]
         for a, b in ((start, end), (start, apex), (apex, end))
@@ -376,7 +376,7 @@ def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, flo
 
 
 def _nearest(names: tuple[str, ...], lengths: Lengths, known: LengthUncertainty) -> dict[str, float]:
-    """Return the lengths of a part's points, in a plane or on a line, that are nearest to those given."""
+    """Return the lengths of a flat torso, or of hips on one line, that are nearest to the given lengths, metres."""
     from scipy.optimize import least_squares
 
     own = np.array([known.own[name] for name in names])

@@ -18,10 +18,10 @@ from posekit.skeleton import SEGMENT_NAMES
 #: Segments that a bending spine and moving clavicles change in one person.
 NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 
-#: Relative deviations by which a bending spine and moving clavicles change one person's trunk.
+#: Relative deviations of one person's trunk lengths due to a bending spine and moving clavicles.
 #:
-#: They are those of DeepMimic's motion, whose spine bends, against each clip's medians (20 clips). CMU's (16 clips)
-#: hardly does: 0.2 % from neck to pelvis, 0.9 % from shoulders to pelvis.
+#: Measured on DeepMimic's motion, whose spine bends, against each clip's medians (20 clips). The spine of CMU's motion
+#: (16 clips) hardly bends: 0.2 % from neck to pelvis, 0.9 % from shoulders to pelvis.
 TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "left_shoulder-pelvis": 0.027}
 
 
@@ -128,7 +128,7 @@ MEASURED_LENGTHS: Final = LengthUncertainty(own=_varying(0.01, 0.02))
 #: For given lengths of a person whose accuracy is unknown.
 #:
 #: They come from a tape, another detector or another day: 2 % is the error that all lengths share, and 3 % the
-#: difference between a tape and joint centres. What a stature tells is `KNOWN_STATURE`.
+#: difference between a tape and joint centres. Lengths estimated from a stature have `KNOWN_STATURE`.
 STATED_LENGTHS: Final = LengthUncertainty(common=0.02, own=_varying(0.03, 0.04))
 
 #: For an adult of unknown lengths, with the figure's own.

@@ -1,6 +1,7 @@
 """Every posture behind a noisy view: the modes of the posterior of 14 joint positions.
 
-`solve` is the method; `Problem` is what is known before, `Modes` what is found, `Limits` the joint ranges.
+`solve` is the method. `Problem` holds the image points and the prior knowledge of a body, `Modes` the result, and
+`Limits` the joint ranges.
 """
 
 from posekit.solver.engine import backend as backend

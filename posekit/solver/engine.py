@@ -1,4 +1,4 @@
-"""The compiled solver where it was built, its NumPy reference elsewhere: one interface."""
+"""One interface to both solvers: the compiled one if it was built, otherwise its NumPy reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ except ImportError:
 
 
 def backend() -> str:
-    """Return which solver runs: ``compiled`` or ``reference``."""
+    """Return the name of the solver in use: ``compiled`` or ``reference``."""
     return "reference" if compiled is None else "compiled"
 
 
@@ -35,7 +35,7 @@ def _warn_once() -> None:
 
 
 def run(name: str, problem: Problem, *arguments: Any) -> Any:
-    """Call a function of `posekit.solver.reference`, or its compiled twin, about the frames of a problem."""
+    """Call a function of the compiled solver, or of `posekit.solver.reference`, on the frames of a problem."""
     if compiled is None:
         _warn_once()
         return getattr(reference, name)(problem, *arguments)

@@ -1,6 +1,6 @@
-r"""Joint ranges and their couplings in numbers: one implementation for the solver and for the check.
+r"""Joint ranges and their couplings as arrays of numbers, which the solver and the check of joint ranges share.
 
-A limb is judged by the four angles of its closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball
+A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball
 joint in the parent's frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. The same two
 directions can be written in up to four ways; the limb is legal if every angle of one writing is between its bounds.
 A bound is a constant, or a piecewise linear function of another angle (a coupling), and may shrink where other
@@ -42,7 +42,8 @@ READINGS: Final = ("elevation", "plane", "turn", "valgus")
 
 ELEVATION, PLANE, TURN, VALGUS = range(4, 8)
 
-#: Whether a lower segment that stands off away from the body reads as an internal rotation: arms, legs.
+#: Sign of the axial rotation that is read from a lower segment which leaves the hinge's plane away from the body: arms,
+#: legs.
 VALGUS_SIGNS: Final = np.array([-1.0, 1.0])
 
 #: Fraction of a range that a sinus leaves at the very end of another angle (dimensionless).
@@ -89,7 +90,7 @@ class Limits:
         above_hips: float = 0.1,
         pelvis_between_hips: bool = False,
     ) -> Limits:
-        """Make the numbers of a table of joint ranges.
+        """Convert a table of joint ranges.
 
         Parameters
         ----------
@@ -137,7 +138,7 @@ class Limits:
 
     @property
     def names(self) -> list[str]:
-        """Names of the angles that are judged (19,): three of the pelvis and four a limb, ``right_hip.flexion``."""
+        """Names (19,) of the angles that have limits: three of the pelvis, then four of each limb."""
         first = "shoulder.elevation" if self.numbers["by_elevation"] else KINDS[0][0]
         angles = [(first, *KINDS[0][1:]), KINDS[1]]
         limbs = [f"{name.split('_')[0]}_{angle}" for k, name in enumerate(LIMBS) for angle in angles[k // 2]]
@@ -146,7 +147,7 @@ class Limits:
     def read(
         self, limb: int, rotations: Array, tolerance: float = 0.0, writing: Ints | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Write limbs in their W ways: angles and bounds.
+        """Return the angles of limbs, and their bounds, in all W sets of Euler angles.
 
         Parameters
         ----------
@@ -157,12 +158,12 @@ class Limits:
         tolerance : float
             Radians that widen the sinus.
         writing : int array (N,), optional
-            The one writing that is wanted; all, if not given.
+            Number of the only set to return for each limb; all sets if not given.
 
         Returns
         -------
         value, lower, upper : array (N, W, 4)
-            Flexion or elevation, abduction, rotation, hinge, radians; unbounded where an angle is not judged.
+            Flexion or elevation, abduction, rotation, hinge, radians; bounds are infinite for an angle without limits.
         bend : array (N,)
             Sine of the hinge's bend.
         """
@@ -202,7 +203,17 @@ class Limits:
     def _bounds(
         self, limb: int, angles: Array, readings: list[Array], tolerance: float
     ) -> tuple[Array, Array, dict[int, Array], list[Array]]:
-        """Return bounds (N, W, 4) with couplings, those of an arm's turn by side, and what valgus adds by side."""
+        """Return the bounds of limbs with couplings and sinus applied.
+
+        Returns
+        -------
+        lower, upper : array (N, W, 4)
+            Bounds of the four angles, radians.
+        turns : dict of int to array (N, W)
+            Bounds of an arm's turn: 0 lower, 1 upper.
+        outward : list of two arrays (N, W)
+            Angles by which valgus widens the rotation's lower and upper bound, radians.
+        """
         n, kind, shape = self.numbers, limb // 2, angles.shape[:2]
         bounds = [np.broadcast_to(n["limit"][limb, :, k], angles.shape).copy() for k in range(2)]
         means = [np.broadcast_to(n["mean"][kind, :, k], angles.shape).copy() for k in range(2)]
@@ -236,11 +247,11 @@ class Limits:
         return bounds[0], bounds[1], turns, outward
 
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
-        r"""Return how far limbs are beyond their limits (N, 4), radians, and the writing that is judged (N,).
+        r"""Return the excess of limb angles over their limits (N, 4), radians, and the set of Euler angles used (N,).
 
-        The writing is the least violated one if not given. A rotation that is beyond by v counts
-        :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`: a straight limb has none. The same holds for the first angle at
-        its pole.
+        If no set is given in `writing`, the least violated one is used. A rotation that exceeds its limit by v counts
+        :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`, which vanishes for a straight limb, whose rotation is not
+        determined. The first angle is weighted in the same way near its pole.
         """
         value, lower, upper, _ = self.read(limb, rotations, writing=writing)
         above, below = value - upper, lower - value
@@ -255,7 +266,7 @@ class Limits:
 
 
 def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -> None:
-    """Write couplings and sinuses into the numbers."""
+    """Write the couplings and sinuses of a table of ranges into the record `n`."""
     couplings = ranges.get("coupling", ())
     longest = max((len(one["points"]) for one in couplings), default=0)
     if len(couplings) > MAX_COUPLINGS or longest > MAX_KNOTS:
@@ -279,16 +290,16 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -
 
 
 def _place(kind: int, angle: str) -> int:
-    """Return the number of an angle of a limb: the four of its closed form, then `READINGS`."""
+    """Return the index of a limb angle: 0 to 3 for the four angles of the closed form, from 4 on for `READINGS`."""
     return KINDS[kind].index(angle) if angle in KINDS[kind] else 4 + READINGS.index(angle.split(".")[1])
 
 
 def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
-    r"""Return by how much rotations read off the hinge's plane, radians, and whether the hinge is bent its own way.
+    r"""Return the error of rotations due to valgus, radians, and whether the hinge is bent in its natural sense.
 
-    The rotation is read from the lower segment. Where that stands off the plane by v, the reading is off by
-    :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`. Ranges of rotation are measured at a
-    right angle: what it is there (`square`) is in them.
+    The rotation is computed from the lower segment. If this segment leaves the hinge's plane by the angle v, the
+    rotation is wrong by :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`. Ranges of
+    rotation are measured at a bend of 90 degrees, so the error at that bend (`square`) is subtracted.
     """
     off, sine = np.maximum(end, 0.0), np.sin(hinge)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -299,7 +310,10 @@ def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
 def _round_off(
     n: NDArray[np.void], limb: int, angles: Array, bounds: list[Array], means: list[Array], slack: float
 ) -> None:
-    """Narrow the bounds of abduction, then of rotation, by how far the angles before are from their middles."""
+    """Narrow the bounds of abduction and rotation, in place, where the angles before them are far from their middles.
+
+    `slack` is the tolerance of angles, radians; it widens the ranges that measure the distance from the middle.
+    """
     limit, mean, power = n["limit"][limb], n["mean"][limb // 2], n["sinus"][limb // 2]
     used = np.zeros(angles.shape[:2])
     for place in range(3):

@@ -1,4 +1,4 @@
-"""The modes of a frame's posterior: which minima pass, which are one, how sure each is."""
+"""The modes of a frame's posterior: their evidence and covariance, and which minima are the same mode."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from posekit.solver import reference
 from posekit.solver.engine import run
 from posekit.solver.problem import RESIDUAL_NAMES, Problem
 
-#: Modes none of whose joints, relative to the neck, are farther apart are one.
+#: Two minima are the same mode if no joint, relative to the neck, differs by more than this.
 MERGE_DISTANCE_METRES: Final = 0.01
 
-#: Modes of which some joint, relative to the neck, is farther apart are never one.
+#: Two minima are different modes if any joint, relative to the neck, differs by more than this.
 MERGE_REACH_METRES: Final = 0.08
 
-#: Modes in reach whose difference d has :math:`d^T H d` below this are one: three standard deviations along the line
-#: between them. H is the information on all joints at once, so trunk and depth are given: a shared error of depth costs
-#: nothing, and does not widen the others.
+#: Two minima between both distances are the same mode if their difference d has :math:`d^T H d` below this value, the
+#: square of three standard deviations along the line between them. H is the information on all joints at once; it
+#: includes their correlations, so the error of depth that all joints share does not make limbs look uncertain.
 MERGE_CHI2: Final = 9.0
 
-#: Standard deviation of a position of which nothing is known.
+#: Standard deviation of the prior of every joint position.
 UNKNOWN_PLACE_METRES: Final = 10.0
 
 #: Standard deviation of a hidden joint about its mode.
@@ -93,7 +93,7 @@ class Modes:
         return np.asarray(run("covariance", self.problem, self.frame[rows], self.x[rows], KNOWN))
 
     def residuals(self) -> Mapping[str, Array]:
-        """Return the size of every residual of all modes (M,), standard deviations, by name.
+        """Return the absolute value of every residual of all modes (M,), in standard deviations, by name.
 
         Names are ``image right_wrist``, ``length neck-pelvis``, ``root``, ``size`` and ``limit right_elbow.flexion``.
         """
@@ -119,10 +119,10 @@ def distinct(
     within: float | Array,
     sure: bool = False,
 ) -> Flags:
-    """Return which bodies (N, 43), the best first in each group, differ from all that are kept before them.
+    """Return which bodies (N, 43), sorted by chi2 in each group, differ from every better body that is kept.
 
-    Bodies are one if none of the joints of `parts`, relative to the neck, is farther apart than `within`, a number or
-    (N,), metres. With `sure`, they are also one if the difference is no more than their uncertainty (`MERGE_CHI2`).
+    Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` metres, a number
+    or (N,). With `sure`, they are also the same if their difference is within their uncertainty (`MERGE_CHI2`).
     """
     near = np.broadcast_to(np.asarray(within, dtype=np.float64), group.shape)
     reach = MERGE_REACH_METRES if sure else 0.0

@@ -49,10 +49,10 @@ RESIDUAL_NAMES: Final = (
 
 #: A frame as the solver reads it.
 #:
-#: Image points are free of intrinsics and lens, x/z and y/z; before a scaled orthographic camera they are x and y in
-#: metres. `image` maps their errors to standard deviations. Both are zero where a joint is hidden. `root` is the neck,
-#: metres, `root_weight` the inverse square root of its covariance, zero if it is unknown. Other weights are one over
-#: standard deviations: of lengths, of the size (0 if the lengths are of the person's own size), of limits (radians).
+#: `ray` has image points x/z and y/z without intrinsics and lens distortion, or x and y in metres for a scaled
+#: orthographic camera. `image` maps errors of `ray` to standard deviations. Both are zero for a hidden joint. `root` is
+#: the neck, metres, and `root_weight` the inverse square root of its covariance, zero if the neck is unknown. The other
+#: weights are inverse standard deviations: of lengths, of the size (0 if the size is known), of limits (1/radians).
 #: `robust` is one over the square of `ROBUST_DEVIATIONS`, or 0 where image points have no gross errors.
 PROBLEM: Final = np.dtype(
     [
@@ -72,14 +72,14 @@ PROBLEM: Final = np.dtype(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """F frames to be solved, each alone.
+    """Image points and prior knowledge of F frames, which the solver treats one by one.
 
     Parameters
     ----------
     records : records (F,) of `PROBLEM`
-        The frames, before one kind of camera.
+        The frames, all seen by one kind of camera.
     limits : Limits, optional
-        Joint ranges that pull at postures beyond them.
+        Joint ranges; postures beyond them have residuals.
     """
 
     records: NDArray[np.void]
@@ -98,7 +98,7 @@ class Problem:
         limits: Limits | None = None,
         robust: bool = False,
     ) -> Problem:
-        """Lay out what a camera saw.
+        """Make the problem of image points that a camera saw.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Problem:
         limits : Limits, optional
             Joint ranges.
         robust : bool
-            Whether the image's residuals are bounded, for detectors, whose points may be gross errors.
+            Whether the residuals of image points are bounded; detectors make gross errors.
         """
         rays = camera.normalize(image)
         hidden = np.asarray(np.isnan(rays).any(axis=-1))
@@ -156,25 +156,25 @@ class Problem:
 
     @cached_property
     def seen_joints(self) -> Flags:
-        """Which joints have an image point (F, 14)."""
+        """Whether each joint has an image point (F, 14)."""
         return np.asarray((self.records["image"] != 0).any(axis=(2, 3)))
 
     @property
     def sized(self) -> Flags:
-        """In which frames the size of the lengths is not known (F,)."""
+        """Whether the size that all lengths share is unknown, by frame (F,)."""
         return np.asarray(self.records["size_weight"] > 0)
 
     @property
     def rooted(self) -> Flags:
-        """In which frames the position of the neck is known (F,)."""
+        """Whether the position of the neck is known, by frame (F,)."""
         return np.asarray((self.records["root_weight"] != 0).any(axis=2).all(axis=1))
 
     @property
     def freedom(self) -> Ints:
-        """Degrees of freedom of chi2 (F,): image coordinates and priors that are left over.
+        """Degrees of freedom of chi2 (F,): image coordinates and priors in excess of the unknowns.
 
-        A limb has as many unknowns as image coordinates, or more. What is left over are the torso's points and the
-        root against six unknowns, and the hips' points against three.
+        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. Torso points and
+        the root exceed the six unknowns of the torso's pose, and hip points the three of the hips' orientation.
         """
         seen = self.seen_joints
         priors = (self.records["root_weight"] != 0).any(axis=2).sum(axis=1) - self.sized

@@ -1,7 +1,7 @@
-"""The solver in NumPy: the same residuals, and the same steps, as `solver.cpp`, for all starts at once.
+"""The solver in NumPy: the residuals and steps of `solver.cpp` for all starts at once.
 
-Unknowns x (N, 43) are the 14 joint positions and the logarithm of the shared size. `parts` says which are free: bit 0
-the trunk (six joints and the size), bits 1 to 4 the limbs.
+Unknowns x (N, 43) are the 14 joint positions and the logarithm of the size that all lengths share. The bits of `parts`
+select the unknowns that are free: bit 0 the trunk (six joints and the size), bits 1 to 4 the four limbs.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ from posekit.solver.problem import Problem
 #: Index of the size among the unknowns.
 SIZE: Final = 42
 
-#: Added to every diagonal element, one over square metres: a joint that is not seen has none of its own.
+#: Added to every diagonal element of the normal matrix, 1/m^2, so that it stays regular if a joint is hidden.
 FLOOR: Final = 1e-6
 
-#: Radians by which limb angles are moved to differentiate what is judged of them.
+#: Step of the finite differences of limit residuals with respect to limb angles, radians.
 ANGLE_STEP: Final = 1e-4
 
-#: Sine or cosine down to which the angles' derivatives follow the directions at a pole.
+#: Smallest sine or cosine by which derivatives of limb angles are divided: they are infinite at a pole.
 LEAST_SINE: Final = 0.02
 
-#: The same for the pelvis.
+#: Smallest cosine by which derivatives of pelvis angles are divided.
 LEAST_COSINE: Final = 0.05
 
-#: Metres by which joints are moved to differentiate residuals of the caller's own.
+#: Step of the finite differences of the caller's own residuals, metres.
 PULL_STEP: Final = 1e-6
 
-#: Damping of a first step and the least one, added to every diagonal element, one over square metres.
+#: Damping of the first step and smallest damping, added to every diagonal element, 1/m^2.
 #:
-#: All directions are damped alike: a share of the diagonal, which image and lengths make stiff, would also hold the few
-#: directions that these leave open.
+#: The damping is not a multiple of the diagonal. Image points and lengths make the diagonal large, so a multiple of it
+#: would also block steps in the few directions that image points and lengths do not determine.
 FIRST_DAMPING: Final = 30.0
 LEAST_DAMPING: Final = 1.0
 
-#: Damping up to which a small gain means that a start has arrived, and above which no step is tried.
+#: A start has converged only with a damping up to the first value; it is given up above the second value (1/m^2).
 ARRIVED_DAMPING: Final = 3e3
 MOST_DAMPING: Final = 1e6
 
-#: Decrease of chi2 below which a start has arrived.
+#: A start has converged if its next step promises a smaller decrease of chi2.
 PRECISION: Final = 1e-2
 
 #: Ends of the 17 segments, and the matrix (17, 14) that takes joints to segments.
@@ -61,7 +61,7 @@ INCIDENCE: Final = np.eye(14)[SEGMENT_ENDS] - np.eye(14)[SEGMENT_STARTS]
 #: Frames of `posekit.solver.problem.PROBLEM`.
 Records = NDArray[np.void]
 
-#: Residuals (N, K), standard deviations, of postures (N, 14, 3): zero where nothing pulls.
+#: Function that returns residuals (N, K), standard deviations, of postures (N, 14, 3); zero for a posture that fits.
 Pull = Callable[[Array], Array]
 
 
@@ -95,7 +95,10 @@ def free_joints(parts: int) -> Ints:
 
 
 def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | None = None) -> Normal:
-    """Return the normal equations of frames `which` (N,) at x (N, 43); chi2 is infinite where it is not defined."""
+    """Return the normal equations of frames `which` (N,) at x (N, 43).
+
+    chi2 is infinite if a seen joint is behind the camera, or if a value is not a number.
+    """
     records, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
     some, trunk = np.isin(SEGMENT_ENDS, free), parts & 1
     to_joints = np.concatenate([np.eye(14)[free], INCIDENCE[some]])[:, free]
@@ -159,9 +162,10 @@ def image_terms(records: Records, joints: Array) -> tuple[Array, Array, Flags]:
 
 
 def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) -> tuple[Array, Array, Array]:
-    """Return residuals (N, S) of the log-lengths of some segments, and derivatives (N, S, 3) along these.
+    """Return residuals (N, S) of the log-lengths of some segments, and their derivatives (N, S, 3) along the segments.
 
-    The third array is the curvature (N, S, 3, 3) of a segment that turns, kept where it is positive.
+    The third array is their curvature (N, S, 3, 3): a segment that turns becomes longer. Negative curvature is set to
+    zero.
     """
     line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
     square, w = dot(line, line), records["length_weight"][:, some]
@@ -171,9 +175,10 @@ def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) 
 
 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
-    """Yield angles beyond their limits, radians, zero within: of the pelvis (N, 3), then of each limb (N, 4), as free.
+    """Yield the excess of angles over their limits, radians, and its derivatives along the joints.
 
-    Derivatives along the joints are (N, 3, 14, 3) and (N, 5, 14, 3): see `_limb_slopes`.
+    The first pair (N, 3), (N, 3, 14, 3) is of the pelvis, if the trunk is free; a pair (N, 5), (N, 5, 14, 3) of each
+    free limb follows. The fifth row of a limb is curvature without a residual: see `_limb_slopes`.
     """
     frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
@@ -197,7 +202,7 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Arr
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
-    """Add the derivative of the turn of torso or hips, weighted with w (M, K, 3), to `d` (M, K, 14, 3)."""
+    """Add to `d` (M, K, 14, 3) the derivatives of w (M, K, 3) times the rotation vector of torso or hips."""
     forward, left, up = (R[:, None, :, k] for k in range(3))
     between = bool(limits.numbers["between_hips"])
     (a, b), (s, t) = ((0, 3), (1, 2)) if torso else ((4, 5), (0, 3) if between else (3, 4))
@@ -211,7 +216,7 @@ def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w:
 
 
 def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, some: Flags) -> Array:
-    """Return derivatives (N, 3, 14, 3) of some (N, 3) of the pelvis's angles along the joints, zero elsewhere."""
+    """Return the derivatives (N, 3, 14, 3) of the pelvis angles along the joints; zero except for `some` (N, 3)."""
     left, up = torso[:, :, 1], hips[:, :, 2]
     lean = dot(left, up)[:, None]
     square = np.maximum(1 - lean * lean, LEAST_COSINE**2)
@@ -226,10 +231,10 @@ def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, som
 def _limb_slopes(
     limits: Limits, joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array
 ) -> Array:
-    """Turn slopes (M, 4, 4) along a limb's four angles into derivatives (M, 5, 14, 3) along the joints.
+    """Convert derivatives (M, 4, 4) of a limb's residuals along its angles into derivatives along the joints.
 
-    The last row is curvature: the limb's turn about an elbow or knee that is almost straight and `bent` (M,) radians
-    beyond its end. How far it is bent grows on all sides, as the length of a segment that turns.
+    Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians: if an elbow or
+    knee is almost straight, moving its end sideways in any direction increases the bend to second order.
     """
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
     upper, lower = (one[:, None] for one in lim.limb_directions(joints, limb))
@@ -267,8 +272,8 @@ def descend(
 ) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts by Levenberg-Marquardt.
 
-    A refused step has met limits that are not violated where it started. They hold for the next step, too; otherwise
-    it would run into them again.
+    A step that is refused may have run into joint limits that its start does not violate. These limits are added to
+    the model of the next step, which would otherwise run into them again.
 
     Parameters
     ----------
@@ -283,22 +288,23 @@ def descend(
     most : int
         Largest number of steps.
     hopeless : array (N,)
-        A start whose chi2 is above this is given up if its step promises less than half of it.
+        A start whose chi2 is above this value is given up if its next step promises to remove less than half of it.
     damping : array (N,)
-        Damping of the first step: `FIRST_DAMPING`, or that of an earlier descent's end; infinite for no step.
+        Damping of the first step, 1/m^2: `FIRST_DAMPING`, or the final damping of an earlier descent. A start with
+        infinite damping stays where it is.
     pull : callable, optional
         Further residuals of whole bodies.
 
     Returns
     -------
     x, chi2, damping : array (N, 43), (N,), (N,)
-        Damping is infinite where a start has arrived or is given up.
+        Damping is infinite if a start has converged or is given up.
     """
     column = np.append((3 * free_joints(parts)[:, None] + np.arange(3)).ravel(), SIZE)
     x, damping = np.array(start, dtype=np.float64), np.array(damping, dtype=np.float64)
     refused = np.zeros(len(x), dtype=np.bool_)
     here = evaluate(problem, which, x, parts, pull)
-    # The model of the next step: what is here, and limits that a refused step has met.
+    # The model of the next step: the normal equations at x, and limits that a refused step has met.
     matrix, gradient = here.matrix.copy(), here.gradient.copy()
     live = np.flatnonzero(np.isfinite(here.chi2 + damping))
     for _ in range(most):
@@ -336,7 +342,7 @@ def descend(
 
 
 def information(problem: Problem, which: Ints, x: Array, known: Array, parts: int = 31) -> Array:
-    """Return the information (N, C, C) on the unknowns: the matrix of `evaluate` and prior knowledge.
+    """Return the information (N, C, C) on the unknowns: the matrix of `evaluate`, and priors of places and turns.
 
     `known` (3,) has three numbers: the information on the place of any joint, and of a hidden joint, both in 1/m^2; and
     the factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
@@ -379,10 +385,11 @@ def distinct(
     level: float,
     known: Array,
 ) -> Flags:
-    """Return which bodies (N,), the best first in each group, differ from all that are kept before them.
+    """Return which bodies (N,), sorted by chi2 in each group, differ from every better body that is kept.
 
-    Bodies are one if none of the joints of `parts`, relative to the neck, is farther than `within` (N,) apart; or none
-    farther than `reach`, and :math:`d^T H d` of their difference is below `level`.
+    Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` (N,) metres.
+    They are also the same if no joint differs by more than `reach` metres and their difference d has
+    :math:`d^T H d` below `level`.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
     free = free_joints(parts)

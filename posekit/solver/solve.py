@@ -1,4 +1,4 @@
-"""The method: trunks first, limbs on each trunk, whole bodies of the combinations that can pass, modes."""
+"""The method: minimise chi2 of trunks, then of limbs on each trunk, then of whole bodies that combine both."""
 
 from __future__ import annotations
 
@@ -15,42 +15,43 @@ from posekit.solver.problem import ROBUST_DEVIATIONS, Problem
 from posekit.solver.reference import Pull
 from posekit.solver.starts import limb_starts, trunk_starts
 
-#: Probability with which noise alone exceeds the largest chi2 that passes.
+#: Probability that noise alone makes chi2 too large to pass.
 REJECTION_PROBABILITY: Final = 1e-3
 
-#: Steps after which trunks, and whole bodies, that approach each other are merged.
+#: Number of steps after which trunks, or whole bodies, that are close to each other are merged.
 FIRST_STEPS: Final = 4
 
-#: Trunks none of whose joints, relative to the neck, are farther apart are one.
+#: Two trunks are the same if no joint, relative to the neck, differs by more than this.
 SAME_TRUNK_METRES: Final = 0.03
 
-#: Limbs on one trunk neither of whose joints is farther apart are one, by the number of hidden joints among the two.
+#: Two limbs on one trunk are the same if neither joint differs by more than this: no, one or two hidden joints.
 #:
-#: Every position of a hidden joint within its limits fits: what is kept are representatives.
+#: Every position of a hidden joint within its limits fits, so only representatives are kept.
 SAME_LIMB_METRES: Final = np.array([0.02, 0.25, 0.45])
 
-#: Largest chi2 of a limb on a fixed trunk that the whole body may still meet.
+#: Largest chi2 of a limb on a fixed trunk: the trunk may still move to fit the limb.
 LOOSE_LIMB: Final = 300.0
 
-#: The same for the sum of trunk and limbs.
+#: Largest sum of the chi2 of trunk and limbs that is combined into a whole body.
 LOOSE_BODY: Final = 600.0
 
-#: Multiple of the largest chi2 that passes, above which a body is given up once its steps promise less than half.
+#: A body is given up if its chi2 is above this multiple of the largest that passes, and its next step promises to
+#: remove less than half of it.
 HOPELESS: Final = 2.0
 
-#: The same for a trunk.
+#: The same multiple for a trunk without limbs.
 HOPELESS_TRUNK: Final = 10.0
 
-#: Steps with residuals of the caller's own, from modes without.
+#: Largest number of steps with the caller's own residuals.
 PULL_STEPS: Final = 15
 
 #: All parts: the trunk and the four limbs.
 WHOLE: Final = 31
 
-#: Whole bodies of a frame that are tried, the likeliest ones: more arise only where much is hidden.
+#: Largest number of whole bodies tried in a frame, the best ones; only frames with several hidden joints have more.
 MOST_BODIES: Final = 1500
 
-#: Degrees of freedom that chi2 is granted at least: limits and lengths add to it even where nothing is left over.
+#: Smallest number of degrees of freedom of chi2: limits and lengths also contribute to it.
 LEAST_FREEDOM: Final = 4
 
 
@@ -64,12 +65,12 @@ def solve(
     problem : Problem
         F frames; each is solved alone.
     max_chi2 : float, optional
-        Largest chi2 of a mode; if not given, the one that noise exceeds with `REJECTION_PROBABILITY`.
+        Largest chi2 of a mode. If not given, noise exceeds it with `REJECTION_PROBABILITY`.
     most : int, optional
         Largest number of modes a frame, the best ones; all if not given.
     pull : callable, optional
-        Further residuals (N, K) of postures (N, 14, 3), standard deviations, as of a check's bounds: zero where nothing
-        pulls. Modes are moved until they fit these, too.
+        Function that returns further residuals (N, K), standard deviations, of postures (N, 14, 3), such as the excess
+        over a check's bounds. Modes are refined with these residuals.
 
     Returns
     -------
@@ -113,9 +114,9 @@ def _best(problem: Problem, most: Array, frame: Ints, x: Array, chi2: Array, par
 def _minima(
     problem: Problem, passing: Array, frame: Ints, x: Array, parts: int, hopeless: float
 ) -> tuple[Ints, Array, Array]:
-    """Return the minima that starts reach and that pass: frames (M,), unknowns (M, 43), and chi2, the best first.
+    """Return the distinct minima whose chi2 passes: frames (M,), unknowns (M, 43) and chi2 (M,), sorted by chi2.
 
-    Starts that approach each other after a few steps go on as one.
+    Starts that are close to each other after `FIRST_STEPS` are merged.
     """
     damping = np.full(len(frame), reference.FIRST_DAMPING)
     for steps, level in ((FIRST_STEPS, np.inf), (40, 1.0)):
@@ -127,11 +128,11 @@ def _minima(
 
 
 def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array) -> tuple[Ints, Array]:
-    """Return whole bodies that limbs make on trunks: frames (B,) and unknowns (B, 43)."""
+    """Combine trunks with limbs into whole bodies: frames (B,) and unknowns (B, 43)."""
     open_ = problem.sized | ~problem.rooted
     if open_[frame].any():
-        # At the depth of a trunk alone a limb may be too short for its image, so that near and far fall together:
-        # each trunk is first moved to where its best limbs want it.
+        # At the depth of the trunk's own minimum a limb may be too short for its image; its near and far positions are
+        # then the same. So each trunk is first moved by a descent together with its best limbs.
         row, body = _combined(problem, frame, x, chi2, most=1)
         row, body = row[open_[frame[row]]], body[open_[frame[row]]]
         body, value, _ = descend(problem, frame[row], body, WHOLE, hopeless=HOPELESS * passing[frame[row]])
@@ -142,9 +143,9 @@ def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
 
 
 def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -> tuple[Ints, Array]:
-    """Put limbs on trunks in all combinations that can pass: trunks (B,) and unknowns (B, 43).
+    """Return all combinations of trunk and limbs that can pass: rows of the trunks (B,) and unknowns (B, 43).
 
-    Of each limb on a trunk, keep the `most` best positions.
+    Only the `most` best positions of each limb on a trunk are combined.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2

@@ -23,7 +23,6 @@ constexpr int D = 17, TRUNK = 6, T = 19, N = 43, SIZE = 42;
 constexpr int A[D] = {0, 0, 0, 3, 3, 1, 2, 6, 7, 4, 5, 10, 11, 1, 1, 2, 4};
 constexpr int B[D] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 2, 3, 3, 5};
 constexpr int LIMB_OF[J] = {-1, -1, -1, -1, -1, -1, 0, 1, 0, 1, 2, 3, 2, 3};
-inline double env(const char* n, double d) { const char* v = getenv(n); return v ? atof(v) : d; }
 constexpr double ANGLE_STEP = 1e-4, LEAST_SINE = 0.02;
 constexpr double FLOOR = 1e-6;  // added to every diagonal element, in 1/m^2: an unseen joint has none of its own
 // As in reference.py.
@@ -36,7 +35,7 @@ struct Problem {
   double size_weight, limit_weight, perspective, robust;
 };
 
-// Normal equations, and the violated limits among their rows: three of the pelvis, and four a limb.
+// Normal equations, and the rows of violated limits: three of the pelvis, and four of each limb.
 constexpr int ROWS = 19;
 struct Normal {
   double H[N][N], g[N], r[ROWS], d[ROWS][N];
@@ -86,7 +85,7 @@ void add_limit(Normal& n, int row, const double d[N], double r) {
 void put(double t[N], int joint, Vec v, double sign) {
   t[3 * joint] += sign * v.x, t[3 * joint + 1] += sign * v.y, t[3 * joint + 2] += sign * v.z;
 }
-// Derivative of a part's turn, weighted with w, along the trunk.
+// Adds the derivative of w times the rotation vector of torso or hips.
 void put_turn(double t[N], const Frame& R, bool between, Vec w) {
   Vec first, other;
   R.pull(w, first, other);
@@ -152,7 +151,7 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
       if (trunk) put(t, START[m], du, -1), put_turn(t, R, between, w);
       add_limit(*n, 3 + 4 * m + k, t, scale * r[k]);
     }
-    // A limb that bends too far about an almost straight joint turns about it (as `bend` of a length).
+    // Curvature of an almost straight joint that bends too far, as `bend` of a length.
     const double bent = std::max(r[3] * slope[3][3] * ce, 0.0) * ie;
     if (bent > 0) {
       double t[N] = {};
@@ -281,7 +280,7 @@ struct Factor {
       }
       cholesky<6>(L[m]);
       if (!(parts & 1)) continue;
-      int used[T], count = 0;  // a limb within its limits knows three coordinates of the trunk, and the size
+      int used[T], count = 0;  // a limb within its limits depends on three coordinates of the trunk, and the size
       for (int c = 0; c < T; ++c)
         for (int i = 0; i < 6; ++i)
           if (C[m][i][c] != 0) {
@@ -337,8 +336,8 @@ struct Factor {
   }
 };
 
-// Levenberg-Marquardt; returns chi2. A refused step has met limits that are not violated where it started: they hold
-// for the next one, too. `damping` is infinite in the end where x has arrived or is given up.
+// Levenberg-Marquardt; returns chi2. Limits that a refused step violates, but not its start, are added to the model of
+// the next step. `damping` is infinite in the end if x has converged or is given up.
 double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double hopeless,
                double& damping) {
   Normal three[3], *here = three, *there = three + 1, *ahead = three + 2;
@@ -380,8 +379,8 @@ double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int
   return chi2;
 }
 
-// Adds what is known besides the residuals: places at all, hidden joints about their modes, and turns of segments near
-// a right angle to their rays (see modes.py).
+// Adds the information of priors: on the place of every joint, on hidden joints about their modes, and on turns of
+// segments near a right angle to their rays (see modes.py).
 void inform(Normal& n, const Problem& p, const double* at, unsigned parts, const double known[3]) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
   for (int j = 0; j < J; ++j)
@@ -492,7 +491,7 @@ py::array_t<double> log_determinants(py::array problems, py::object limits, Long
   return found;
 }
 
-// For bodies in order of preference within each group, whether each differs from all that are kept before: see modes.py.
+// Whether each body, sorted by chi2 in its group, differs from every better body that is kept: see modes.py.
 py::array_t<bool> distinct(py::array problems, py::object limits, Longs group, Longs which, Doubles at, unsigned parts,
                            Doubles within, double reach, double level, Doubles known) {
   const Problem* p = problems_of(problems);

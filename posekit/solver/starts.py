@@ -1,4 +1,4 @@
-"""Starts of the descents: near and far choices on the rays, times a few depths; many directions for hidden joints."""
+"""Starts of the solver: seen joints near and far on their rays, at a few depths; hidden joints in many directions."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TRUNK_SEGMENTS: Final = tuple(k for k, pair in enumerate(SEGMENTS) if max(pair) 
 #: The segment that lifts each joint from its parent.
 LIFTED: Final = {max(pair): k for k, pair in enumerate(SEGMENTS[:13])}
 
-#: Distances of a neck whose position is not known, as fractions of the largest at which the trunk fits its image.
+#: Distances at which an unknown neck starts, as fractions of the largest distance at which the trunk fits its image.
 DEPTHS: Final = np.array([1.02, 0.95, 0.87, 0.78, 0.68])
 
-#: Distance of a person of whose trunk no two joints are seen.
+#: Distance at which a neck starts if fewer than two joints of the trunk are seen.
 UNSEEN_TRUNK_METRES: Final = 5.0
 
 #: Directions in which a hidden joint starts from its neighbour.
@@ -35,12 +35,15 @@ def sphere(count: int) -> Array:
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
 
 
-#: Where hidden hips start beside those of a straight trunk, which pelvises turn by some 20 degrees (metres).
+#: Offsets of hidden hips from the hips of a straight trunk, metres: a pelvis turns by some 20 degrees.
 HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
 
 
 def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array, far: Flags | bool) -> Array:
-    """Return the end (N, 3) of segments on a joint's ray, near or far; the foot of the start if it is too short."""
+    """Return the ends (N, 3) of segments on a joint's ray, near or far.
+
+    If a segment is too short to reach the ray, its end is the point of the ray nearest to its start.
+    """
     o, d = (one[frame, joint] for one in problem.rays)
     foot = o + dot(start - o, d)[:, None] * d
     off = foot - start
@@ -49,11 +52,11 @@ def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array,
 
 
 def necks(problem: Problem) -> tuple[Ints, Array]:
-    """Return possible places of necks: their frames (K,), ascending, and positions (K, 3)."""
+    """Return start positions of necks (K, 3), metres, and their frames (K,), ascending."""
     rooted, p, (origins, directions) = problem.rooted, problem.records, problem.rays
     deep = (p["root_weight"][:, 2, 2] > 0) & problem.seen_joints[:, 0]
     known = rooted | deep | (not problem.perspective)
-    # Where only the depth is known, the neck is there on its ray.
+    # If only its depth is known, the neck is the point of its ray at that depth.
     root, origin, ray = (one[known] for one in (p["root"], origins[:, 0], directions[:, 0]))
     beside = origin + ((root - origin)[:, 2] / ray[:, 2])[:, None] * ray
     frames, places = [np.flatnonzero(known)], [np.where(rooted[known, None], root, beside)]
@@ -95,7 +98,7 @@ def branches(
 
 
 def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
-    """Return frames (S,), ascending, and trunks (S, 6, 3): near and far of each seen joint from every neck."""
+    """Return frames (S,), ascending, and trunks (S, 6, 3) with each seen joint near or far, from every neck."""
     frame, neck = necks(problem)
     trunk = np.zeros((len(frame), TRUNK, 3))
     trunk[:, 0] = neck
@@ -104,15 +107,16 @@ def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
         row, place = branches(problem, frame, joint, trunk[:, PARENTS[joint]], anywhere, 1)
         frame, trunk = frame[row], trunk[row]
         trunk[:, joint] = place
-        if joint in (3, 5):  # hips hang on the pelvis, which is placed before
+        if joint in (3, 5):  # a hidden pelvis is needed before the hips are lifted from it
             frame, trunk = _filled(problem, frame, trunk, slice(0 if joint == 3 else 4, joint + 1))
     return frame, trunk
 
 
 def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
-    """Place hidden joints of torso or hips by laying a trunk of the person's lengths onto the others, in several turns.
+    """Place the hidden joints of torso or hips: fit a straight trunk of the person's lengths to the seen joints.
 
-    Fewer than three joints leave a turn open: a point beside the trunk then ties it to one direction.
+    One or two seen joints leave a rotation open. The trunk is then fitted in `DIRECTIONS` rotations, by one more point
+    beside it.
     """
     seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
     seen[:, part] = problem.seen_joints[frame, part]
@@ -140,14 +144,14 @@ def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[I
 
 
 def _template(lengths: Array) -> Array:
-    """Return a trunk (6, 3) of 17 lengths that stands straight."""
+    """Return the joints (6, 3) of a straight trunk with given lengths (17,), metres."""
     named = dict(zip(SEGMENT_NAMES, lengths.tolist(), strict=True))
     torso, hips = torso_points(named), hips_points(named)
     return np.concatenate([torso, torso[3] + hips[1:]])
 
 
 def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
-    """Return trunks (S,), ascending, and middle and end (S, 2, 3) of one limb from each of them.
+    """Return start positions (S, 2, 3) of elbow and wrist, or knee and ankle, and their trunks (S,), ascending.
 
     Parameters
     ----------
@@ -158,7 +162,7 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     trunk : array (T, 6, 3)
         Metres.
     limb : int
-        Of `posekit.solver.limits.LIMBS`.
+        Index in `posekit.solver.limits.LIMBS`.
     """
     start, ways = trunk[:, STARTS[limb]], sphere(DIRECTIONS)
     around = np.broadcast_to(ways, (len(frame), *ways.shape))
