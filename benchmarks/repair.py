@@ -5,7 +5,8 @@
 Faults are put into the text of the files, in a span of frames, so that nothing of posekit's own
 representation is used. Clips are those that pass without a fault; cases those that do not pass with it.
 Kept: the hierarchy with all names and channels, the number of frames, and the lines of frames outside of
-the span. Without ``--data`` the sample walk is used.
+the span. A slide displaces all frames after it, so that at best the larger side of the span is kept. Without
+``--data`` the sample walk is used.
 """
 
 from __future__ import annotations

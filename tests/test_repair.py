@@ -345,6 +345,7 @@ def test_gaps_of_a_table_are_filled_in_place(clean: posekit.Motion, tmp_path: Pa
     assert posekit.validate(path, up="+z").ok.sum() == FRAMES - 3
     done = repair(path, target, up="+z")
     assert posekit.validate(target, up="+z").ok.all(), done.notes
+    assert done.notes[:2] == ("3 of 90 frames changed", "3 frames interpolated")
     old, new = path.read_text().splitlines(), target.read_text().splitlines()
     assert [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b] == [41, 42, 43]
     for k in (41, 42, 43):

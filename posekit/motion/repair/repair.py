@@ -293,7 +293,7 @@ def _told(given: Clip, clip: Clip) -> list[str]:
     rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
     moved = np.nan_to_num(clip.state - given.state[rows])
     changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
-    changed |= rows != np.arange(len(rows))
+    changed |= filled | (rows != np.arange(len(rows)))
     ends = filled & (np.logical_and.accumulate(filled) | np.logical_and.accumulate(filled[::-1])[::-1])
     notes = [_changed(int(changed.sum()), len(clip))]
     for made, how in (
