@@ -23,9 +23,6 @@ DEPTHS: Final = np.array([1.02, 0.95, 0.87, 0.78, 0.68])
 #: Distance at which a neck starts if fewer than two joints of the trunk are seen.
 UNSEEN_TRUNK_METRES: Final = 5.0
 
-#: Directions in which a hidden joint starts from its neighbour.
-DIRECTIONS: Final = 30
-
 
 def sphere(count: int) -> Array:
     """Return unit vectors (count, 3) spread evenly over the sphere (Fibonacci lattice)."""
@@ -34,6 +31,9 @@ def sphere(count: int) -> Array:
     r = np.sqrt(1 - z * z)
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
 
+
+#: Directions (30, 3) in which a hidden joint starts from its neighbour.
+DIRECTIONS: Final = sphere(30)
 
 #: Offsets of hidden hips from the hips of a straight trunk, metres: a pelvis turns by some 20 degrees.
 HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
@@ -73,8 +73,7 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
         mean = np.einsum("fji,fj->fi", d[:, :TRUNK], seen[:, :TRUNK].astype(float))
         ray = np.where(seen[:, :1], d[:, 0], mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-9)[:, None])
         frames.append(np.repeat(open_, len(DEPTHS)))
-        places.append((farthest[:, None] * DEPTHS)[..., None] * ray[:, None])
-        places[-1] = places[-1].reshape(-1, 3)
+        places.append(((farthest[:, None] * DEPTHS)[..., None] * ray[:, None]).reshape(-1, 3))
     frame = np.concatenate(frames)
     order = np.argsort(frame, kind="stable")
     return frame[order], np.concatenate(places)[order]
@@ -127,7 +126,7 @@ def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[I
         body = np.stack([_template(one) for one in np.exp(problem.records["log_length"][frame[rows]])])
         given = trunk[rows][:, pattern]
         source, target = body[:, pattern], given
-        for turn in sphere(DIRECTIONS) if pattern.sum() < 3 else np.zeros((1, 3)):
+        for turn in DIRECTIONS if pattern.sum() < 3 else np.zeros((1, 3)):
             if turn.any():
                 centre = (given if pattern.any() else trunk[rows, :1]).mean(axis=1, keepdims=True)
                 source = np.concatenate([body[:, pattern], body[:, :1] + [0.3, 0.1, 0.2]], axis=1)
@@ -164,15 +163,14 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     limb : int
         Index in `posekit.solver.limits.LIMBS`.
     """
-    start, ways = trunk[:, STARTS[limb]], sphere(DIRECTIONS)
-    around = np.broadcast_to(ways, (len(frame), *ways.shape))
-    row, middle = branches(problem, frame, MIDDLES[limb], start, around, DIRECTIONS)
+    start, count = trunk[:, STARTS[limb]], len(DIRECTIONS)
+    around = np.broadcast_to(DIRECTIONS, (len(frame), count, 3))
+    row, middle = branches(problem, frame, MIDDLES[limb], start, around, count)
     # Beyond a hidden joint the limb goes straight on, back, or at a right angle.
     upper = unit(middle - start[row])
     side = unit(cross(upper, np.where(np.abs(upper[:, 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])))
-    bent = np.stack([upper, -upper, side] * (DIRECTIONS // 3), axis=1)
+    bent = np.stack([upper, -upper, side] * (count // 3), axis=1)
     seen = problem.seen_joints[frame[row], MIDDLES[limb]]
-    around = np.where(seen[:, None, None], ways, bent)
-    hidden = np.where(seen, DIRECTIONS, 3)
-    again, end = branches(problem, frame[row], ENDS[limb], middle, around, hidden)
+    around = np.where(seen[:, None, None], DIRECTIONS, bent)
+    again, end = branches(problem, frame[row], ENDS[limb], middle, around, np.where(seen, count, 3))
     return row[again], np.stack([middle[again], end], axis=1)
