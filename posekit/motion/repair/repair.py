@@ -310,7 +310,7 @@ def _told(given: Clip, clip: Clip) -> list[str]:
     notes += [SAID[name] for name in dict.fromkeys(clip.done) if name in SAID]
     if not isinstance(clip, RobotClip) and not clip.mirrored:
         way = np.linalg.norm(moved[:, : len(JOINTS)], axis=-1).max(initial=0.0)
-        notes.append(f"joints moved by up to {100 * way:.3g} cm")
+        notes += [f"joints moved by up to {100 * way:.3g} cm"] if way > SEEN else []
     return [f"{clip.motion.clips[0]}: {note}" for note in notes] if any(clip.motion.clips) else notes
 
 
