@@ -44,7 +44,7 @@ class BatchRun(Record):
     done : tuple of Entry
         Inputs that were computed.
     kept : tuple of Entry
-        Inputs whose output was there.
+        Inputs whose output already existed.
     failed : tuple of Entry
         Inputs that are broken, each with its error.
     """

@@ -108,12 +108,12 @@ class Judgement(Record):
 
     @property
     def low(self) -> Array:
-        """Lower bounds (T, K) with the tolerance."""
+        """Lower bounds (T, K), including the tolerance."""
         return np.broadcast_to(self.lower - self.tolerance, self.value.shape)
 
     @property
     def high(self) -> Array:
-        """Upper bounds (T, K) with the tolerance."""
+        """Upper bounds (T, K), including the tolerance."""
         return np.broadcast_to(self.upper + self.tolerance, self.value.shape)
 
     @cached_property

@@ -373,7 +373,7 @@ class Report(Record):
         return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
-        """Return for each check the numbers of rejected frames and clips, the most frequent place and the worst."""
+        """Return for each check the numbers of rejected frames and clips, its usual place, and its worst finding."""
         counts: dict[str, dict[str, Any]] = {}
         for k, name in enumerate(self.checks):
             found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}

@@ -87,7 +87,7 @@ class Person(Record):
 def person_of(joints: Array, lengths_of: Array) -> Person:
     """Measure the person in the frames of a recording (T, 14, 3), metres, with these lengths (17, T); NaN is unknown.
 
-    Numbers are rounded to 0.01 mm and whole degrees, so that clips of one skeleton have the same figure.
+    Lengths are rounded to 0.01 mm and angles to whole degrees, so that clips of one skeleton share one figure.
     """
     lengths = dict(zip(SEGMENT_NAMES, lengths_of, strict=True))
     known = {name: one[np.isfinite(one)] for name, one in lengths.items()}

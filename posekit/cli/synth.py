@@ -67,7 +67,7 @@ def walker(
     lean: float,
     phase: float,
 ) -> None:
-    """Walk past the camera of 1985 with the gait of Boulic, Thalmann & Thalmann 1990."""
+    """Make a person who walks past Lee & Chen's camera, with the gait of Boulic, Thalmann & Thalmann (1990)."""
     import math
 
     from posekit.synthesis import Walker, walker_view

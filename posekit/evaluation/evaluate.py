@@ -102,7 +102,7 @@ class Evaluation(Record):
         """Return the numbers of some frames, all by default: shares from 0 to 1, errors in millimetres.
 
         Shares count all frames, those without survivors included. Errors are means, medians and 95th percentiles over
-        frames that have survivors.
+        frames with at least one survivor.
         """
         chosen = np.arange(len(self)) if rows is None else rows
         table = {name: values[chosen] for name, values in self.columns.items()}

@@ -1,10 +1,10 @@
-"""One person through a sequence: the likeliest paths through the survivors of its frames.
+"""Most probable paths of one person through the frames of a sequence; a path takes one survivor of each frame.
 
-Every end of a path holds the body's position and velocity. It continues to every survivor of the next frame, or skips
-the frame. While there are few paths, all are kept, and the cheapest is exact. If several paths end in the same
-survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with a filter for
-each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the probability
-of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+The state at the last frame of every path is the body's position and velocity. It continues to every survivor of the
+next frame, or skips the frame. While there are few paths, all are kept, and the cheapest is exact. If several paths end
+in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with a
+filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the
+probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
 """
 
 from __future__ import annotations

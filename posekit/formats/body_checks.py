@@ -293,7 +293,7 @@ def _check_depth(body: Array, source: str) -> None:
             if np.ptp(known[:, k]) == 0:
                 got = f"{known[0, k]:g} for every joint in every frame"
                 remedy = "these are points in a picture: recover them, and give the result"
-                raise refusal(source, f"{'xyz'[k]} coordinate", got, "points in space", remedy)
+                raise refusal(source, f"{'xyz'[k]} coordinate", got, "three coordinates that vary", remedy)
 
 
 def stature(body: Array) -> float:

@@ -22,7 +22,7 @@ def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
     corners : array (T, P, 3)
         Points that span the hulls; NaN where there is none.
     normal : array (3,)
-        Unit vector across the plane.
+        Unit normal of the plane.
 
     Returns
     -------

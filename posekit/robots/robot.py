@@ -186,7 +186,7 @@ class Robot(Record):
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of URDF and SRDF. A report identifies the robot by it."""
+        """SHA-256 of URDF and SRDF. A report identifies the robot by this value."""
         return hashlib.sha256(f"{self.urdf}\0{self.srdf or ''}".encode()).hexdigest()
 
     @cached_property

@@ -84,8 +84,8 @@ def branches(
 ) -> tuple[Ints, Array]:
     """Return rows (S,), ascending, and ends (S, 3) of the segments that lift a joint from N starts.
 
-    A seen joint is placed near and far on its ray. A hidden one is placed in the first `hidden`, int or (N,), of the
-    directions `ways` (N, W, 3).
+    A seen joint is placed near and far on its ray. A hidden joint is placed in each of the first `hidden`, int or (N,),
+    of the directions `ways` (N, W, 3).
     """
     seen = problem.seen_joints[frame, joint]
     row = np.repeat(np.arange(len(frame)), np.where(seen, 2, hidden))

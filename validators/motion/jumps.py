@@ -121,7 +121,7 @@ APART_TIMES: Final = 2.0
 
 
 def displaced_by(joints: Array, step: float) -> Array:
-    """Return lasting displacements of the body in the slots of the displacement (S,), metres; NaN in other slots.
+    """Return the lasting displacement of the body (S,) in each slot of even time, metres; NaN in slots without one.
 
     Parameters
     ----------

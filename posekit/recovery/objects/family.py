@@ -95,7 +95,7 @@ class LinkageFamily(Record):
         Raises
         ------
         CameraError
-            If a scale is below the bound; the message names the segment and the scale that it needs.
+            If a scale is below its lower bound; the message names the segment that sets the bound, and the bound.
         """
         scale = np.asarray(s, dtype=np.float64)
         bound = self.minimum_scale

@@ -154,7 +154,7 @@ class Linkage(Record):
         )
 
     def segment(self, name: str) -> int:
-        """Return the index of a segment; ``b-a`` is ``a-b``.
+        """Return the index of a segment by its name; ``b-a`` names the same segment as ``a-b``.
 
         Raises
         ------
