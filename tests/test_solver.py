@@ -108,6 +108,7 @@ def test_engines_find_the_same_modes(monkeypatch, hidden):
     image[:2, [JOINTS.index(name) for name in hidden]] = np.nan
     problem = observed(image=image, length_deviation=0.02, size_deviation=0.02)
     fast = solve(problem)
+    evidence, covariance = fast.log_evidence, fast.covariance()
     monkeypatch.setattr(engine, "compiled", None)
     engine._warn_once.cache_clear()
     with pytest.warns(UserWarning, match="compiler"):
@@ -119,8 +120,9 @@ def test_engines_find_the_same_modes(monkeypatch, hidden):
         off(slow.joints[slow.frame == f], j).min() for f, j in zip(fast.frame, fast.joints, strict=True)
     ]
     assert max(nearest) < 1e-6
+    np.testing.assert_allclose(covariance, fast.covariance(), rtol=1e-5, atol=1e-9)
     H = reference.information(problem, fast.frame, fast.x, KNOWN)
-    np.testing.assert_allclose(fast.log_evidence, -fast.chi2 / 2 - np.linalg.slogdet(H)[1] / 2, atol=1e-3)
+    np.testing.assert_allclose(evidence, -fast.chi2 / 2 - np.linalg.slogdet(H)[1] / 2, atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", PROBLEMS)
