@@ -81,6 +81,14 @@ LIMB_JOINTS: Final = tuple(
     for side in SIDES
 )
 
+#: Length of each limb segment as a fraction of stature: Drillis & Contini 1966, "Body segment parameters", Technical
+#: Report 1166.03, New York University, as reprinted in Winter, "Biomechanics and Motor Control of Human Movement"
+#: (figure 4.1).
+LIMB_SHARES: Final = {
+    **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
+    **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
+}
+
 #: Upper arms, forearms, thighs and shanks, limb by limb, by their two joints.
 LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
 

@@ -67,3 +67,11 @@ def test_names_of_joints_are_known_and_each_given_once(name: str, got: str) -> N
     joints = np.asarray(walking(2).joints)
     with pytest.raises(posekit.InputError, match=f"joint_names: {got}; expected each once of neck, "):
         Motion(joints=joints, joint_names=(*POINTS[:-1], name))
+
+
+def test_json_holds_one_recording(tmp_path: Path) -> None:
+    joints = np.repeat(posekit.load_figure().neutral_points[None, :14], 4, axis=0)
+    two = posekit.Motion(joints=joints, clip=[0, 0, 1, 1], clips=("a", "b"))
+    with pytest.raises(posekit.InputError, match="2 recordings"):
+        posekit.save(two, tmp_path / "two.json")
+    assert not list(tmp_path.iterdir())

@@ -9,10 +9,9 @@ import posekit
 from posekit.body.inertias import inertias
 from posekit.body.lengths import stature_from_lengths
 from posekit.following.tracking import COMPARED, FALLOFF
-from posekit.formats import body_checks
 from posekit.ranking import standing
 from posekit.recovery.scales import ANNOTATION_SIGMAS
-from posekit.skeleton import JOINTS, POINTS
+from posekit.skeleton import JOINTS, LIMB_SHARES, POINTS
 from posekit.synthesis import Walker
 from posekit.validators.motion import ground
 
@@ -44,7 +43,7 @@ def test_shares_of_the_stature_are_those_of_winter() -> None:
     """Winter 2009, figure 4.1: foot 0.152 long, ankle 0.039 high, thigh 0.245, shank 0.246, hand 0.108."""
     shares = [ground.FOOT_SHARE, ground.ANKLE_SHARE, ground.LEG_SHARE, ground.HAND_SHARE]
     assert shares == pytest.approx([0.152, 0.039, 0.491, 0.108])
-    assert list(body_checks.LIMB_SHARES.values()) == pytest.approx([0.245, 0.246, 0.186, 0.146])
+    assert list(LIMB_SHARES.values()) == pytest.approx([0.186, 0.146, 0.245, 0.246])
 
 
 def test_parts_of_the_body_weigh_what_de_leva_says() -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from posekit.body.uncertainty import MEASURED_LENGTHS, LengthUncertainty
 from posekit.errors import FigureError, nearest, refusal, shown
 from posekit.geometry import Array, cross, known_median, unit
-from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
+from posekit.skeleton import JOINT, LIMB_SHARES, SEGMENT_NAMES, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
 
 #: Metres by segment name.
 Lengths = Mapping[str, float]
@@ -48,15 +48,8 @@ MAX_MOVED: Final = 0.2
 #: has a gradient.
 MIN_WIDTH_PART: Final = 0.25
 
-#: Length of each limb segment as a fraction of stature: Drillis & Contini 1966, "Body segment parameters", Technical
-#: Report 1166.03, New York University, as reprinted in Winter, "Biomechanics and Motor Control of Human Movement"
-#: (figure 4.1).
-LIMB_SHARES: Final = {
-    **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
-    **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
-}
-
-#: Width of the shoulders and of the hips, and height of the shoulders over the hips, by the same source.
+#: Width of the shoulders and of the hips, and height of the shoulders over the hips, as fractions of stature: Drillis
+#: & Contini 1966 (see `posekit.skeleton.LIMB_SHARES`).
 WIDTH_SHARES: Final = (0.259, 0.191)
 TRUNK_SHARE: Final = 0.818 - 0.530
 

@@ -12,7 +12,7 @@ from posekit.formats.layout import LIMBS, Layout, by_names, by_order, load_layou
 from posekit.formats.options import Options
 from posekit.geometry import FARTHEST_COORDINATE, UP_AXES, Array, Flags, Ints, up_vector
 from posekit.motion import Motion
-from posekit.skeleton import JOINT, JOINTS, SIDES
+from posekit.skeleton import JOINT, JOINTS, LIMB_SHARES, SIDES
 
 #: Metres in each unit of length that a user or a file can state.
 METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -25,12 +25,6 @@ UNIT_WORDS: Final = {
 #: Words for axes that point up, in lower case.
 UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
 
-#: Lengths as shares of stature: Drillis & Contini 1966, in Winter 2009, *Biomechanics and Motor Control of Human
-#: Movement*, fig. 4.1.
-LIMB_SHARES: Final = {
-    **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
-    **{("shoulder", "elbow"): 0.186, ("elbow", "wrist"): 0.146},
-}
 #: Statures of most recorded people: a body 67 units tall is in inches, not a toddler of 67 cm.
 USUAL_METRES: Final = (1.2, 2.2)
 #: Smallest and largest stature by which a unit is recognised: a toddler or a small robot, and a giant.

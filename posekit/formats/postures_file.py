@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.errors import refusal
 from posekit.formats import json_file
 from posekit.formats.json_file import nullable
 from posekit.formats.node import Node, schema_of
@@ -114,6 +115,9 @@ def write(path: str | Path, motion: Motion, unit: str | None = None) -> None:
     InputError
         If the file cannot be written.
     """
+    if len(motion.clips) > 1:
+        remedy = "write csv or npz, or choose one"
+        raise refusal(path, "", f"{len(motion.clips)} recordings", "one for JSON", remedy)
     shared: dict[str, Any] = {"up": motion.up} if motion.up else {}
     if np.isfinite(motion.time).any():  # type: ignore[arg-type]
         shared["time"] = nullable(motion.time)  # type: ignore[arg-type]
