@@ -26,7 +26,7 @@ from posekit.recovery.recovery import Recovery
 from posekit.recovery.scales import figure_linkage, from_near, from_usual_distance
 from posekit.recovery.sight import SHARP_PIXELS, Sight, sight_of
 from posekit.settings import EXACT, MEASURED, PHOTOGRAPH, RecoverSettings
-from posekit.skeleton import HEAD_POINTS, RIGID_SEGMENTS
+from posekit.skeleton import HEAD_POINTS, RIGID_SEGMENTS, SEGMENTS
 from posekit.solver import Modes, Problem, solve
 from posekit.tree import grow
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
@@ -109,7 +109,9 @@ class _Conductor:
         chosen = chosen_checks(settings, of_robot=False, in_time=False)
         self.checks = [check for check in chosen if not getattr(check, "over_time", False)]
         self.exact = PostureJudge(person, settings, self.tolerance, self.up.direction)
-        nearer = read_nearer(figure_linkage(person), settings.nearer, len(view))
+        nearer = np.zeros((len(view), len(SEGMENTS)), dtype=np.int8)
+        if settings.nearer:
+            nearer[:] = read_nearer(figure_linkage(person), settings.nearer, len(view))
         self.found = Gathering(view, self.sight, person, settings, nearer)
 
     @cached_property
