@@ -17,6 +17,7 @@ from posekit.cli.command import (
     settings_from,
     settings_options,
 )
+from posekit.geometry import known_median
 from posekit.settings import RecoverSettings
 
 if TYPE_CHECKING:
@@ -126,10 +127,10 @@ def summary(recovery: Recovery, output: Path) -> list[str]:
     known = counts > 0
     if known.any():
         listed = np.array([len(rows) for rows in recovery.answer.representatives])[known]
-        sure = np.nanmedian(recovery.answer.sure[known])
+        sure = known_median(recovery.answer.sure[known])
         words = next((one for one in recovery.answer.sure_of if one), "position")
         lines.append(
-            f"median frame: {int(np.median(counts[known]))} postures, {int(np.median(listed))} that differ; "
+            f"median frame: {int(known_median(counts[known]))} postures, {int(known_median(listed))} that differ; "
             f"every joint of the answer is within 5 cm ({words}) with probability {probability(sure)}"
         )
         unlisted = int(np.sum(np.asarray(recovery.frames.unlisted)))

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.geometry.vectors import Array, Flags
+from posekit.geometry.vectors import Array, Flags, Ints
 
 #: Any two points align exactly with any two others: a distance needs three.
 MIN_ALIGNED_POINTS: Final = 3
@@ -176,7 +176,7 @@ def mean_known(values: Array) -> Array:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def known_median(values: Array) -> float:
+def known_median(values: Array | Ints) -> float:
     """Return the median of the known numbers of an array; NaN if there are none."""
     known = np.sort(values[np.isfinite(values)])
     # NumPy's median would load numpy.ma.

@@ -32,7 +32,7 @@ MAX_FLIPS, MAX_BLOCK_FLIPS = 1 << 15, 1 << 20
 RIGHT_ANGLE: Final = 1e-3
 
 #: Angles (rad) at which residuals are sampled; small ones resolve segments whose own bound is near the largest one.
-GRID: Final = np.unique(
+GRID: Final = np.sort(
     np.concatenate([np.linspace(0.0, math.pi / 2 - RIGHT_ANGLE, 240), np.geomspace(1e-5, 0.03, 36)])
 )
 
