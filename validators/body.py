@@ -125,7 +125,7 @@ class Body(Record):
         residual: Array | None = None,
         placed: bool = True,
     ) -> Body:
-        """Return the body of one recording.
+        """Return the `Body` of one recording: the data that its checks read.
 
         If the motion has configurations only, its joints are the points of `robot`; unknown if `placed` is False.
         """
@@ -223,7 +223,7 @@ class Body(Record):
 
     @cached_property
     def figure(self) -> Figure:
-        """The figure that positions are compared with: the base, with the person's lengths if people were measured."""
+        """The figure that positions are compared with: the base figure, or one of the measured person's lengths."""
         if not self.measured or not self.person.lengths:
             return self.base_figure
         return figure_of(self.base_figure, tuple(self.person.lengths.items()), self.person.behind)

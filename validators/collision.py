@@ -79,7 +79,7 @@ class Collision:
         return found
 
     def judge(self, body: Body) -> Judgement:
-        """Measure the distances of all pairs."""
+        """Measure the distances of all pairs of collision bodies."""
         capsules = body.figure.capsules
         at = {capsule.link: k for k, capsule in enumerate(capsules)}
         head = np.isfinite(body.head).any()

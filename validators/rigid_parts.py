@@ -35,8 +35,9 @@ class RigidParts:
         Pairs of joints; the check judges their distances.
     torso : bool
         Judge the shape of the torso too. For exact postures the check aligns the figure's torso with the posture's, as
-        the closed form of q does, and compares points. For other postures it judges only whether the shoulders lie on
-        the right side of the line from neck to pelvis, front or back: distances do not determine the side.
+        the closed-form computation of q does, and compares points. For other postures it judges only whether the
+        shoulders lie on the right side of the line from neck to pelvis, front or back: distances do not determine the
+        side.
     """
 
     name = "rigid-parts"

@@ -137,7 +137,7 @@ def draw(
 
 
 def _place_of_eye(azimuth: float | None, of_camera: bool) -> str:
-    """Say from where a picture is seen: an eye turned to the person's left is to the right of their camera."""
+    """Describe the direction of view in words; the person's left is on the right of the camera that faces them."""
     degrees = USUAL_AZIMUTH if azimuth is None else azimuth
     origin = "the camera" if of_camera else "the person's front"
     side = "right" if (degrees > 0) == of_camera else "left"

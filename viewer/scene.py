@@ -306,7 +306,7 @@ def pictures(
     InputError
         If the size cannot be drawn.
     ViewerError
-        If there is no browser, it fails, or a picture is flat.
+        If no browser is found, the browser fails, or a picture has a single colour.
     """
     Image = pillow()
     width, height = size

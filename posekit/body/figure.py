@@ -371,10 +371,10 @@ class Figure(Robot):
     ) -> Configurations:
         """Turn postures into configurations, in closed form.
 
-        All branches of the decomposition are tried; the one inside the limits is taken, else the one that
-        violates them least. If the posture has the figure's lengths, forward kinematics returns its joints; otherwise
-        the rigid parts are the figure's own, every segment keeps its direction, and `distance` tells how far
-        the two are apart. Every posture with 14 finite joints has a finite configuration.
+        Of all angles that give the same directions, those inside the joint limits are returned, else those that violate
+        them least. If the posture has the figure's lengths, forward kinematics returns its joints; otherwise the rigid
+        parts are the figure's own, every segment keeps its direction, and `distance` tells how far the two are apart.
+        Every posture with 14 finite joints has a finite configuration.
 
         Parameters
         ----------

@@ -279,8 +279,9 @@ def stature_from_lengths(lengths: Lengths) -> float:
 def lengths_from_stature(stature: float, reference: Lengths, *, key_points: bool = False) -> dict[str, float]:
     """Estimate the 17 lengths of a person of a given stature.
 
-    Limbs and widths are fractions of stature. The inner torso (neck, pelvis joint) has the reference figure's shape,
-    scaled across by the widths of shoulders and hips and along by the height of the shoulders above the hips.
+    Limbs and widths are fractions of stature. Neck and pelvis joint have the reference figure's proportions: their
+    sideways offsets scale with the widths of shoulders and hips, their heights with the height of the shoulders above
+    the hips.
 
     Parameters
     ----------

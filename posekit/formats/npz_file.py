@@ -224,7 +224,7 @@ class _Plain(pickle._Unpickler):
         self.stream, self.source, self.names = file, source, {**PLAIN_NAMES, **(extra or {})}
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return the object of a name that a pickle may use; refuse any other."""
+        """Return the object that a name in a pickle refers to, if it is allowed; refuse any other."""
         if (module, name) not in self.names:
             expected = "arrays, numbers, strings, lists and dicts"
             remedy = "save its arrays with numpy.savez"

@@ -27,7 +27,7 @@ def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
     Returns
     -------
     array (T,)
-        Metres; negative inside; NaN without a corner, or where the point is not known.
+        Signed distances, metres, negative inside; NaN if the hull has no corner or the point is unknown.
     """
     first = unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
     across = np.stack([first, np.cross(normal, first)], axis=1)

@@ -240,7 +240,7 @@ def _folded(lengths: Array, diagonal: float) -> Array:
 
 
 def _laid(lengths: Array, turns: Sequence[float] | Array) -> Array:
-    """Return the chain in a plane (6, 3), turning at each point of articulation."""
+    """Return the points (6, 3) of the flat chain, bent at each joint."""
     heading = np.radians(np.concatenate([[0.0], np.cumsum(turns)]))
     steps = lengths[:, None] * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1)
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])

@@ -58,7 +58,7 @@ class Up(Record):
 
     @staticmethod
     def level() -> Up:
-        """Return the direction for a level camera: opposite to the image's y axis."""
+        """Return the up direction of a level camera: opposite to the image's y axis."""
         source = f"assumed: a level camera, within {LEVEL_WITHIN_DEGREES:g} degrees"
         return Up(direction=np.array([0.0, -1.0, 0.0]), deviation=LEVEL_WITHIN_DEGREES, source=source)
 

@@ -121,7 +121,7 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
 
 
 def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
-    """Return the standard deviation (pixels) of image points, and whether points and lengths can be without error."""
+    """Return the standard deviation (pixels) of image points, and whether a view may be treated as exact."""
     usual = KEY_POINT_PIXELS if view.derived else UNSTATED_PIXELS
     stated = (settings.deviation, view.deviation, settings.length_deviation, view.length_deviation)
     return stated[0] or stated[1] or usual, not (view.derived or settings.refine or any(stated))

@@ -290,7 +290,7 @@ class Explained:
 
 @once
 def explained(body: Body) -> Explained:
-    """Return the defects of the frames of a body."""
+    """Return the defects of the time frames of a recording."""
     timeline = timeline_of(body)
     # Frames without a slot come last; no check judges them.
     order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")

@@ -184,7 +184,7 @@ class Incidence(Record):
 
     @staticmethod
     def of(linkage: Linkage, seen: NDArray[np.bool_]) -> Incidence:
-        """Return the matrices of a linkage; `seen` (S,) is true for segments with both ends in the image."""
+        """Return the incidence matrices of a linkage; `seen` (S,) marks segments with both ends in the image."""
         from scipy.sparse.csgraph import connected_components
 
         weights = linkage.place_nodes(np.eye(len(linkage.points)))
