@@ -10,7 +10,7 @@ from typing import Any, Final
 from posekit.errors import refusal, shown
 
 #: Suffixes of files in folders that hold neither motion nor key points.
-SKIPPED: Final = ".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .lock".split()
+SKIPPED: Final = ("", *".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .lock".split())
 
 
 def are_paths(given: Any) -> bool:
@@ -63,7 +63,8 @@ def _below(folder: Path) -> Iterator[Path]:
 
 def _is_hidden(file: Path, folder: Path) -> bool:
     parts = file.relative_to(folder).parts
-    return any(part.startswith((".", "__")) for part in parts) or file.suffix.lower() in SKIPPED
+    no_motion = file.is_file() and file.suffix.lower() in SKIPPED
+    return no_motion or any(part.startswith((".", "__")) for part in parts)
 
 
 def names_below(files: Iterable[str]) -> dict[str, Path]:

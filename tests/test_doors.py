@@ -320,3 +320,15 @@ def test_rows_of_a_robot_have_z_up_and_the_order_of_their_layout() -> None:
     assert "orientation" in turned.clips[0].reason  # upside down: the quaternion has another order
     read = posekit.validate(mujoco, urdf="g1", rate=50, layout="robot_qpos")
     np.testing.assert_allclose(read.worst, good.worst, atol=1e-9)
+
+
+def test_one_posture_follows_a_layout_as_a_batch_of_one_does() -> None:
+    posture = np.random.default_rng(0).normal(size=(22, 3))
+    one = posekit.validate(posture, layout="smpl_22")
+    np.testing.assert_array_equal(one.worst, posekit.validate(posture[None], layout="smpl_22").worst)
+
+
+def test_files_without_a_suffix_are_no_clips(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "walk.npz").write_bytes((folder / "walk.npz").read_bytes())
+    (tmp_path / "README").touch()
+    assert posekit.validate(tmp_path).decision == "keep 1 of 1 clip"

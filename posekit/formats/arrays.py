@@ -49,9 +49,12 @@ def has_layout(given: Any, layout: str | None) -> bool:
 def motion_of(values: Any, options: Options) -> Motion:
     """Read joints in space (T, J, 3), or configurations of a robot (T, nq), in the order of a layout."""
     values = numbers(values)
+    layout = load_layout(options.layout) if options.layout else None
+    if values.ndim == 2 and values.shape[1] == 3 and layout is not None and layout.points:
+        values = values[None]  # one posture
     if values.ndim != 2:
         return joint_arrays.read({"": values}, "array", options)
-    whole = load_layout(options.layout).fields.get("whole", {}) if options.layout else {}
+    whole = layout.fields.get("whole", {}) if layout is not None else {}
     return robot_tables.read({whole.get("sure", [""])[0]: values}, "array", options)
 
 
