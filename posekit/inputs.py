@@ -14,7 +14,7 @@ SKIPPED: Final = ("", *".md .py .png .jpg .jpeg .gif .mp4 .avi .html .pdf .log .
 
 
 def are_paths(given: Any) -> bool:
-    """Tell whether a path or several are given."""
+    """Return whether the argument is a path, or a list or tuple of paths."""
     several = given if isinstance(given, list | tuple) and given else [given]
     return all(isinstance(one, str | os.PathLike) for one in several)
 
@@ -75,7 +75,7 @@ def names_below(files: Iterable[str]) -> dict[str, Path]:
 
 
 def new_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return the path of a new or empty folder; refuse one that holds something."""
+    """Return the path of a new or empty folder; a folder that holds something is refused."""
     path = Path(folder)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise refusal(path, "", "something that exists", "a new or empty folder", "name another")

@@ -169,14 +169,8 @@ def test_noise_keeps_the_truth():
     assert off.min() < 0.3 * size
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("kind", ["coplanar", "collinear", "perpendicular"])
-def test_noise_keeps_the_truth_of_a_shape(kind, seed):
-    rng = np.random.default_rng(seed)
-    flat = np.array([[0, 0, 0], [3, 0, 0], [3, 2, 0], [1, 4, 0], [0.5, 2, 0]], dtype=float)
-    if kind == "collinear":
-        flat = np.array([[0, 0, 0], [1, 1, 0], [2, 0, 0], [3, 2, 0], [4, 0, 0]], dtype=float)
-    points = flat @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+def flat_linkage(points, kind):
+    """Return the chain through points in a plane, with the constraint that they satisfy."""
     names = [f"p{k}" for k in range(len(points))]
     segments = {
         pair: float(np.linalg.norm(points[k + 1] - points[k]))
@@ -187,7 +181,18 @@ def test_noise_keeps_the_truth_of_a_shape(kind, seed):
         "perpendicular": {"perpendicular": [("p0-p1", "p1-p2")]},
         "collinear": {"collinear": [names[::2]]},
     }[kind]
-    linkage = Linkage.from_names(name="flat", segments=segments, points=names, **shape)
+    return Linkage.from_names(name="flat", segments=segments, points=names, **shape)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["coplanar", "collinear", "perpendicular"])
+def test_noise_keeps_the_truth_of_a_shape(kind, seed):
+    rng = np.random.default_rng(seed)
+    flat = np.array([[0, 0, 0], [3, 0, 0], [3, 2, 0], [1, 4, 0], [0.5, 2, 0]], dtype=float)
+    if kind == "collinear":
+        flat = np.array([[0, 0, 0], [1, 1, 0], [2, 0, 0], [3, 2, 0], [4, 0, 0]], dtype=float)
+    points = flat @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+    linkage = flat_linkage(points, kind)
     size = float(linkage.lengths.max())
     image = (points[:, :2] + 0.002 * size * rng.normal(size=(5, 2))) * 50.0
     found = recover_object(linkage, [image], scale=50.0, tolerance=(0.02 * size, 0.02 * size))
@@ -248,17 +253,7 @@ def test_shape_fixes_the_scale(kind):
         flat = np.array([[0, 0, 0], [1, 1, 0], [2, 0, 0], [3, 2, 0], [5, 0, 0]], dtype=float)
     R, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     points = flat @ R.T
-    names = [f"p{k}" for k in range(len(points))]
-    segments = {
-        pair: float(np.linalg.norm(points[k + 1] - points[k]))
-        for k, pair in enumerate(itertools.pairwise(names))
-    }
-    shape = {
-        "coplanar": {"coplanar": [names]},
-        "perpendicular": {"perpendicular": [("p0-p1", "p1-p2")]},
-        "collinear": {"collinear": [names[::2]]},
-    }[kind]
-    linkage = Linkage.from_names(name="flat", segments=segments, points=names, **shape)
+    linkage = flat_linkage(points, kind)
     found = search(LinkageFamily(linkage=linkage, image=points[:, :2] * 30.0), {kind: 1.0})
     assert np.abs(found.s[found.residual < 1e-18] / 30.0 - 1).min() < 1e-6
 

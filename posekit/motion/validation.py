@@ -145,7 +145,7 @@ class Judge:
             motion, frame = given, np.asarray(given.frame)
         else:
             if unit is not None and np.ndim(given) == 3:
-                given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit", "m, cm, mm or in")
+                given = np.asarray(given, dtype=np.float64) * number(f"1{unit}", "unit")
             motion = self.validator("").motion(given)
             if rate and motion.q is not None and motion.robot != "figure":
                 up = up or "+z"  # of URDFs (REP-103)
