@@ -595,16 +595,19 @@ def test_angles_of_more_than_a_turn_are_degrees(tmp_path: Path, size: float, deg
     np.testing.assert_allclose(found.q[:, knee], np.radians(size) if degrees else size)
 
 
-def test_joints_that_a_robots_table_lacks_are_zero_and_said(tmp_path: Path) -> None:
+def test_joints_that_a_robots_table_lacks_are_neutral_and_said(tmp_path: Path) -> None:
     motion = squatting(yaw=0.6)
     from posekit.formats.layout import load_layout
 
     used = [motion.q_names.index(name) for name in load_layout("g1_23").fields["joints"]]
     np.savetxt(tmp_path / "g1.csv", motion.q[:, [*range(7), *used]], delimiter=",")
     found = posekit.open(tmp_path / "g1.csv")
-    order = [found.q_names.index(name) for name in motion.q_names]
-    assert np.allclose(found.q[:, order], motion.q)
-    assert any("waist_roll_joint" in note and "set to 0" in note for note in found.notes)
+    assert found.robot == "g1" and found.q_names == tuple(motion.q_names[k] for k in [*range(7), *used])
+    q, notes = posekit.load_robot("g1").q_from_columns(found.q_names, found.q)
+    assert np.allclose(q, motion.q)
+    assert any("waist_roll_joint" in note and "neutral" in note for note in notes)
+    report = posekit.validate(tmp_path / "g1.csv", rate=30)
+    assert any("waist_roll_joint" in note for note in report.notes)
 
 
 def test_bones_seed_is_in_centimetres_and_degrees(tmp_path: Path) -> None:

@@ -325,6 +325,24 @@ def other_branch(angles: Array) -> Array:
     return turned
 
 
+def continuous(angles: Array) -> Array:
+    """Choose among the angles (T, J, 3) of the same rotations those that jump least from frame to frame.
+
+    The first frame stays; no step is a full turn, and none goes to the other branch a + pi, pi - b, c + pi (Diebel
+    2006, *Representing Attitude*, section 5.6).
+    """
+    angles = np.array(angles, dtype=np.float64)
+    if len(angles) < 2:
+        return angles
+    # A frame's branch against the one before is the same for both branches of that one: parity adds up.
+    step = turned_near(np.diff(angles, axis=0), 0.0)
+    other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)
+    odd = np.zeros(angles.shape[:2], dtype=bool)
+    odd[1:] = np.cumsum((other**2).sum(axis=-1) < (step**2).sum(axis=-1), axis=0) % 2 == 1
+    angles[odd] = other_branch(angles[odd])
+    return np.unwrap(angles, axis=0)
+
+
 def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
     """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment after two turns."""
     across = np.hypot(local[:, 0], local[:, 1])

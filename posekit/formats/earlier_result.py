@@ -1,4 +1,4 @@
-"""``posekit.result/2``, the format of earlier versions: its JSON is converted to a document of ``result/3``.
+"""``posekit.result/2``, the format of earlier versions: its JSON and NPZ are converted to a document of ``result/3``.
 
 ``result/2`` stores no joints of the answer; the joints of the first representative are used. Postures are sorted by
 decreasing probability, and the covariance of each joint becomes its radius.
@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.formats import json_file
 from posekit.formats.node import Node
 from posekit.geometry import PER_METRE
 from posekit.recovery.answer import joint_radius
@@ -18,15 +19,18 @@ from posekit.skeleton import JOINTS
 
 #: Entries of a symmetric matrix in a file: xx, xy, xz, yy, yz, zz.
 UPPER: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+#: Arrays of the NPZ with a row per posture, by the field of a posture in JSON.
+POSTURE_ARRAYS: Final = {
+    **{"joints": "joints", "q": "q", "branches": "branches", "group": "groups", "scale": "scales"},
+    **{"probability": "probability", "chi2": "refined/chi2", "covariance": "refined/covariance"},
+}
 ROOT_FIELDS: Final = ("method", "estimate", "deviation", "lower", "upper")
 
 
 def document_of(root: Node) -> dict[str, Any]:
     """Return the document of ``posekit.result/3`` for one of ``posekit.result/2``, in the file's unit."""
-    document: Mapping[str, Any] = root.value
-    if "frames" not in document:
-        raise root.refused("its JSON", "recover the view again", "posekit.result/2 as NPZ")
-    frames = [dict(frame.object()) for frame in root.at("frames").list(1)]
+    document: Mapping[str, Any] = _unpadded(root) if "count" in root.value else root.value
+    frames = [dict(frame.object()) for frame in Node(document, root.source).at("frames").list(1)]
     _add_radius([posture for frame in frames for posture in frame["postures"]])
     places = []  # by frame: the new number of each posture
     for frame in frames:
@@ -83,4 +87,53 @@ def _path(one: Mapping[str, Any], places: list[dict[int, int]]) -> dict[str, Any
         "probability": one["share"],
         "survivor": [place.get(int(old), -1) for old, place in zip(one["survivor"], places, strict=True)],
         "joints": np.where(np.isfinite(smoothed), smoothed, joints),
+    }
+
+
+def _unpadded(root: Node) -> dict[str, Any]:
+    """Return the JSON document of an NPZ, whose arrays (frames, postures, ...) are padded to the most postures."""
+    held: Mapping[str, Any] = root.value
+    counts = root.at("count").array(None).astype(np.intp).tolist()
+
+    def parsed(name: str, default: Any) -> Any:
+        return json_file.parse(root.at(name).text().encode(), root.source) if name in held else default
+
+    columns = {field: held[name] for field, name in POSTURE_ARRAYS.items() if name in held}
+    margins = {name.removeprefix("margins/"): held[name] for name in held if name.startswith("margins/")}
+    inferred, roots = (parsed(name, [None] * len(counts)) for name in ("inferred", "roots"))
+    frames: list[dict[str, Any]] = []
+    for k, count in enumerate(counts):
+        postures = [
+            {
+                **{field: values[k, i].tolist() for field, values in columns.items()},
+                "margins": {name: float(values[k, i]) for name, values in margins.items()},
+                "inferred": inferred[k][i] if inferred[k] else {},
+            }
+            for i in range(count)
+        ]
+        camera = {name: held[f"camera/{name}"][k] for name in ("f", "rotation", "position", "residual")}
+        rejected = zip(held["rejected/names"].tolist(), held["rejected/counts"][k].tolist(), strict=True)
+        frame = {
+            "time": float(held["time"][k]),
+            "camera": {name: None if np.isnan(values).any() else values for name, values in camera.items()},
+            "rejected": {name: number for name, number in rejected if number >= 0},
+            "levels": {"motion": [number for number in held["levels/motion"][k].tolist() if number >= 0]},
+            "root": roots[k],
+            "postures": postures,
+        }
+        if "answer/representatives" in held:
+            rows = [row for row in held["answer/representatives"][k].tolist() if row >= 0]
+            chances = held["answer/probability"][k, : len(rows)].tolist()
+            frame["answer"] = {"representatives": rows, "probability": chances}
+        frames.append(
+            frame | {name: held[name][k] for name in ("unlisted", "unlisted_probability") if name in held}
+        )
+    names = ("survivor", "share", "joints", "smoothed")
+    paths = zip(*(held[f"paths/{name}"] for name in names), strict=True) if "paths/survivor" in held else ()
+    return {
+        "unit": root.at("unit").text(),
+        "configuration_names": list(root.at("configuration_names").texts()),
+        "settings": parsed("settings", {}),
+        "frames": frames,
+        "paths": {"paths": [dict(zip(names, one, strict=True)) for one in paths]},
     }

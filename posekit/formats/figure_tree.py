@@ -21,7 +21,7 @@ from posekit.formats.bvh import Bvh, holds
 from posekit.formats.layout import load_layout
 from posekit.formats.trc import even_step, one_recording
 from posekit.geometry import Array, rotation_from_quaternion, up_vector
-from posekit.geometry.rotations import coordinate_rotation, rotation_between, turned_near
+from posekit.geometry.rotations import coordinate_rotation, rotation_between
 from posekit.skeleton import DOFS, POINT
 
 if TYPE_CHECKING:
@@ -153,31 +153,10 @@ def euler_angles(R: Array) -> Array:
     The first is taken out of the rotation before the last is read: where the middle one is a quarter turn the first is
     arbitrary, and the last makes up for it.
     """
-    a = np.arctan2(R[..., 2, 1], R[..., 1, 1])
-    cosine, sine = np.cos(a), np.sin(a)
-    b = np.arctan2(-R[..., 0, 1], cosine * R[..., 1, 1] + sine * R[..., 2, 1])
-    c = np.arctan2(sine * R[..., 1, 0] - cosine * R[..., 2, 0], cosine * R[..., 2, 2] - sine * R[..., 1, 2])
-    return np.stack([a, b, c], axis=-1)
+    from posekit.body.angles import ball_branch
 
-
-def continuous(angles: Array) -> Array:
-    """Choose among the angles (T, J, 3) of the same rotations those that jump least from frame to frame.
-
-    The first frame stays; no step is a full turn, and none goes to the other branch a + pi, pi - b, c + pi (Diebel
-    2006, *Representing Attitude*, section 5.6).
-    """
-    from posekit.body.angles import other_branch
-
-    angles = np.array(angles, dtype=np.float64)
-    if len(angles) < 2:
-        return angles
-    # A frame's branch against the one before is the same for both branches of that one: parity adds up.
-    step = turned_near(np.diff(angles, axis=0), 0.0)
-    other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)
-    odd = np.zeros(angles.shape[:2], dtype=bool)
-    odd[1:] = np.cumsum((other**2).sum(axis=-1) < (step**2).sum(axis=-1), axis=0) % 2 == 1
-    angles[odd] = other_branch(angles[odd])
-    return np.unwrap(angles, axis=0)
+    flat = (TO_Y_UP.T @ R @ TO_Y_UP).reshape(-1, 3, 3)
+    return ball_branch(flat).reshape(R.shape[:-1])
 
 
 def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -> None:
@@ -196,6 +175,8 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
         return
     if unit not in METRES:
         raise refusal(path, "unit", repr(unit), f"one of {', '.join(METRES)}", "state one of them")
+    from posekit.body.angles import continuous
+
     figure, root, angles = figure_in_tree(motion, "BVH")
     scale = 1.0 / METRES[unit]
     values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(root), -1)])

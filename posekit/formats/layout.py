@@ -13,7 +13,8 @@ import numpy as np
 
 from posekit.errors import nearest, refusal, shown
 from posekit.files import DATA, parse_toml, read_bytes
-from posekit.geometry import Array, cross, dot, unit
+from posekit.geometry import Array
+from posekit.geometry.landmarks import PELVIS_SHARE, hips_from_markers, middles, place_neck
 from posekit.skeleton import FEET_POINTS, NAMES, POINTS, SIDES, other_side
 
 FOLDER: Final = DATA / "layouts"
@@ -26,11 +27,6 @@ LIMBS: Final = tuple(f"{side}_{part}" for part in PARTS for side in SIDES)
 
 #: A file's points for each of posekit's names.
 Placed = dict[str, tuple[str, ...]]
-
-#: Place of the built-in figure's pelvis on the line from the middle of the shoulders (0) to that of the hips (1).
-PELVIS_SHARE: Final = 0.8200545021161334
-#: The figure's neck from the middle of the shoulders, as shares of that line's length: forward, left, up.
-NECK_OFFSET: Final = (0.06720811867953341, 0.0, -0.002995656796876607)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +86,7 @@ class Layout:
         markers = self.fields.get("hips", {})
         if markers and points.shape[-1] == 3 and _in(tuple(markers.values()), column):
             right, left, back = (points[..., column[plain(markers[k])], :] for k in ("right", "left", "back"))
-            found |= dict(zip(("right_hip", "left_hip"), _hips(right, left, back), strict=True))
+            found |= dict(zip(("right_hip", "left_hip"), hips_from_markers(right, left, back), strict=True))
         return found
 
     def seen(self, names: Sequence[str], values: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
@@ -100,7 +96,7 @@ class Layout:
         Both are placed in the image: bent spines and perspective move them by a centimetre or two.
         """
         found = self.gather(values, names)
-        found = {**_middles(found), **found}
+        found = {**middles(found), **found}
         derived = []
         shoulders, hips = found.get("mid_shoulders"), found.get("mid_hips")
         if "neck" not in found and shoulders is not None:
@@ -130,7 +126,7 @@ class Layout:
             Joints that were placed between others, as the file has no point for them.
         """
         found = self.gather(points, names)
-        for name, middle in _middles(found).items():
+        for name, middle in middles(found).items():
             found[name] = np.where(np.isnan(middle), found.get(name, middle), middle)
         derived = tuple(name for name in ("pelvis", "neck") if name not in found)
         if not {"mid_shoulders", "mid_hips", "right_shoulder", "left_shoulder"} <= set(found):
@@ -139,48 +135,14 @@ class Layout:
             spine = found["mid_hips"] - found["mid_shoulders"]
             found["pelvis"] = found["mid_shoulders"] + PELVIS_SHARE * spine
         if "neck" in derived:
-            found["neck"] = _neck(found)
+            found["neck"] = place_neck(found)
         return *_in_order(found, points), derived
-
-
-def _middles(found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the middles of the shoulders and of the hips, where both sides are among the landmarks."""
-    return {
-        f"mid_{part}s": (found[f"right_{part}"] + found[f"left_{part}"]) / 2
-        for part in ("shoulder", "hip")
-        if {f"right_{part}", f"left_{part}"} <= set(found)
-    }
 
 
 def _in_order(found: Mapping[str, Array], points: Array) -> tuple[tuple[str, ...], Array]:
     """Stack landmarks in the order of `posekit.skeleton.NAMES`, as the file's points are."""
     placed = tuple(name for name in NAMES if name in found)
     return placed, np.stack([found[name] for name in placed], axis=-2) if placed else points[..., :0, :]
-
-
-def _hips(right: Array, left: Array, back: Array) -> tuple[Array, Array]:
-    """Place the hips (T, 3) from the anterior spines of the pelvis and the sacrum.
-
-    From the middle of the spines, as shares of their distance: 0.36 to the side, 0.19 backward, 0.30 down (Bell,
-    Brand & Pedersen 1989, *Prediction of hip joint centre location from external landmarks*, Human Movement Science 8).
-    """
-    width = np.linalg.norm(left - right, axis=-1, keepdims=True)
-    to_left, middle = unit(left - right), (left + right) / 2
-    ahead = unit((middle - back) - dot(middle - back, to_left)[..., None] * to_left)
-    base = middle - width * (0.19 * ahead + 0.30 * cross(ahead, to_left))
-    return base - 0.36 * width * to_left, base + 0.36 * width * to_left
-
-
-def _neck(found: Mapping[str, Array]) -> Array:
-    """Place the neck (T, 3) in the frame of shoulders and pelvis, scaled by the median spine."""
-    spine = np.linalg.norm(found["mid_shoulders"] - found["mid_hips"], axis=-1)
-    spine = spine[np.isfinite(spine)]
-    left = unit(found["left_shoulder"] - found["right_shoulder"])
-    way = found["right_shoulder"] - found["pelvis"]
-    down = unit(way - dot(way, left)[..., None] * left)
-    frame = np.stack([cross(down, left), left, -down], axis=-1)
-    offset = np.array(NECK_OFFSET) * (float(np.median(spine)) if len(spine) else 1.0)
-    return np.asarray(found["mid_shoulders"] + frame @ offset)
 
 
 def plain(name: str) -> str:

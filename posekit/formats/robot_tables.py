@@ -138,7 +138,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
             turn, how = _euler(turn, how), {"order": "xyzw"}
         turn, up = root_quaternion(turn, how.get("order", ""), place, up, path, options)
         place = _metres(place, options.unit or parts.get("position", {}).get("unit", ""), up, options)
-    labels, joints = _named(labels, joints, order or _order(parts, columns, joints.shape[1]), options)
+    labels = _named(labels, joints.shape[1], order or _order(parts, columns, joints.shape[1]), options)
     robot = options.urdf or str(about.get("robot", "")) or _robot_of(labels)
     if not robot:
         options.note("the file does not name the robot (--urdf)")
@@ -273,23 +273,15 @@ def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> 
     return order
 
 
-def _named(
-    labels: tuple[str, ...], joints: Array, order: str, options: Options
-) -> tuple[tuple[str, ...], Array]:
-    """Name unnamed joints by a layout's order; joints of a G1 are sorted, and its missing joints are 0."""
+def _named(labels: tuple[str, ...], count: int, order: str, options: Options) -> tuple[str, ...]:
+    """Return the names of the joints: those of the file, or the layout's for joints without names."""
     names = load_layout(order).fields["joints"] if order and not labels else ()
-    if len(names) == joints.shape[1] and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
+    if len(names) == count and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
         options.note(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
-        labels = tuple(names)
-    elif not labels:
+        return tuple(names)
+    if not labels:
         options.note("joints are in the robot's own order: the file does not name them")
-    if not _robot_of(labels):
-        return labels, joints
-    missing = [name for name in _g1() if name not in labels]
-    if missing:
-        options.note(f"{', '.join(missing)} are not in the file and set to 0")
-    joints = np.hstack([joints, np.zeros((len(joints), len(missing)))])
-    return tuple(_g1()), joints[:, [(*labels, *missing).index(name) for name in _g1()]]
+    return labels
 
 
 def _g1() -> Sequence[str]:
