@@ -158,12 +158,11 @@ def _write_key_points(folder: Path, points: Array) -> None:
 
 def _write_robots(folder: Path) -> None:
     """Write a view of a Panda robot, and a squatting G1 as arrays that simulators exchange."""
-    import pinocchio as pin
-
     from posekit.files import write_bytes
     from posekit.formats.npz_file import packed
     from posekit.recovery.objects import load_linkage
     from posekit.robots import load_robot
+    from posekit.robots.kinematics import frame_places
     from posekit.synthesis import object_document, object_view
 
     panda = load_robot("panda", bodies="none")
@@ -184,10 +183,8 @@ def _write_robots(folder: Path) -> None:
             q[:, column[f"{side}_{joint}_joint"]] = angle
         q[:, column[f"{side}_shoulder_pitch_joint"]] = sign * swing
         q[:, column[f"{side}_shoulder_roll_joint"]] = sign * 0.3
-    data, ankle = robot.model.createData(), robot.model.getFrameId("left_ankle_roll_link")
-    for row in q:  # the feet stay where they are, flat
-        pin.framesForwardKinematics(robot.model, data, row)
-        row[[0, 2]] = -data.oMf[ankle].translation[[0, 2]]
+    ankle = frame_places(robot.model, q, [robot.model.getFrameId("left_ankle_roll_link")])[:, 0]
+    q[:, [0, 2]] = -ankle[:, [0, 2]]  # the feet stay where they are, flat
     for frames, name, change in ROBOT_MISTAKES:
         count = frames.stop - frames.start
         q[frames, column[name]] += change * np.sin(np.pi * np.arange(count) / count) ** 2

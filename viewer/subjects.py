@@ -28,6 +28,7 @@ from posekit.geometry import (
 from posekit.motion import Motion
 from posekit.recovery import Recovery
 from posekit.robots import Robot, load_robot
+from posekit.robots.kinematics import frame_places
 from posekit.skeleton import JOINT
 
 #: Colours (red, green, blue) of right limbs, left limbs and the trunk, 0 to 255.
@@ -79,10 +80,7 @@ class Subject(Record):
     @cached_property
     def points(self) -> Array:
         """Places of the robot's links (T, P, 3), world, metres; NaN where the configuration is not known."""
-        known = np.isfinite(self.q).all(axis=1)
-        places = np.full((len(self.q), len(link_frames(self.robot)), 3), np.nan)
-        places[known] = link_places(self.robot, self.q[known])
-        return np.asarray(places @ self.R_world_data.T + self.offset)
+        return np.asarray(link_places(self.robot, self.q) @ self.R_world_data.T + self.offset)
 
 
 def link_frames(robot: Robot) -> list[int]:
@@ -93,15 +91,10 @@ def link_frames(robot: Robot) -> list[int]:
 
 
 def link_places(robot: Robot, q: Array) -> Array:
-    """Return the origins (N, L, 3) of all links at configurations (N, nq), metres."""
-    import pinocchio as pin
-
-    frames, data = link_frames(robot), robot.model.createData()
-    found = np.empty((len(q), len(frames), 3))
-    for k, row in enumerate(q):
-        pin.framesForwardKinematics(robot.model, data, np.ascontiguousarray(row))
-        found[k] = [data.oMf[frame].translation for frame in frames]
-    return found
+    """Return the origins (N, L, 3) of all links at configurations (N, nq), metres; NaN for incomplete ones."""
+    places = frame_places(robot.model, q, link_frames(robot))
+    places[~np.isfinite(q).all(axis=1)] = np.nan
+    return places
 
 
 def side(name: str) -> str:

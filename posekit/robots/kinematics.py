@@ -143,6 +143,13 @@ class Kinematics:
         return axes, origin
 
 
+def frame_places(model: pin.Model, q: Array, frames: Sequence[int]) -> Array:
+    """Return the origins (N, K, 3) of K frames of a model at configurations (N, nq), metres, world."""
+    placed = [model.frames[k] for k in frames]
+    sites = [Site(one.parentJoint, one.placement.translation) for one in placed]
+    return Kinematics(model, sites).positions(q)
+
+
 def _mix(parent: Array, translation: Array, rotation: Array) -> Array:
     """Return the axes x, y, z and the origin of a frame (4, 3) in the turned axes of its parent.
 

@@ -87,19 +87,15 @@ def object_view(
     InputError
         If a point is not a link or joint of the robot.
     """
-    import pinocchio as pin
+    from posekit.robots.kinematics import frame_places
 
-    model = robot.model
-    names = [frame.name for frame in model.frames]
+    names = [frame.name for frame in robot.model.frames]
     for point in points:
         if point not in names:
             expected = f"a link or joint of {robot.name}"
             raise refusal(robot.name, "points", shown(point), expected, nearest(point, names))
-    frames, data = [names.index(point) for point in points], model.createData()
-    truth = np.empty((n, len(frames), 3))
-    for k, q in enumerate(random_configurations(robot, n, rng)):
-        pin.framesForwardKinematics(model, data, q)
-        truth[k] = [data.oMf[frame].translation for frame in frames]
+    q = random_configurations(robot, n, rng)
+    truth = frame_places(robot.model, q, [names.index(point) for point in points])
     image = truth[..., :2] * PIXELS_PER_METRE
     return image + noise * rng.normal(size=image.shape) if noise else image, truth
 

@@ -162,10 +162,7 @@ def _points(motion: Motion, robot: Robot, q: Array) -> Array:
         if motion.joints is None:
             return robot.forward_kinematics(q)
         return np.concatenate([motion.figure_joints, motion.head], axis=1)
-    known = np.isfinite(q).all(axis=1)
-    places = np.full((len(q), len(drawn.link_frames(robot)), 3), np.nan)
-    places[known] = drawn.link_places(robot, q[known])
-    return places
+    return drawn.link_places(robot, q)
 
 
 def _joints(robot: Robot, q: Array) -> Array:

@@ -308,6 +308,9 @@ def linkage_of_robot(robot: Any) -> Linkage:
     """
     import pinocchio as pin
 
+    from posekit.robots.kinematics import frame_places
+    from posekit.synthesis.objects import random_configurations
+
     model = robot.model
     # Points beyond a sliding joint keep no distance to the others.
     kinds = [joint.shortname().removeprefix("JointModel") for joint in model.joints]
@@ -318,14 +321,8 @@ def linkage_of_robot(robot: Any) -> Linkage:
     last = [k for k in bodies if k not in used and model.frames[k].parentJoint in turning]
     joints = [model.getFrameId(model.names[k], pin.FrameType.JOINT) for k in turning if model.nvs[k] == 1]
     ids = [*bodies[:1], *joints, *last]
-    rng, data, moved = np.random.default_rng(0), model.createData(), []
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -1.0)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, 1.0)
-    for _ in range(6):
-        q = pin.randomConfiguration(model, lower, upper) if robot.free_flyer else rng.uniform(lower, upper)
-        pin.framesForwardKinematics(model, data, q)
-        moved.append([data.oMf[k].translation.copy() for k in ids])
-    places, ends = np.array(moved), [0, *range(1 + len(joints), len(ids))]
+    shapes = random_configurations(robot, 6, np.random.default_rng(0))
+    places, ends = frame_places(model, shapes, ids), [0, *range(1 + len(joints), len(ids))]
     # Joints come first; a base or an end near a joint is left out, and coincident joints are one point.
     kept: list[int] = []
     for k in [*range(1, 1 + len(joints)), *ends]:
