@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import posekit
 from posekit.motion import Motion
 from posekit.skeleton import JOINT, JOINTS, other_side
 from posekit.validators import Report
+from posekit.validators.motion.profile import MOTION_CHECKS
 from tests.test_checks_motion import (
     RATE,
     first_pose,
@@ -32,10 +33,26 @@ from tests.test_checks_motion import (
 
 PLANTS = (held, jumped, first_pose, lengthened, lifted, shaken, slid, swapped)
 EXCHANGED = [JOINTS.index(other_side(name)) for name in JOINTS]
-PROFILE = tomllib.loads(
-    Path(posekit.__file__).with_name("urdf").joinpath("profiles/posekit.toml").read_text()
-)
+PROFILES = Path(posekit.__file__).with_name("urdf") / "profiles"
+PROFILE = tomllib.loads(PROFILES.joinpath("posekit.toml").read_text())
 BOUNDS = PROFILE["checks"]
+
+
+@pytest.mark.parametrize(
+    ("profile", "checks"),
+    [
+        ("posekit", PROFILE["checks"]),
+        ("phuma", ("contact-share", "root-height", "support-distance")),
+        ("protomotions", ("above-ground", "body-speed")),
+        ("holomotion", ("root-speed",)),
+        ("skating", ("skating",)),
+    ],
+)
+def test_a_check_by_its_name_has_the_thresholds_of_its_profile(profile: str, checks: Sequence[str]) -> None:
+    stated = tomllib.loads(PROFILES.joinpath(f"{profile}.toml").read_text())["checks"]
+    for name in checks:
+        defaults = MOTION_CHECKS[name].defaults
+        assert {key: defaults[key] for key in stated[name]} == stated[name], name
 
 
 def sides_exchanged(place: str) -> str:

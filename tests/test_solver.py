@@ -314,8 +314,14 @@ def test_residuals_of_the_callers_own_pull():
     assert (hands_together(pulled.joints) < 6).all()
 
 
-def test_nothing_seen_gives_no_error():
-    assert len(np.unique(solve(observed(image=np.full_like(IMAGE, np.nan))).frame)) <= len(TRUTH)
+def test_nothing_seen_leaves_postures_of_the_known_lengths_at_the_root():
+    modes = solve(observed(image=np.full_like(IMAGE[:1], np.nan), root=TRUTH[:1, 0]))
+    assert len(modes) > 100 and off(modes.joints[:1], modes.joints).max() > 0.5
+    for k, (a, b) in enumerate(SEGMENTS):
+        np.testing.assert_allclose(
+            np.linalg.norm(modes.joints[:, a] - modes.joints[:, b], axis=1), LENGTHS[k]
+        )
+    np.testing.assert_allclose(modes.joints[:, 0], np.broadcast_to(TRUTH[0, 0], (len(modes), 3)), atol=1e-9)
 
 
 def standing(**angles):
