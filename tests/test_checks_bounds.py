@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 
@@ -11,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from posekit.motion import Motion
 from posekit.settings import ValidateSettings
-from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, both
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENTS, both, segment_name
 from posekit.validators import Report, validate_motion
 from posekit.validators.motion.profile import MOTION_CHECKS
-from tests.test_checks_motion import RATE, gesture
+from tests.test_checks_motion import FIGURE, RATE, gesture
+from tests.test_ranges_laws import ends_of
 
 FORWARD, LEFT, UP = np.eye(3)
 ANKLES, WRISTS = both("ankle"), both("wrist")
@@ -229,10 +231,7 @@ def slides_ever_faster_for(frames: float) -> bool:
 
 
 def would_fall_with_a_foot_at(height: float) -> bool:
-    joints = person()
-    joints[:, ANKLES] += np.array([-0.35, 0.35])[:, None] * LEFT
-    joints[:, ANKLES[0]] += height * UP
-    return found(joints, "balance-still")
+    return found(wide(height), "balance-still")
 
 
 def would_fall_with_hips_at(height: float) -> bool:
@@ -377,3 +376,126 @@ AIR = 0.03 + np.hypot(0.75 * 0.152, 0.039) * STATURE - 0.039 * STATURE
 )
 def test_a_number_decides_at_its_bound(finds: Callable[[float], bool], inside: float, outside: float) -> None:
     assert [finds(inside), finds(outside)] == [False, True]
+
+
+# Tolerances for noise of measuring
+
+NOISE = 0.004
+BETWEEN = 3 * np.sqrt(2) * NOISE
+"""Tolerance of a distance, metres: three standard deviations of the noise of both ends."""
+
+
+def jumped(joints: slice | int) -> np.ndarray:
+    moved = gesture()
+    moved[50, joints] += 0.3 * LEFT
+    return moved
+
+
+def evenly(order: int, constant: float) -> np.ndarray:
+    """Return a person whose derivative of an order is constant."""
+    return person() + along(constant * TIME**order / math.factorial(order))
+
+
+def wide(height: float = 0.1) -> np.ndarray:
+    """Return a person with a foot off the ground and the other far to the side."""
+    joints = person()
+    joints[:, ANKLES] += np.array([-0.35, 0.35])[:, None] * LEFT
+    joints[:, ANKLES[0]] += height * UP
+    return joints
+
+
+@pytest.mark.parametrize(
+    ("check", "place", "joints", "bound", "deviations"),
+    [
+        ("floating", "lowest", person() + along(0.2 * STRETCH, UP), 0.02, 2),
+        ("penetration", "lowest", person() - along(0.3 * STRETCH, UP), -0.025, 3),
+        ("teleport", "left_wrist", jumped(WRISTS[1]), 0.07, 5),
+        ("teleport", "body", jumped(slice(None)), 0.06, 5),
+        ("jitter", "neck", gesture() + np.random.default_rng(0).normal(0, 0.02, (120, 14, 3)), 0.006, 2),
+        ("balance-still", "centre_of_mass", wide(), 0.05, 2),
+        ("balance", "centre_of_mass", wide(), 0.0, 2),
+        *(
+            (
+                name,
+                "neck",
+                evenly(order, 2 * bound),
+                bound,
+                5 * np.sqrt(3 * math.comb(2 * order, order)) * RATE**order,
+            )
+            for order, name, bound in ((1, "speed", 14.0), (2, "acceleration", 400.0), (3, "jerk", 48e3))
+        ),
+    ],
+)
+def test_bounds_widen_by_multiples_of_the_noise(
+    check: str, place: str, joints: np.ndarray, bound: float, deviations: float
+) -> None:
+    table = judged(joints, check, noise=NOISE).to_pandas()
+    table = table[table.place == place]
+    ends = table.lower if bound < 0 else table.upper
+    assert len(table)
+    assert ends.to_numpy() == pytest.approx(bound + math.copysign(deviations * NOISE, bound))
+
+
+def test_bones_may_differ_by_what_bodies_and_noise_give() -> None:
+    """Spines bend to the side by 38.2 degrees; clavicles, 0.8 of the half width, turn by 30; bones differ by 3 cm."""
+    joints = gesture()
+    lengths = {segment_name((a, b)): float(np.linalg.norm(joints[0, a] - joints[0, b])) for a, b in SEGMENTS}
+    joints[50] *= 2.0
+    table = judged(joints, "rigid-parts", noise=NOISE).to_pandas()
+    table = table[table.frame == 50].set_index("place")
+    assert set(lengths) <= set(table.index)
+    bone = math.hypot(0.03, BETWEEN)
+    height, width = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
+    half = math.radians(38.2) / 2
+    chord = height * math.sin(half) / half
+    leaning = np.array([chord * math.sin(half), chord * math.cos(half)])
+    spine = math.hypot(height, width) - math.dist(leaning, (width, 0.0))
+    across, raised = 1.6 * width * (1 - math.cos(math.pi / 6)), 0.8 * width * math.sin(math.pi / 6)
+    for name, length in lengths.items():
+        gives = {
+            "neck-pelvis": (spine,),
+            **dict.fromkeys(("right_shoulder-pelvis", "left_shoulder-pelvis"), (spine, raised)),
+            **dict.fromkeys(
+                ("neck-right_shoulder", "neck-left_shoulder", "right_shoulder-left_shoulder"), (across,)
+            ),
+        }.get(name, ())
+        ends = np.array([table.lower[name], table.upper[name]])
+        assert ends == pytest.approx(length + np.array([-1, 1]) * math.hypot(bone, *gives)), name
+
+
+def test_directions_may_differ_by_what_bodies_and_noise_give() -> None:
+    q = np.tile(FIGURE.neutral, (60, 1))
+    names = list(FIGURE.configuration_names)
+    for name, degrees in (
+        ("right_elbow_flexion", 176.0),
+        ("left_knee_flexion", 176.0),
+        ("neck_flexion", 89.0),
+    ):
+        q[50, names.index(name)] = np.radians(degrees)
+    points = FIGURE.forward_kinematics(q)
+    motion = Motion(joints=points, joint_names=POINTS, time=np.arange(60) / RATE)
+    report = validate_motion(motion, ValidateSettings(checks=["joint-range"], noise=NOISE))
+    table = report.to_pandas().set_index("place")
+    for place, levers in (
+        (
+            "right_elbow.flexion",
+            [FIGURE.lengths[f"right_{part}"] for part in ("shoulder-right_elbow", "elbow-right_wrist")],
+        ),
+        (
+            "left_knee.flexion",
+            [FIGURE.lengths[f"left_{part}"] for part in ("hip-left_knee", "knee-left_ankle")],
+        ),
+        ("neck.flexion", [0.2]),
+    ):
+        lower, upper = ends_of("anatomical", place) or (0.0, 0.0)
+        tolerance = math.hypot(2.0, math.degrees(BETWEEN / min(levers)))
+        assert table.upper[place] == pytest.approx(upper + tolerance), place
+        assert table.lower[place] == pytest.approx(lower - tolerance), place
+
+
+def test_capsules_of_people_may_overlap_by_a_centimetre_and_the_noise() -> None:
+    joints = gesture()
+    joints[50, WRISTS] = (joints[50, JOINT["neck"]] + joints[50, JOINT["pelvis"]]) / 2
+    table = judged(joints, "collision", noise=NOISE).to_pandas()
+    assert set(table.frame) == {50}
+    assert table.lower.to_numpy() == pytest.approx(-0.01 - BETWEEN)
