@@ -15,7 +15,7 @@ from posekit.settings import ValidateSettings
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENTS, both, segment_name
 from posekit.validators import Report, validate_motion
 from posekit.validators.motion.profile import MOTION_CHECKS
-from tests.test_checks_motion import FIGURE, RATE, gesture
+from tests.test_checks_motion import FIGURE, RATE, gesture, held, lengthened, slid, swapped
 from tests.test_ranges_laws import ends_of
 
 FORWARD, LEFT, UP = np.eye(3)
@@ -321,6 +321,44 @@ def unusual_until(frames: float) -> bool:
     return bool((judged(joints, "drift").table()["frame"] > frames).any())
 
 
+# Remarks
+
+
+def has_a_belt(speed: float = 1.0, travel: float = 0.0, frames: int = 120) -> bool:
+    """Both feet go backward in some frames, under hips that travel forward."""
+    joints = person() + along(travel * COUNT / 119)
+    joints[:, ANKLES] -= along(speed * np.minimum(COUNT, frames) / RATE + travel * COUNT / 119)
+    return any("treadmill" in note for note in judged(joints, "sliding").notes)
+
+
+def begins_with_another_posture(joints: float) -> bool:
+    moved = gesture()
+    moved[0, [*WRISTS, *both("knee")][: int(joints)]] += 0.4 * LEFT
+    return any("Frame 0 is another posture" in note for note in judged(moved, "teleport").notes)
+
+
+# Joint ranges
+
+
+def elbow_is_judged_at(bend: float, **settings: object) -> bool:
+    """The rotation of the upper arm is far outside its range; straight arms do not show it."""
+    q = FIGURE.neutral.copy()
+    for name, degrees in (
+        ("elbow_flexion", bend),
+        ("shoulder_rotation", 160.0),
+        ("shoulder_abduction", 30.0),
+    ):
+        q[FIGURE.configuration_names.index(f"right_{name}")] = np.radians(degrees)
+    settings = {"checks": ["joint-range"], "noise": 0.0, **settings}
+    return bool(
+        validate_motion(Motion(joints=FIGURE.points(q[None])), ValidateSettings(**settings)).invalid.any()
+    )
+
+
+def elbow_of_the_figure_is_judged_at(bend: float) -> bool:
+    return elbow_is_judged_at(bend, angle_tolerance=10.0, strict=True, ranges="urdf")
+
+
 AIR = 0.03 + np.hypot(0.75 * 0.152, 0.039) * STATURE - 0.039 * STATURE
 """Height of a body in the air without toes: 3 cm, and the rise of an ankle over the tips of the toes."""
 
@@ -372,6 +410,16 @@ AIR = 0.03 + np.hypot(0.75 * 0.152, 0.039) * STATURE - 0.039 * STATURE
         (early_by, 0.74, 0.76),
         (shuffled_at, 19.9, 20.1),
         (unusual_until, 23, 25),
+        (has_a_belt, 0.29, 0.31),
+        (lambda travel: not has_a_belt(travel=travel), 0.98, 1.02),  # a quarter of the way of the belt
+        (lambda frames: has_a_belt(frames=int(frames)), 58, 61),
+        (begins_with_another_posture, 2, 3),
+        (elbow_is_judged_at, 14.9, 15.1),
+        # An angle with a tolerance of 45 degrees is not determined.
+        (
+            elbow_of_the_figure_is_judged_at,
+            *(np.degrees(np.arcsin(10 / 45)) + np.array([-0.1, 0.1])),
+        ),
     ],
 )
 def test_a_number_decides_at_its_bound(finds: Callable[[float], bool], inside: float, outside: float) -> None:
@@ -499,3 +547,81 @@ def test_capsules_of_people_may_overlap_by_a_centimetre_and_the_noise() -> None:
     table = judged(joints, "collision", noise=NOISE).to_pandas()
     assert set(table.frame) == {50}
     assert table.lower.to_numpy() == pytest.approx(-0.01 - BETWEEN)
+
+
+# Whole clips
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0])
+def test_a_body_over_a_stated_ground_may_be_away_from_it_for_a_while(rate: float) -> None:
+    """The body jumps onto a box and stays there; 3 cm of slope, 4 of lifted heels and 2 are allowed."""
+    count = np.arange(round(6 * rate))
+    time = np.clip(count - len(count) // 2, 0, round(0.4 * rate)) / rate
+    rise = (0.3 / time[-1] + 9.81 * time[-1] / 2) * time - 9.81 / 2 * time**2
+    joints = person(len(count)) + along(rise, UP) + along(2.0 * time)
+    frames = judged(joints, "floating", ground=SOLE, rate=rate).table()["frame"]
+    above = int(np.argmax(rise > 0.09))
+    assert frames.tolist() == list(range(above + round(0.4 * rate), len(count)))
+
+
+@pytest.mark.parametrize("frames", [344, 345, 400])
+def test_parts_of_four_seconds_overlap_by_half_a_second(frames: int) -> None:
+    """A rest shorter than a second belongs to the part before it; a frame has the worst of its parts."""
+    ups_and_downs = np.convolve(np.random.default_rng(0).normal(size=frames), np.ones(20), "same") > 0
+    joints = person(frames) + along(0.15 * ups_and_downs, UP) + along(0.001 * np.arange(frames))
+    expected = np.full(frames, np.inf)
+    starts = [start for start in range(0, frames, 105) if start + 30 <= frames]
+    for start in starts:
+        part = slice(start, frames if start == starts[-1] else start + 120)
+        expected[part] = np.minimum(expected[part], np.mean(~ups_and_downs[part]))
+    table = judged(joints, "contact-share", profile="phuma").to_pandas()
+    assert table.frame.tolist() == np.flatnonzero(expected < 0.6).tolist() and len(table)
+    assert table.value.to_numpy() == pytest.approx(expected[table.frame])
+
+
+@pytest.mark.parametrize(("frames", "asked"), [(29, False), (30, True)])
+def test_parts_need_a_second(frames: int, asked: bool) -> None:
+    report = judged(gesture()[:frames], "contact-share", profile="phuma")
+    assert ("contact-share" in report.checks) is asked
+
+
+SCALES = {
+    "swap": 0.5,
+    "repeated": 0.5,
+    "orientation": 90.0,
+    "above-ground": 0.1,
+    "balance": 0.1,
+    "collision": 0.1,
+}
+"""Margins that count as 1; otherwise half of the range or, if it has one end, the size of that end."""
+
+
+@pytest.mark.parametrize(
+    ("check", "joints"),
+    [
+        ("frozen", held(gesture())),
+        ("repeated", gesture()[[*range(60), 59, *range(60, 119)]]),
+        ("swap", swapped(gesture())),
+        ("teleport", jumped(WRISTS[1])),
+        ("drift", lengthened(gesture())),
+        ("floating", person() + along(0.2 * STRETCH, UP)),
+        ("penetration", person() - along(0.3 * STRETCH, UP)),
+        ("balance-still", wide()),
+        ("balance", wide()),
+        ("sliding", slid(gesture())),
+        ("speed", evenly(1, 20.0)),
+        ("orientation", turned(180.0) + 5.0),
+        ("above-ground", person() - along(0.3 * STRETCH, UP)),
+    ],
+)
+def test_margins_of_frames_are_shares_of_ranges(check: str, joints: np.ndarray) -> None:
+    report = judged(joints, check, **({"ground": 0.0} if check == "above-ground" else {}))
+    table = report.to_pandas()
+    assert len(table)
+    ends = table[["lower", "upper"]].to_numpy()
+    half = np.where(
+        np.isfinite(ends).all(axis=1), (ends[:, 1] - ends[:, 0]) / 2, np.nanmax(np.abs(ends), axis=1)
+    )
+    share = (table.margin / SCALES.get(check, half)).groupby(table.frame).min()
+    assert report.margins[share.index, 0] == pytest.approx(share.to_numpy())
+    assert report.worst[share.index] == pytest.approx(share.to_numpy())

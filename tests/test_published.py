@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import posekit
 from posekit.body.inertias import inertias
@@ -13,7 +14,7 @@ from posekit.ranking import standing
 from posekit.recovery.scales import ANNOTATION_SIGMAS
 from posekit.skeleton import JOINTS, LIMB_SHARES, POINTS
 from posekit.synthesis import Walker
-from posekit.validators.motion import ground
+from posekit.validators.motion import ground, trembling
 
 COCO = {
     **{"nose": 0.026, "eye": 0.025, "ear": 0.035, "shoulder": 0.079, "elbow": 0.072, "wrist": 0.062},
@@ -37,6 +38,11 @@ def test_key_points_spread_as_coco_says() -> None:
     same = {"neck": "shoulder", "pelvis": "hip"}
     words = [same.get(name, name.rpartition("_")[2]) for name in JOINTS]
     assert ANNOTATION_SIGMAS == pytest.approx([COCO[word] for word in words])
+
+
+def test_medians_of_normal_coordinates_are_those_of_scipy() -> None:
+    assert trembling.MEDIAN_OF_ONE == pytest.approx(stats.chi(1).median(), abs=5e-5)
+    assert trembling.MEDIAN_OF_THREE == pytest.approx(stats.chi(3).median(), abs=5e-5)
 
 
 def test_shares_of_the_stature_are_those_of_winter() -> None:
