@@ -81,6 +81,10 @@ def validate(
         mended = mend(source, repair, settings=settings, **given)
         say("\n".join(["", f"repaired: {mended.report.decision}", *mended.notes]))
         code = 0 if bool(mended.report.ok.all()) else INVALID
+    elif any(clip.decision == "repair?" for clip in report.clips):
+        one = sources[0]
+        target = f"{one.stem}.repaired{one.suffix}" if len(sources) == 1 and one.is_file() else "repaired/"
+        say(f"next: the same command with --repair {target} writes a motion nearby that passes")
     if report.refused:
         code = BAD_INPUT
     raise SystemExit(code)
