@@ -25,7 +25,9 @@ def test_validate_prints_and_writes_the_report_of_the_function(run: Any, tmp_pat
     files = [str(tmp_path / name) for name in ("bad.npz", "good.npz")]
     code, out, _ = run("validate", *files, "-o", str(tmp_path / "report.json"), "--checks", "joint-range")
     report = posekit.validate(files, checks="joint-range")
-    assert code == 1 and out.strip() == report.summary().strip()
+    printed, _, following = out.partition("next: ")
+    assert code == 1 and printed.strip() == report.summary().strip()
+    assert following.startswith("the same command with --repair repaired/")
     written = posekit.open(tmp_path / "report.json").table()
     for name, column in report.table().items():
         np.testing.assert_array_equal(written[name], column)
@@ -39,7 +41,8 @@ def test_kept_and_repaired_clips_decide_the_exit_code(run: Any, tmp_path: Path) 
     (tmp_path / "text.bvh").write_text("HIERARCHY\nnothing", encoding="utf-8")
     bad = str(tmp_path / "bad.npz")
     code, out, _ = run("validate", bad, "--repair", str(tmp_path / "mended.npz"))
-    assert code == 0 and "repaired: keep 1 of 1 clip" in out
+    assert code == 0 and "repaired: keep 1 of 1 clip" in out and "next:" not in out
+    assert "--repair bad.repaired.npz" in run("validate", bad)[1]
     assert posekit.validate(tmp_path / "mended.npz").ok.all()
     assert run("validate", bad, str(tmp_path / "text.bvh"))[0] == 2
     code, out, _ = run("validate", bad, "--keep", str(tmp_path / "kept"), "--keep-spans", "0.5")
