@@ -15,8 +15,7 @@ from posekit.settings import RecoverSettings, number, picture_size
 
 if TYPE_CHECKING:
     from posekit.body import Figure
-    from posekit.cameras import PinholeCamera, View
-    from posekit.following.detections import Detections
+    from posekit.cameras import CameraModel, PinholeCamera, View
     from posekit.recovery import Recovery
 
 #: A path, an array, a `View`, `Detections` or a `Motion`.
@@ -157,7 +156,8 @@ def view_of(
     InputError
         If the source holds no view and no key points, or the calibration does not fit.
     """
-    from posekit.cameras import View
+    from posekit.cameras import ScaledOrthographicCamera, View
+    from posekit.cameras.pinhole import camera_from_fov
     from posekit.following.detections import Detections
     from posekit.formats import open as open_file
     from posekit.formats.arrays import key_points_of
@@ -176,46 +176,19 @@ def view_of(
             "judge motion and results with posekit validate; make a view of motion with posekit synth mocap"
         )
         raise refusal(name, "", kind_of(source), "a view or key points", remedy)
-    return detected_view(
-        source,
-        camera=opened_camera(camera, unit),
-        person=person,
-        rate=rate,
-        stature=None if stature is None else number(stature, "stature"),
-        size=picture_size(size),
-        fov=fov,
-        min_confidence=min_confidence,
-    )
-
-
-def detected_view(
-    detections: Detections,
-    *,
-    camera: PinholeCamera | None,
-    person: str = "",
-    rate: float | None = None,
-    stature: float | None = None,
-    size: tuple[int, int] | None = None,
-    fov: float | None = None,
-    min_confidence: float = 0.0,
-) -> View:
-    """Make the view of one person from key points: see `view_of`."""
-    from posekit.cameras import ScaledOrthographicCamera
-    from posekit.cameras.pinhole import camera_from_fov
-
-    size = size or detections.size
-    taken: Any = camera
-    if taken is None and fov is not None:
-        if size is None:
+    known: CameraModel | None = opened_camera(camera, unit)
+    pixels = picture_size(size) or source.size
+    if known is None and fov is not None:
+        if pixels is None:
             raise refusal(
                 "", "fov", shown(fov), "the pictures' size, too", "give it with --set size=1280x720"
             )
-        taken = camera_from_fov(size, fov, "horizontal")
-    return detections.view(
-        taken if taken is not None else ScaledOrthographicCamera(scale=None),
+        known = camera_from_fov(pixels, fov, "horizontal")
+    return source.view(
+        known or ScaledOrthographicCamera(scale=None),
         person=person,
         rate=rate,
-        stature=stature,
+        stature=None if stature is None else number(stature, "stature"),
         min_confidence=min_confidence,
     )
 

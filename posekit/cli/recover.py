@@ -50,23 +50,14 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
     """Recover every posture behind a view: each passes the checks and reprojects onto the image."""
     from posekit import save
-    from posekit.doors import opened_camera, view_of
+    from posekit.doors import view_of
     from posekit.recovery.conductor import recover as recover_view
 
     settings = settings_from(RecoverSettings, given)
     if linkage:
         say("\n".join(recover_linkage(source, linkage, settings, output)))
         return
-    view = view_of(
-        source,
-        camera=opened_camera(given["camera"], given["unit"]),
-        person=given["person"],
-        layout=given["layout"],
-        rate=given["rate"],
-        size=given["size"],
-        fov=given["fov"],
-        min_confidence=given["min_confidence"],
-    )
+    view = view_of(source, **given)
     recovery = recover_view(view, settings)
     if output.suffix == ".html":
         from posekit.viewer import draw
