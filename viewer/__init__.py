@@ -37,8 +37,8 @@ def draw(
 
     Parameters
     ----------
-    source : Motion, Recovery, View with truth, Report or array (T, 14, 3)
-        The bodies to draw; arrays are in metres.
+    source : Motion, Recovery, Report, View with truth, or Robot
+        The bodies to draw; a robot is drawn at its neutral configuration.
     target : path
         ``.png`` (frames or alternative postures side by side), ``.gif`` and ``.mp4`` (one frame after the other),
         ``.html`` (a page that needs nothing else), ``.svg`` and ``.pdf`` (plots).

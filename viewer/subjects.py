@@ -328,12 +328,9 @@ def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subj
 
 
 def as_motion(source: Any) -> Any:
-    """Return an array (T, 14, 3) or (14, 3), the truth of a view, or a robot at neutral as a motion; others as is."""
+    """Return the truth of a view, or a robot at neutral, as a motion; other objects as they are."""
     if isinstance(source, Robot):
         return Motion(q=source.neutral[None], q_names=source.configuration_names, robot=source.source)
     if isinstance(source, View):
         return Motion(joints=source.truth, time=source.time, up="-y", source=source.source)
-    if isinstance(source, Sequence | np.ndarray):
-        joints = np.asarray(source, dtype=np.float64)
-        return Motion(joints=joints[None] if joints.ndim == 2 else joints)
     return source

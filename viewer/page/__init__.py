@@ -12,7 +12,6 @@ from typing import Any, Final
 
 from posekit.files import write_bytes
 from posekit.viewer.page.data import page_data
-from posekit.viewer.subjects import as_motion
 
 #: Scripts of a page; each uses those before it.
 SCRIPTS: Final = ("sight.js", "panel.js", "tables.js", "scene.js", "play.js")
@@ -23,7 +22,7 @@ POLICY: Final = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsa
 
 def write_page(
     source: Any,
-    path: str | Path,
+    path: Path,
     *,
     view: Any = None,
     frame: int | tuple[int, int] | None = None,
@@ -33,7 +32,7 @@ def write_page(
 
     Parameters
     ----------
-    source : Recovery, Motion, Report, View with truth or array (T, 14, 3)
+    source : Recovery, Motion or Report
         A motion is judged by the usual checks; its page shows the findings beside the body.
     path : path
         The HTML file.
@@ -49,8 +48,7 @@ def write_page(
     InputError
         If there is nothing to show, or the file cannot be written.
     """
-    path = Path(path)
-    data = page_data(as_motion(source), path.stem, view=view, frame=frame, urdf=urdf)
+    data = page_data(source, path.stem, view=view, frame=frame, urdf=urdf)
     write_bytes(path, page_html(data).encode())
 
 
