@@ -108,7 +108,7 @@ def samples(folder: str | Path) -> list[str]:
     photo = forget_camera(random_views(1, np.random.default_rng(PHOTO_SEED)))
     save(replace(photo, image=photo.image.round(), deviation=POINT_DEVIATION), folder / "photo.json")
 
-    walker = Walker(figure=load_figure().scaled(stature=STATURE))
+    walker = Walker(figure=load_figure().scaled(_lengths_of_a_person()))
     figure, time = walker.figure, np.arange(WALK_FRAMES) / RATE
     q = walker.configurations(walker.phase(time))
     q[:, :3] += walker.travel(time)
@@ -124,6 +124,18 @@ def samples(folder: str | Path) -> list[str]:
     save(jump, folder / "jump.bvh")
     _write_robots(folder)
     return [f"{name:<18}{content}" for name, content in SAMPLE_FILES.items()]
+
+
+def _lengths_of_a_person() -> dict[str, float]:
+    """Draw the lengths of the walking person, metres, between the points that a detector sees."""
+    from posekit.recovery.person import PROPORTIONS, by_segment
+
+    people, rng = PROPORTIONS["people"], np.random.default_rng(NOISE_SEED)
+    drawn = {
+        name: share * rng.lognormal(0.0, people["deviations"][name])
+        for name, share in people["shares"].items()
+    }
+    return {name: STATURE * share for name, share in by_segment(drawn).items()}
 
 
 def _write_key_points(folder: Path, points: Array) -> None:

@@ -8,6 +8,7 @@ import pytest
 import posekit
 from posekit.body import lay, load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
+from posekit.evaluation import evaluate
 from posekit.geometry import pa_mpjpe
 from posekit.recovery import Answer, Frames, Recovery, Survivors
 from posekit.recovery.answer import answers_of, joint_radius, representatives
@@ -237,6 +238,31 @@ def test_a_photograph_of_a_stranger_has_the_proportions_of_people(tmp_path):
         for proportions in ("auto", "people", "figure")
     }
     assert error["auto"] == error["people"] < 0.9 * error["figure"]
+
+
+def test_lengths_between_key_points_are_those_of_the_literature(tmp_path):
+    """de Leva 1996, table 4 (means of women and men); ANSUR II less 2.27 % of stature on either side; neck between."""
+    samples(tmp_path)
+    seen = recover(posekit.open(tmp_path / "photo.json"), stature=1.8).lengths
+    shares = {"shoulder-elbow": 0.16018, "elbow-wrist": 0.15339, "hip-knee": 0.22745, "knee-ankle": 0.25285}
+    for name, share in shares.items():
+        start, end = name.split("-")
+        for side in ("right", "left"):
+            assert seen[f"{side}_{start}-{side}_{end}"] == pytest.approx(1.8 * share, rel=3e-4), name
+    for name, share in {"shoulder": 0.1913, "hip": 0.1103}.items():
+        assert seen[f"right_{name}-left_{name}"] == pytest.approx(1.8 * share, rel=3e-4), name
+    half = seen["right_shoulder-left_shoulder"] / 2
+    assert seen["neck-left_shoulder"] == pytest.approx(half, rel=1e-3)
+    assert np.hypot(half, seen["neck-pelvis"]) == pytest.approx(seen["left_shoulder-pelvis"], rel=1e-3)
+
+
+def test_key_points_of_the_walk_are_recovered_by_its_stature(tmp_path):
+    samples(tmp_path)
+    seen, walk = posekit.open(tmp_path / "keypoints"), posekit.open(tmp_path / "walk.npz")
+    view = seen.view(posekit.open(tmp_path / "calibration.toml")["cam_01"], rate=10, stature=1.75)
+    found = evaluate(recover(view), walk).summary()
+    assert found["regions"] > 0.9
+    assert found["error_mm"]["answer"]["pa"]["median"] < 70
 
 
 def test_an_exact_photograph_has_an_exact_tree():

@@ -232,7 +232,6 @@ class Figure(Robot):
         head_points: Mapping[str, ArrayLike] | None = None,
         *,
         stature: float | None = None,
-        key_points: bool = False,
         behind: bool | None = None,
         known: LengthUncertainty = MEASURED_LENGTHS,
     ) -> Figure:
@@ -252,8 +251,6 @@ class Figure(Robot):
         stature : float, optional
             Height of the person, metres: lengths that are not given follow from it (`lengths_from_stature`), and the
             head is scaled with the stature.
-        key_points : bool
-            Use lengths between detectors' key points (`lengths_from_stature`).
         behind : bool, optional
             Whether the shoulders lie behind the line from neck to pelvis, if positions tell it
             (`shoulders_are_behind`).
@@ -267,9 +264,8 @@ class Figure(Robot):
         """
         lengths, head_points = dict(lengths or {}), dict(head_points or {})
         if stature is not None:
-            usual = lengths_from_stature(stature, self.lengths, key_points=key_points)
-            spine = lengths_from_stature(stature, self.lengths)["neck-pelvis"]
-            ratio = spine / self.lengths["neck-pelvis"]
+            usual = lengths_from_stature(stature, self.lengths)
+            ratio = usual["neck-pelvis"] / self.lengths["neck-pelvis"]
             lengths = usual | lengths
             usual_head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(HEAD_POINTS)}
             head_points = head_points or usual_head

@@ -53,21 +53,6 @@ MIN_WIDTH_PART: Final = 0.25
 WIDTH_SHARES: Final = (0.259, 0.191)
 TRUNK_SHARE: Final = 0.818 - 0.530
 
-#: The same between joint centres, means of women and men: de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment
-#: inertia parameters", J Biomech 29:1223, Table 4 (statures 1735 and 1741 mm).
-CENTRE_SHARES: Final = {
-    ("shoulder", "elbow"): (275.1 / 1735 + 281.7 / 1741) / 2,
-    ("elbow", "wrist"): (264.3 / 1735 + 268.9 / 1741) / 2,
-    ("hip", "knee"): (368.5 / 1735 + 422.2 / 1741) / 2,
-    ("knee", "ankle"): (438.6 / 1735 + 440.3 / 1741) / 2,
-}
-
-#: Widths between key points. Shoulders: the breadth over the acromia (415.7 of 1756.2 mm: Gordon et al. 2014, ANSUR II)
-#: less what detectors mark further in on either side, near the heads of the humeri (fitted to MediaPipe's points,
-#: triangulated by four cameras; OpenPose's BODY_25B agrees within 1 %). Hips: the heads of the femurs (X-ray of 500
-#: adults: 91.54 of 1629 and 95.02 of 1756.2 mm from the middle).
-KEY_POINT_WIDTHS: Final = (415.7 / 1756.2 - 2 * 0.0227, 91.54 / 1629.0 + 95.02 / 1756.2)
-
 #: Accepted statures: beyond those ever recorded a number is more likely in another unit.
 STATURE_METRES: Final = (0.4, 2.8)
 
@@ -276,7 +261,7 @@ def stature_from_lengths(lengths: Lengths) -> float:
     return total / (2 * sum(LIMB_SHARES.values()))
 
 
-def lengths_from_stature(stature: float, reference: Lengths, *, key_points: bool = False) -> dict[str, float]:
+def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]:
     """Estimate the 17 lengths of a person of a given stature.
 
     Limbs and widths are fractions of stature. Neck and pelvis joint have the reference figure's proportions: their
@@ -289,9 +274,6 @@ def lengths_from_stature(stature: float, reference: Lengths, *, key_points: bool
         Standing height, metres.
     reference : mapping
         The reference figure's lengths, metres.
-    key_points : bool
-        Use lengths between key points of detectors, close to joint centres, with the neck in the middle of the
-        shoulders, in place of Drillis & Contini's of anatomical landmarks.
 
     Returns
     -------
@@ -307,33 +289,18 @@ def lengths_from_stature(stature: float, reference: Lengths, *, key_points: bool
     if not low <= stature <= high:
         expected, remedy = f"{low} to {high} m", "check its unit"
         raise refusal("figure", "stature", f"{stature:g} m", expected, remedy, error=FigureError)
-    limbs, widths = (CENTRE_SHARES, KEY_POINT_WIDTHS) if key_points else (LIMB_SHARES, WIDTH_SHARES)
     torso, hips = torso_points(reference), hips_points(reference)
-    across = widths[0] * stature / (torso[2, 1] - torso[1, 1])
+    across = WIDTH_SHARES[0] * stature / (torso[2, 1] - torso[1, 1])
     height = (torso[1, 2] + torso[2, 2]) / 2 - (torso[3, 2] + (hips[1, 2] + hips[2, 2]) / 2)
     along = TRUNK_SHARE * stature / height
     torso *= [across, across, along]
-    hips *= [1.0, widths[1] * stature / (hips[2, 1] - hips[1, 1]), along]
+    hips *= [1.0, WIDTH_SHARES[1] * stature / (hips[2, 1] - hips[1, 1]), along]
     place = {**dict(enumerate(torso)), 4: hips[1] + torso[3], 5: hips[2] + torso[3]}
     trunk = [(a, b) for a, b in SEGMENTS if a in place and b in place]
     lengths = {segment_name((a, b)): float(np.linalg.norm(place[a] - place[b])) for a, b in trunk}
-    for (a, b), share in limbs.items():
+    for (a, b), share in LIMB_SHARES.items():
         lengths |= {f"{side}_{a}-{side}_{b}": share * stature for side in SIDES}
-    return middle_neck(lengths) if key_points else lengths
-
-
-def middle_neck(lengths: Lengths) -> dict[str, float]:
-    r"""Return a figure's lengths with its neck in the middle between its shoulders, as most detectors place it.
-
-    With shoulders w apart and c from the pelvis joint, the neck is w / 2 from each and :math:`\sqrt{c^2 - w^2 / 4}`
-    from the pelvis joint; c is the mean of both sides.
-    """
-    half = lengths["right_shoulder-left_shoulder"] / 2
-    to_pelvis = (lengths["right_shoulder-pelvis"] + lengths["left_shoulder-pelvis"]) / 2
-    moved = {"neck-pelvis": math.sqrt(to_pelvis**2 - half**2)}
-    for side in SIDES:
-        moved |= {f"neck-{side}_shoulder": half, f"{side}_shoulder-pelvis": to_pelvis}
-    return {**lengths, **moved}
+    return lengths
 
 
 def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:

@@ -21,7 +21,7 @@ from posekit.skeleton import SEGMENT_NAMES
 PROPORTIONS: Final = tomllib.loads((DATA / "priors" / "proportions.toml").read_text(encoding="utf-8"))
 
 
-def _by_segment(table: Mapping[str, float]) -> dict[str, float]:
+def by_segment(table: Mapping[str, float]) -> dict[str, float]:
     """Expand a table of segments without sides: the left and the right segment have the same value."""
     sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
     return {name: table[bare] for name, bare in sideless.items() if bare in table}
@@ -41,11 +41,11 @@ def figure_of_view(view: View, settings: RecoverSettings, figure: Figure | None)
     if _of_people(view, settings) and figure is None:
         # Key points of a detector, and photographs of strangers, have the mean proportions of people.
         size = stature or people["stature"]
-        lengths = {name: share * size for name, share in _by_segment(people["shares"]).items()}
+        lengths = {name: share * size for name, share in by_segment(people["shares"]).items()}
         stature = None
     if settings.proportions == "taylor":
         unit = (stature or stature_from_lengths(base.lengths)) / taylor["stature"]
-        lengths |= {name: share * unit for name, share in _by_segment(taylor["shares"]).items()}
+        lengths |= {name: share * unit for name, share in by_segment(taylor["shares"]).items()}
     return _person(base, stature, tuple(lengths.items()), view.shoulders, tuple(head.items()))
 
 
@@ -87,6 +87,6 @@ def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -
         return STATED_LENGTHS
     other = UNKNOWN_ADULT if (settings.stature or view.stature) is None else KNOWN_STATURE
     if _of_people(view, settings):
-        return LengthUncertainty(common=other.common, own=_by_segment(PROPORTIONS["people"]["deviations"]))
+        return LengthUncertainty(common=other.common, own=by_segment(PROPORTIONS["people"]["deviations"]))
     own = {name: (STATED_LENGTHS if name in view.lengths else other).own[name] for name in SEGMENT_NAMES}
     return LengthUncertainty(common=STATED_LENGTHS.common if view.lengths else other.common, own=own)
