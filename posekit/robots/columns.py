@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.errors import cut, nearest, shown
+from posekit.errors import nearest, shown
 from posekit.geometry import Array
 from posekit.robots.kinematics import entries_of
 from posekit.robots.urdf import FREEDOM, Element, need, numbers
 
 if TYPE_CHECKING:
     from posekit.robots.robot import Robot
+
+#: Largest number of names that a note lists.
+MOST_LISTED: Final = 12
 
 
 class Mimic(NamedTuple):
@@ -76,7 +79,10 @@ def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple
         f"{len(left)} of {len(entries)} entries have no column and are neutral": left,
         f"Columns that are not a joint of {robot.name} are ignored": ignored,
     }
-    return q, tuple(f"{note}: {cut(', '.join(some))}." for note, some in notes.items() if some)
+    listed = {
+        note: [*some[:MOST_LISTED], *(["…"] if some[MOST_LISTED:] else [])] for note, some in notes.items()
+    }
+    return q, tuple(f"{note}: {', '.join(some)}." for note, some in listed.items() if some)
 
 
 def _key(name: str) -> str:
