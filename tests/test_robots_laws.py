@@ -9,7 +9,9 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 
+import posekit
 from posekit.robots import Robot, load_robot
+from posekit.skeleton import JOINTS
 from tests.test_robots import LIMIT, configurations, joint, link, text
 
 
@@ -60,3 +62,38 @@ def test_angles_of_a_posture_do_not_depend_on_where_it_stands_and_looks(name: st
     np.testing.assert_allclose(again, distance, atol=1e-6)
     np.testing.assert_allclose(moved[:, 7:], q[:, 7:], atol=1e-4)
     np.testing.assert_allclose(robot.points(moved), robot.points(q) @ turn.T + move, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "strict"),
+    [("human", 1.0, False), ("human", 1.1, False), ("human", 1.1, True), ("g1", 1.0, True)],
+)
+def test_positions_are_judged_by_the_configurations_that_reach_them(
+    name: str, size: float, strict: bool
+) -> None:
+    """A robot that is not scaled cannot reach the joints of a person of another size."""
+    robot = load_robot(name, bodies="none")
+    joints = size * robot.points(configurations(robot, 5, 0.3, seed=3))
+    joints[1] = np.nan
+    joints[2, JOINTS.index("left_wrist"), 2] += 3.0
+    joints[3, JOINTS.index("right_elbow")] = np.nan
+    settings = posekit.ValidateSettings(strict=strict, checks="reach,joint-range")
+    report = posekit.validate(posekit.Motion(joints=joints), settings, urdf=name)
+    table, near = report.table(), size == 1.0 or not strict
+    assert report.ok.tolist() == [near, False, False, near, near]
+    assert set(table["check"][table["verdict"] == "invalid"]) == {"reach"}
+    assert table["verdict"][table["frame"] == 1].tolist() == ["undecided"] * 2
+    assert 0.5 < table["value"][(table["frame"] == 2) & (table["place"] == "left_wrist")] < 3.0
+
+
+def test_a_joint_may_be_beyond_reach_by_the_tolerance_of_lengths() -> None:
+    robot = load_robot("human", bodies="none")
+    joints = robot.points(robot.neutral[None])[:, :14]
+    joints[:, JOINTS.index("left_wrist"), 2] -= 0.4
+
+    def found(tolerance: float | None) -> posekit.Report:
+        settings = posekit.ValidateSettings(strict=True, checks="reach", rigid_tolerance=tolerance)
+        return posekit.validate(posekit.Motion(joints=joints), settings, urdf="human")
+
+    worst = found(1e-4).table()["value"].max()
+    assert 0.03 < worst < 0.4 and not found(None).ok and not found(0.99 * worst).ok and found(1.01 * worst).ok

@@ -14,7 +14,7 @@ import numpy as np
 
 from posekit.errors import refusal, shown
 from posekit.formats.body_checks import METRES, times
-from posekit.formats.layout import Layout, load_layout
+from posekit.formats.layout import Layout, by_order, load_layout
 from posekit.formats.options import Options
 from posekit.formats.tables import TIMES, Table, seconds
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, quaternion_rotate
@@ -97,8 +97,9 @@ def _whole(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> str | None:
     """Return the name of the array that holds root and joints; it has 7 columns more than there are joint names."""
     wide = len(_labels(parts, columns)) + len(ROOT_NAMES)
     for name in parts["whole"]["arrays"]:
-        values = columns.get(name)
-        sure = name in parts["whole"].get("sure", ("",))
+        values: Any = columns.get(name)
+        posture = np.shape(values)[1:] == (3,) and by_order(len(values))  # the joints of one posture
+        sure = name in parts["whole"].get("sure", ("",)) and not posture
         if isinstance(values, np.ndarray) and values.ndim == 2 and (sure or values.shape[1] == wide):
             return str(name)
     return None
