@@ -1,11 +1,11 @@
-r"""Closed-form joint angles of a posture: all branches of the decomposition, and the choice among them by limits.
+r"""Joint angles of a posture in closed form: all Euler branches, and the choice of one by the joint limits.
 
 A ball joint of the figure is three revolutes, :math:`R = R_y(\alpha) R_x(\beta) R_z(\gamma)` in the parent's
 frame (x forward, y left, z up); a hinge below it turns about y by :math:`\varepsilon`. A limb hangs along -z,
 so that its upper segment points along
 :math:`R(-e_z) = (-\sin\alpha \cos\beta, \sin\beta, -\cos\alpha \cos\beta)`.
 
-Returned angles are the URDF joints' own: each is the rotation above times the sign of the joint's axis.
+Returned angles are those of the URDF's joints: each is an angle above times the sign of the joint's axis.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ LIMBS: Final = tuple(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """Signs and limits of consecutive revolutes.
+    """Signs and limits of consecutive revolute joints.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Limits:
     upper: Array
 
     def part(self, first: int, count: int) -> Limits:
-        """Return the limits of some consecutive revolutes."""
+        """Return the limits of `count` consecutive joints from the joint `first` on."""
         part = (..., slice(first, first + count))
         return Limits(sign=self.sign[part], lower=self.lower[part], upper=self.upper[part])
 
@@ -86,7 +86,7 @@ class Limits:
         return turned_near(angles, (self.lower + self.upper) / 2)
 
     def cost(self, angles: Array) -> Array:
-        """Return the cost (...) of branches (..., K): the largest violation, radians.
+        """Return the cost (...) of Euler branches (..., K): the largest violation of a limit, radians.
 
         The axial rotation of a whole limb (K = 4) is weighted by how far it turns the lower segment: little if
         the limb is almost straight.
@@ -108,12 +108,13 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Limits of all 22 angles. They decide among the branches; a free angle is set inside its limits.
+        Limits of all 22 angles. They choose the Euler branch. An angle that the posture does not determine is set
+        inside its limits.
     head_offsets : array (5, 3)
         From the neck to the head's points, head link's frame, metres.
     middle_pelvis : bool
-        Whether the pelvis is between the hips, so that the spine gives their orientation. The flexion of the pelvis is
-        then the least that brings both thighs inside their limits, if possible.
+        Whether the pelvis is between the hips, so that the spine gives their orientation. Then the pelvis flexes by the
+        smallest angle that brings both hips inside their limits, if there is one.
     """
 
     limits: Limits
@@ -121,7 +122,7 @@ class ClosedForm:
     middle_pelvis: bool = False
 
     def with_limits(self, lower: Array, upper: Array) -> ClosedForm:
-        """Return the same with other limits (22,) of the figure's angles, radians."""
+        """Return the same inverse kinematics with other limits (22,) of the figure's angles, radians."""
         return replace(self, limits=Limits(sign=self.limits.sign, lower=lower, upper=upper))
 
     def angles(self, points: Array) -> Array:
@@ -178,9 +179,10 @@ class ClosedForm:
 
     @cached_property
     def _choosing(self) -> Limits:
-        """Limits that decide among branches; with a pelvis between the hips, hip flexion includes pelvis flexion.
+        """Limits that choose the Euler branch; with a pelvis between the hips, hip flexion includes pelvis flexion.
 
-        The share of the pelvis is unknown. Turning the hips about the line between them changes only hip flexion.
+        The points do not show how pelvis and hips share that flexion: a turn of the pelvis about the line between the
+        hips changes hip flexion alone.
         """
         if not self.middle_pelvis:
             return self.limits
@@ -193,13 +195,13 @@ class ClosedForm:
 
     @property
     def _pelvis_turn(self) -> tuple[float, float]:
-        """Limits of the pelvis's flexion, radians, in the sense of a hip's flexion."""
+        """Limits of pelvis flexion, radians, with the sign of hip flexion."""
         sign = self.limits.sign[PELVIS_FLEXION] * self.limits.sign[HIP_FLEXIONS[0]]
         ends = (sign * self.limits.lower[PELVIS_FLEXION], sign * self.limits.upper[PELVIS_FLEXION])
         return min(ends), max(ends)
 
     def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
-        """Flex pelvises by the least that brings both hips inside their own limits (N, 22), if possible."""
+        """Flex pelvises in `angles` (N, 22) by the smallest angles that bring both hips inside their limits."""
         low, high = self._pelvis_turn
         least, most = np.full(len(angles), low), np.full(len(angles), high)
         for k in HIP_FLEXIONS:
@@ -248,9 +250,9 @@ def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     r"""Find the four angles of a ball joint and the hinge below it.
 
-    Two Euler branches times two signs of the hinge are tried. If the limb is straight the axial rotation
-    is free, and if the upper segment lies along the abduction axis the first angle is: where none of the
-    four branches is inside the limits, the free angles are used to bring one inside.
+    There are four candidates: two Euler branches, each with both signs of the hinge. A straight limb leaves its axial
+    rotation free. An upper segment along the abduction axis leaves the first angle free. If all four candidates violate
+    the limits, the free angles are turned to bring one candidate inside.
 
     Parameters
     ----------
@@ -262,7 +264,8 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     Returns
     -------
     array (N, 4)
-        Radians; NaN if a direction is unknown. Rotation and hinge alone are NaN if `lower` is.
+        Radians; NaN if a direction is unknown. If only `lower` is unknown, only the axial rotation and the hinge angle
+        are NaN.
     """
     angles = np.full((len(upper), N_LIMB_ANGLES), np.nan)
     both = np.asarray(np.isfinite(upper).all(axis=1) & np.isfinite(lower).all(axis=1))
@@ -285,7 +288,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
 
 
 def _upper_angles(upper: Array, limits: Limits) -> Array:
-    """Find flexion and abduction (N, 2) of directions (N, 3), the lower segment being unknown."""
+    """Find flexion and abduction (N, 2) of a limb from the direction (N, 3) of its upper segment alone."""
     angles = _least_violating(direction_branches(upper) * limits.sign, limits)
     angles[:, 0] = np.where(_along_abduction_axis(upper), limits.clip(0, angles[:, 0]), angles[:, 0])
     return angles
@@ -308,11 +311,11 @@ def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
 
 
 def other_branch(angles: Array) -> Array:
-    r"""Return the angles of the same rotation with the second on the other side of a quarter turn.
+    r"""Return the angles of the other Euler branch: the same rotation, with the second angle beyond a quarter turn.
 
     :math:`(\alpha, \beta, \gamma) \to (\alpha + \pi, \pi - \beta, \gamma + \pi)` for rotations about three mutually
-    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). The first two alone give the third
-    axis the same direction; a hinge that follows the three keeps its angle.
+    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). Both branches give the third axis the same
+    direction, and a hinge after the three joints keeps its angle.
 
     Parameters
     ----------
@@ -326,10 +329,10 @@ def other_branch(angles: Array) -> Array:
 
 
 def continuous(angles: Array) -> Array:
-    """Choose among the angles (T, J, 3) of the same rotations those that jump least from frame to frame.
+    """Choose, for each rotation, the equivalent angles (T, J, 3) that change least from frame to frame.
 
-    The first frame stays; no step is a full turn, and none goes to the other branch a + pi, pi - b, c + pi (Diebel
-    2006, *Representing Attitude*, section 5.6).
+    The angles of the first frame stay. In later frames neither a full turn nor a change to the other branch a + pi, pi
+    - b, c + pi (Diebel 2006, *Representing Attitude*, section 5.6) is left.
     """
     angles = np.array(angles, dtype=np.float64)
     if len(angles) < 2:
@@ -352,7 +355,7 @@ def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: 
 
 
 def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits) -> Array:
-    r"""Bring limbs (N) inside their limits by their free angles, if that helps.
+    r"""Turn the free angles of limbs (N) so that the limbs lie inside their limits, if such angles exist.
 
     A straight limb's axial rotation is put into its limits. At beta = +-90 deg,
     :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
@@ -382,12 +385,12 @@ def _parallel(upper: Array, lower: Array) -> Flags:
 
 
 def _along_abduction_axis(upper: Array) -> Flags:
-    """Return which directions (N, 3) leave the first angle free."""
+    """Return which directions (N, 3) of an upper segment leave the first angle (flexion) free."""
     return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
 def direction_branches(upper: Array) -> Array:
-    """Return both (alpha, beta) of directions (N, 3), (2, N, 2)."""
+    """Return the two pairs (alpha, beta) that point the upper segment along directions (N, 3): an array (2, N, 2)."""
     alpha = np.arctan2(-upper[:, 0], 0.0 - upper[:, 2])  # 0 along the abduction axis
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
@@ -395,7 +398,7 @@ def direction_branches(upper: Array) -> Array:
 
 
 def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
-    """Turn directions into the frame reached after alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
+    """Return the directions `lower` in the frame after the turns alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     x, y, z = lower[:, 0], lower[:, 1], lower[:, 2]
     forward = sa * x + ca * z
@@ -403,7 +406,7 @@ def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Return the branch (N, K) of (B, N, K) that violates the limits least, the first of those that tie."""
+    """Return the candidate (N, K) of candidates (B, N, K) that violates the limits least; the first of a tie."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)

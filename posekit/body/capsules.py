@@ -1,4 +1,4 @@
-"""The figure's collision bodies, as capsules laid along lines between its points."""
+"""The figure's collision bodies: capsules along the lines between its points."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Capsule:
     link : str
         The URDF link.
     start, end : tuple of int
-        Points whose means start and end the axis.
+        Indices of points: the mean of each set is one end of the axis.
     center : float
         Distance from the start to the capsule's middle along the axis, metres.
     half_length : float
@@ -52,11 +52,11 @@ class Capsule:
 
     @property
     def points(self) -> tuple[int, ...]:
-        """The points that place the capsule."""
+        """Indices of the points that determine the capsule's position."""
         return self.start + self.end
 
     def place(self, points: Array) -> tuple[Array, Array]:
-        """Lay the capsule along a posture's own points.
+        """Place the capsule along the points of postures.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ def read_capsules(
 
 
 def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule, ...]:
-    """Let capsules grow with their part, from the neutral points of one figure (19, 3) to those of another.
+    """Scale capsules with the parts of the body: from the neutral points (19, 3) of one figure to those of another.
 
     A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with the same
     ratio, the torso's with the width of the shoulders.

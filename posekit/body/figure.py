@@ -69,13 +69,13 @@ SAME_POINT_METRES: Final = 1e-6
 
 
 class Configurations(NamedTuple):
-    """Configurations and how far their joints are from the postures they came from.
+    """Configurations, and the distance of their joints from the postures that they were computed from.
 
     Attributes
     ----------
     q : array (N, nq)
-        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. NaN in angles of unknown joints;
-        an unknown head is at neutral.
+        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. Angles of unknown joints are NaN; an
+        unknown head has its neutral orientation.
     distance : array (N,)
         The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
     """
@@ -91,14 +91,14 @@ class Figure(Robot):
     Parameters
     ----------
     urdf, srdf : str
-        The texts; the model, the lengths, limits, capsules and checked pairs are read from them.
+        Text of the URDF and of the SRDF. The model, lengths, limits, capsules and collision pairs are read from them.
     source : str
         Name of the URDF in errors.
     side_known : bool
         Whether it is known on which side of the line from neck to pelvis the shoulders lie: a URDF determines it,
         lengths do not.
     moved_lengths : mapping
-        Changes of lengths so that torso and hips close, metres, by segment name.
+        Changes of lengths, metres, by segment name, that made the distances within torso and hips consistent.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class Figure(Robot):
 
     @cached_property  # type: ignore[misc]
     def urdf(self) -> str:
-        """The URDF as it was given; that of a figure from `scaled` is written when it is read for the first time."""
+        """The text of the URDF. A figure made by `scaled` writes its URDF when this property is first read."""
         return str(vars(self)["_writer"]())
 
     @cached_property
@@ -167,7 +167,7 @@ class Figure(Robot):
 
     @property
     def shoulder_side(self) -> Literal["front", "behind", "undecided"]:
-        """Side of that line on which they are; undecided if unknown, and for a flat torso."""
+        """Side of the line from neck to pelvis on which the shoulders lie; undecided if unknown or zero."""
         if not self.side_known or self.shoulder_offset == 0:
             return "undecided"
         return "behind" if self.shoulder_offset < 0 else "front"
@@ -191,7 +191,7 @@ class Figure(Robot):
 
     @property
     def capsule_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Index pairs into `capsules` that are to be checked."""
+        """Index pairs into `capsules` that are checked for collision."""
         return self._bodies[1]
 
     @cached_property
@@ -235,11 +235,12 @@ class Figure(Robot):
         behind: bool | None = None,
         known: LengthUncertainty = MEASURED_LENGTHS,
     ) -> Figure:
-        """Make the same figure with other lengths; capsules grow with their part.
+        """Return the figure with other lengths; its capsules are scaled with the parts of the body.
 
-        Lengths that do not close are replaced by the nearest that do (`posekit.body.lengths`), and `moved_lengths` has
-        the changes. Lengths do not determine on which side of the line from neck to pelvis the shoulders lie: unless it
-        is given, or the torso is unchanged, the new figure does not know it (`side_known`).
+        Lengths that are inconsistent within torso or hips are replaced by the nearest consistent lengths
+        (`posekit.body.lengths`); `moved_lengths` has the changes. Lengths do not determine whether the shoulders lie in
+        front of the line from neck to pelvis or behind it. Without `behind`, the new figure does not know the side
+        (`side_known`), unless the torso is unchanged.
 
         Parameters
         ----------
@@ -252,10 +253,10 @@ class Figure(Robot):
             Height of the person, metres: lengths that are not given follow from it (`lengths_from_stature`), and the
             head is scaled with the stature.
         behind : bool, optional
-            Whether the shoulders lie behind the line from neck to pelvis, if positions tell it
-            (`shoulders_are_behind`).
+            Whether the shoulders lie behind the line from neck to pelvis; `shoulders_are_behind` finds it from
+            positions.
         known : LengthUncertainty
-            Uncertainty of the lengths: uncertain ones are changed more if the lengths do not close.
+            Uncertainty of the lengths. If the lengths are inconsistent, the less certain ones change more.
 
         Raises
         ------
@@ -304,7 +305,7 @@ class Figure(Robot):
         return points
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
-        """Return the figure with an unknown side of the shoulders if uncertain lengths do not determine it."""
+        """Return the figure, with an unknown side of the shoulders if lengths so uncertain do not determine it."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
         return replace(self, side_known=False)
@@ -320,7 +321,7 @@ class Figure(Robot):
         Path(path).write_text(self.urdf, encoding="utf-8")
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
-        """Place the 19 points of configurations.
+        """Return the positions of the 19 points at configurations.
 
         Parameters
         ----------
@@ -330,7 +331,7 @@ class Figure(Robot):
         Returns
         -------
         array (N, 19, 3)
-            Metres; NaN in points that follow from an unknown entry of q.
+            Metres; NaN for points that depend on an unknown entry of q.
         """
         q = np.asarray(q, dtype=np.float64)
         angles, neutral = q[:, self.angle_index] * self.limits.sign, self.neutral_points
@@ -367,10 +368,10 @@ class Figure(Robot):
     ) -> Configurations:
         """Turn postures into configurations, in closed form.
 
-        Of all angles that give the same directions, those inside the joint limits are returned, else those that violate
-        them least. If the posture has the figure's lengths, forward kinematics returns its joints; otherwise the rigid
-        parts are the figure's own, every segment keeps its direction, and `distance` tells how far the two are apart.
-        Every posture with 14 finite joints has a finite configuration.
+        Several sets of angles give the same directions. The set inside the joint limits is returned, or else the set
+        that violates them least. If the posture has the figure's lengths, forward kinematics returns its joints.
+        Otherwise forward kinematics returns the figure's lengths with the directions of the posture's segments, and
+        `distance` is the largest difference of a joint. Every posture with 14 finite joints has a finite configuration.
 
         Parameters
         ----------
@@ -423,7 +424,7 @@ class Figure(Robot):
         return head
 
     def _check_layout(self) -> None:
-        """Raise if the joints are not placed as the closed forms assume."""
+        """Raise an error if a joint of the URDF has another position or parent than the closed forms assume."""
         q = self.neutral[None].copy()
         q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
         near = np.linalg.norm(self.forward_kinematics(q)[0] - self._placed(q[0]), axis=-1) < SAME_POINT_METRES
@@ -491,7 +492,7 @@ def _ball(angles: Array) -> Array:
 
 
 def _completed_frames(points: Array, R_torso: Array) -> Array:
-    """Replace undetermined torso frames (N, 3, 3) of whole postures, as with the shoulders in line with the spine."""
+    """Replace torso frames (N, 3, 3) that are undetermined, because the shoulders lie in line with the spine."""
     rows = np.isnan(R_torso).any(axis=(1, 2)) & np.isfinite(points[:, : len(JOINTS)]).all(axis=(1, 2))
     if rows.any():
         up = unit(points[rows, 0] - points[rows, JOINT["pelvis"]])

@@ -1,13 +1,14 @@
-r"""Segment lengths: rigid parts from their distances, the nearest lengths that close, and lengths from stature.
+r"""Segment lengths: torso and hips from their distances, the nearest consistent lengths, and lengths from stature.
 
 Six distances make a torso, and three make hips, only if triangles close and the four points of the torso fit into
-space. Medians over frames, tapes and rounded numbers miss that by a little. The nearest lengths that close lie at the
-edge of the feasible set, where the torso's points are in one plane, or the hips' on one line:
+space. Medians over frames, tape measurements and rounded numbers miss these conditions by a little. The nearest lengths
+that satisfy them lie at the edge of the feasible set, where the torso's points are in one plane, or the hips' on one
+line:
 
 .. math:: \min_p \sum_i \left(\frac{\log d_i(p) - \log l_i}{\sigma_i}\right)^2
 
-over places p of the points in that plane or on that line, for lengths l of relative standard deviations
-:math:`\sigma`. A common unknown size changes nothing: lengths that close do so in every size.
+over places p of the points in that plane or on that line, for lengths l of relative standard deviations :math:`\sigma`.
+A common unknown size has no effect: consistent lengths stay consistent if all are scaled.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def lengths_in_frames(joints: Array) -> Array:
 def segment_lengths(joints: Array) -> dict[str, float]:
     """Return the median length of each of the 17 segments over postures (N, 14, 3) or (N, 19, 3), metres.
 
-    Segments that are never seen whole, or have no length, are left out.
+    Segments whose two ends are never known together, or whose length is zero, are left out.
     """
     medians = zip(SEGMENT_NAMES, map(known_median, lengths_in_frames(joints)), strict=True)
     return {name: length for name, length in medians if length > 0}
@@ -102,10 +103,11 @@ def shoulders_are_behind(joints: Array) -> bool | None:
 def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     r"""Place neck, right shoulder, left shoulder and pelvis by their six distances.
 
-    With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that
-    line: height :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for
-    neck-shoulder a, neck-pelvis b, shoulder-pelvis c. The line between the shoulders gives the angle
-    between the two, and its part across the body the left axis. The distances leave the side open.
+    With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that line: height
+    :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for neck-shoulder a,
+    neck-pelvis b, shoulder-pelvis c. The distance between the shoulders gives the angle between the two circles'
+    points, and its part across the body gives the left axis. The distances do not determine whether the shoulders lie
+    in front of the line or behind it.
 
     Parameters
     ----------
@@ -122,7 +124,8 @@ def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     Raises
     ------
     FigureError
-        If no such body exists: a triangle does not close, or the shoulders are too far apart or too near.
+        If no such body exists: one distance of a triangle exceeds the sum of the other two, or the shoulders are too
+        far apart or too near.
     """
     right, left, forward_squared = _torso(lengths)
     if forward_squared < -FLAT_DEPTH_SQUARED:
@@ -164,7 +167,7 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
     known : LengthUncertainty
         Their uncertainty.
     deviations : float
-        Standard deviations of f by which it must differ from zero.
+        Number of standard deviations by which f must differ from zero.
     """
     squared = max(_torso(lengths)[2], 0.0)
     variance = 0.0
@@ -184,24 +187,25 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
 def closed_lengths(
     lengths: Lengths, known: LengthUncertainty = MEASURED_LENGTHS
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the nearest lengths that make a torso and hips; lengths that close already are unchanged.
+    """Return the nearest lengths with which a torso and hips exist; consistent lengths are unchanged.
 
     Parameters
     ----------
     lengths : mapping
         All 17, metres, by segment name.
     known : LengthUncertainty
-        Uncertainty of each beside their common size. If some lengths of a part are exact, all of them count alike.
+        Uncertainty of each length beside the common size. If some lengths of a part (torso or hips) are exact, all
+        lengths of that part have equal weight.
 
     Returns
     -------
     lengths, moved : dict
-        Metres, by segment name; `moved` has the changes, and only of the lengths that were changed.
+        Metres, by segment name; `moved` lists the changes, for changed lengths only.
 
     Raises
     ------
     FigureError
-        If a length would have to change by more than `MAX_MOVED` of it.
+        If a length would have to change by more than the share `MAX_MOVED`.
     """
     check_lengths(lengths)
     out, moved = dict(lengths), dict[str, float]()
@@ -226,8 +230,8 @@ LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 def lay(joints: Array, lengths: Array) -> Array:
     r"""Move postures (F, 14, 3) to the nearest ones with given segment lengths (F, 17).
 
-    Newton's steps for :math:`\min |x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. Postures in which a segment has
-    no direction are laid joint by joint, outward from the neck. Segments with an unknown end are left out.
+    Newton's steps for :math:`\min |x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. A posture with a segment of
+    length zero is placed joint by joint, outward from the neck. Segments with an unknown end are left out.
     """
     a, b = np.array(SEGMENTS).T
     x, known = np.nan_to_num(joints), np.isfinite(joints[:, :, 0])

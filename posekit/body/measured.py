@@ -1,6 +1,6 @@
 r"""The person in the frames of a recording: lengths, the side of the shoulders, and the noise of measuring.
 
-Bones keep their length, so the scatter of a limb's length over time is measuring noise. Two ends with independent
+Bones keep their length, so the scatter of a segment's length over time is measurement noise. Two ends with independent
 errors of standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
 
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
@@ -59,12 +59,12 @@ class Person(Record):
     behind : bool or None
         Whether the shoulders lie behind the line from neck to pelvis in most frames.
     noise : float
-        Standard deviation of measured coordinates, metres; NaN of fewer than ten frames.
+        Standard deviation of measured coordinates, metres; NaN for fewer than ten frames.
     limb_noise : mapping
-        The same from each limb's segment alone.
+        The same standard deviation, estimated from each limb segment alone, by segment name.
     hips_forward : float
-        Angle by which the hips lie before the line from neck to pelvis, at the pelvis, in the median frame, degrees;
-        NaN of fewer than ten frames.
+        Angle at the pelvis by which the hips lie in front of the line from neck to pelvis, median over frames, degrees;
+        NaN for fewer than ten frames.
     """
 
     lengths: Mapping[str, float]
@@ -85,7 +85,7 @@ class Person(Record):
 
 
 def person_of(joints: Array, lengths_of: Array) -> Person:
-    """Measure the person in the frames of a recording (T, 14, 3), metres, with these lengths (17, T); NaN is unknown.
+    """Measure the person in a recording (T, 14, 3), metres, with segment lengths (17, T); NaN marks unknown joints.
 
     Lengths are rounded to 0.01 mm and angles to whole degrees, so that clips of one skeleton share one figure.
     """
@@ -127,7 +127,7 @@ def _hips_forward(joints: Array) -> float:
 
 
 def _shoulders_behind(joints: Array) -> bool | None:
-    """Return the side in the frames whose knees bend forward: in other frames left and right may be exchanged."""
+    """Return whether the shoulders lie behind, from frames without exchanged sides: their knees bend forward."""
     neck, pelvis, right, left = (
         joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
     )
@@ -147,8 +147,8 @@ def _shoulders_behind(joints: Array) -> bool | None:
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
     """Return a figure with the lengths of a person, as far as they are plausible.
 
-    Implausible lengths are replaced by the figure's lengths at the person's size. If no plausible body is near the
-    lengths, all lengths except the limbs' are replaced. Clips of one skeleton share a figure.
+    Implausible lengths are replaced by the figure's lengths at the person's size. If no consistent body is near the
+    lengths, all lengths except those of the limbs are replaced. Clips of one skeleton share a figure.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-r"""Motion of a measured body as rigid pieces: torso, hips, head and eight segments, each turned about its own start.
+r"""A measured body as 11 rigid pieces: torso, hips, head and eight limb segments; each turns about its first joint.
 
-A point is its parent's place plus a vector of its piece: :math:`x_p = x_{parent(p)} + R_{piece(p)} b_p`. All lengths
-stay.
+The position of a point is the position of its parent plus a vector of its piece: :math:`x_p = x_{parent(p)} +
+R_{piece(p)} b_p`. All lengths stay.
 """
 
 from __future__ import annotations
@@ -65,14 +65,14 @@ PIECE_OF_POINT: Final = _piece_of_points()
 
 
 def vectors_of(points: Array) -> Array:
-    """Return the vector that ends at each point (N, P, 3); for the neck, its place."""
+    """Return the vector (N, P, 3) from each point's parent to the point; for the neck, its position."""
     vectors = points.copy()
     vectors[:, 1:] -= points[:, list(PIECE_PARENTS[1:])]
     return vectors
 
 
 def placed(vectors: Array) -> Array:
-    """Return the points (N, P, 3) at the ends of vectors: the inverse of `vectors_of`."""
+    """Return the points (N, P, 3) that have these vectors: the inverse of `vectors_of`."""
     points = vectors.copy()
     for point in range(1, len(NAMES)):  # parents come before their points
         points[:, point] += points[:, PIECE_PARENTS[point]]
@@ -80,9 +80,9 @@ def placed(vectors: Array) -> Array:
 
 
 def turns_between(start: Array, end: Array) -> Array:
-    """Return the rotations (N, 11, 3, 3) of the pieces that bring postures (N, P, 3) nearest to others.
+    """Return the rotations (N, 11, 3, 3) of the pieces that bring postures (N, P, 3) nearest to target postures.
 
-    A piece of one vector turns by the shortest rotation; one of which nothing is known does not turn.
+    A piece with one known vector turns by the shortest rotation; a piece without known vectors does not turn.
     """
     R = np.tile(np.eye(3), (len(start), N_PIECES, 1, 1))
     before, after = vectors_of(start), vectors_of(end)
@@ -112,7 +112,7 @@ def moved(points: Array, step: Array) -> Array:
 
 
 def carried(start: Array, end: Array, share: Array) -> Array:
-    """Turn the pieces of postures (N, P, 3) a share (N,) of the way to others, and move the neck as far."""
+    """Move postures (N, P, 3) a share (N,) of the way to target postures, by the turns of their pieces."""
     turn = vector_from_rotation(turns_between(start, end)).reshape(len(start), 3 * N_PIECES)
     shift = end[:, :1] - start[:, :1]
     return turned(start, share[:, None] * turn) + share[:, None, None] * shift

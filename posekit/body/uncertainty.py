@@ -27,11 +27,10 @@ TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "lef
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class LengthUncertainty(Record):
-    r"""Standard deviations of the logarithms of a body's 17 lengths, which for small ones are relative deviations.
+    r"""Standard deviations of the logarithms of a body's 17 lengths. Small ones are relative deviations of the lengths.
 
-    With the body's one size s and each segment's own part :math:`t_i`, a length is
-    :math:`l_i = e^{s + t_i} \bar l_i`, and the covariance of the logarithms
-    :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
+    With the size s that all lengths share, and each segment's own part :math:`t_i`, a length is :math:`l_i = e^{s +
+    t_i} \bar l_i`, and the covariance of the logarithms :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
 
     Parameters
     ----------
@@ -65,7 +64,7 @@ class LengthUncertainty(Record):
         self._set("own", MappingProxyType(own))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the numbers: a read-only mapping cannot be."""
+        """Pickle the numbers, because a read-only mapping cannot be pickled."""
         return _uncertainty, (self.common, dict(self.own))
 
     def __hash__(self) -> int:
@@ -74,10 +73,10 @@ class LengthUncertainty(Record):
 
     @staticmethod
     def uniform(deviation: float) -> LengthUncertainty:
-        """Give the size, and each length beside it, the same relative deviation.
+        """Return an uncertainty in which the size and each single length have the same relative deviation.
 
-        The trunk also bends, by `TRUNK_BENDS`, but by three times the deviation at most: with exact lengths the body is
-        stiff.
+        Lengths of the trunk also change with posture, by `TRUNK_BENDS`, but at most by three times the deviation: a
+        body with exact lengths is rigid.
         """
         own = dict.fromkeys(SEGMENT_NAMES, deviation)
         for name, bend in TRUNK_BENDS.items():
@@ -114,7 +113,7 @@ def _uncertainty(common: float, own: Mapping[str, float]) -> LengthUncertainty:
 
 
 def _varying(deviation: float, non_rigid: float) -> dict[str, float]:
-    """Give every segment one deviation, and the segments that posture changes another."""
+    """Return each segment's deviation; segments whose length changes with posture have one of their own."""
     return {name: non_rigid if name in NON_RIGID_SEGMENTS else deviation for name in SEGMENT_NAMES}
 
 

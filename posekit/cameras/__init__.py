@@ -1,4 +1,4 @@
-"""Cameras, and a person's image points in one of them: `View`."""
+"""Camera models, and `View`: the image points of one person in one camera."""
 
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift

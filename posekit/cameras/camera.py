@@ -1,4 +1,4 @@
-"""Rays of a camera, and the ray-sphere intersection behind every lift."""
+"""The base of all cameras: rays of image points, and the two possible ends of a segment on a ray."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ COINCIDENT_METRES: Final = 1e-7
 
 
 class Lift(NamedTuple):
-    """The ends that a segment can have.
+    """The possible positions of a segment's far end, given its start, its length and the ray of its image point.
 
     Attributes
     ----------
     points : array (..., 2, 3)
         The nearer and the farther candidate, camera frame, metres. NaN if the ray is unknown.
     valid : bool array (..., 2)
-        Whether each is a solution: both, the nearer alone (tangent, both coincide), or none.
+        Whether each candidate is a solution: both, only the nearer one (the ray is tangent, and both coincide), or
+        none.
     excess : array (...)
         Distance from the segment's start to the ray minus the segment's length, metres: positive if the
         segment is too short for its image.
@@ -115,7 +116,7 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
 
 
 def positive(name: str, value: float | Array | None) -> float | Array | None:
-    """Return a focal length or a scale, one or one a frame, as it is kept; None is unknown.
+    """Return a focal length or a scale, one number or one per frame, as a float or a read-only array; None if unknown.
 
     Raises
     ------
@@ -133,7 +134,7 @@ def positive(name: str, value: float | Array | None) -> float | Array | None:
 
 
 def per_frame(name: str, value: float | Array | None, ndim: int) -> Array:
-    """Shape one number, or one a frame (F,), so that it broadcasts against an array of `ndim` axes.
+    """Reshape one number, or one per frame (F,), so that it broadcasts against an array with `ndim` axes.
 
     Raises
     ------

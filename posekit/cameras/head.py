@@ -1,15 +1,15 @@
-r"""The pose of the camera, or its focal length too, from six or more points of a head (Lee & Chen 1985, §2.1).
+r"""The pose of the camera, and if unknown its focal length, from six or more points of a head (Lee & Chen 1985, §2.1).
 
 The squared reprojection error is minimised over the head's pose. With the points centred and of size 1,
 :math:`q = R\,(p - c) / \sigma`, and the head's centre at depth :math:`z`, their perspective image is
 
 .. math:: u = \frac{a + s\,q_{xy}}{1 + d\,q_z}, \qquad s = f \sigma / z, \quad d = \sigma / z,
 
-where :math:`a` is the image of the centre. With the unknowns :math:`R, a, s, d` each
-can be seen in the image, and a camera at infinity is the regular point :math:`d = 0`, the scaled orthographic
-projection. With depth and f as unknowns both would run to infinity together. With f free there are seven
-unknowns. With a known camera :math:`u` is the normalised image (f = 1), :math:`d = s`, and there are six; residuals
-are then multiplied by the camera's derivatives at the image points, which makes them pixels.
+where :math:`a` is the image of the centre. Each of the unknowns :math:`R, a, s, d` has an effect in the image, and a
+camera at infinity is the regular point :math:`d = 0`, the scaled orthographic projection. With depth and f as unknowns,
+both would diverge together. With f free there are seven unknowns. With a known camera :math:`u` is the normalised image
+(f = 1), :math:`d = s`, and there are six; residuals are then multiplied by the camera's derivatives at the image
+points, which makes them pixels.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ UNSETTLED: Final = "no pose was found from any start: check the image points and
 
 
 class HeadWarning(UserWarning):
-    """A head point does not fit the others, in one frame or in more frames than chance explains."""
+    """Warning that a head point does not fit the others: in a single frame, or in more frames than chance explains."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -80,7 +80,7 @@ class HeadPose(Record):
     t_cam_head : array (F, 3)
         The head frame's origin in the camera frame, metres.
     f : array (F,)
-        The focal length, in the image's unit; a known camera's own. A distant head hardly determines it.
+        The focal length, in the image's unit; a known camera's own. A distant head hardly determines f.
     points_cam : array (F, P, 3)
         All points of the head, seen or not, in the camera frame, metres.
     residuals : array (F, P)
@@ -108,7 +108,7 @@ class HeadPose(Record):
         return np.array([not reason for reason in self.reasons], dtype=np.bool_)
 
     def point(self, name: str) -> Array:
-        """Return one point of the head (F, 3), camera frame, metres."""
+        """Return the positions (F, 3) of one point of the head, camera frame, metres."""
         return np.asarray(self.points_cam[:, self.head.names.index(name)])
 
 
@@ -179,7 +179,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
                 reasons[row] += f"; check head point {misfit[row]} first, which does not fit the others"
 
     def whole(values: Array, kept: Flags) -> Array:
-        """Spread values of the fitted frames over all frames, NaN elsewhere."""
+        """Return values for all frames: those of the fitted frames, and NaN for the others."""
         full = np.full((len(points), *values.shape[1:]), np.nan)
         full[rows[kept]] = values[kept]
         return full
@@ -257,7 +257,7 @@ class _Problem(NamedTuple):
 
     @property
     def rounding(self) -> Array:
-        """Squared error that is rounding (F,)."""
+        """Squared error (F,) below which the error is rounding."""
         _, size, offset = _centred(self.plane, self.seen)
         spread = np.einsum("fpij,fpj->fpi", self.to_image, size[:, None, None] * offset)
         return np.asarray(ROUNDING_ERROR**2 * (spread**2).sum(axis=(1, 2)))
@@ -321,8 +321,9 @@ class _Problem(NamedTuple):
     def best(self) -> tuple[Array, Array, Array]:
         """Fit from the scaled orthographic view, and from the same with depths reversed (Necker 1832).
 
-        Coarse image points have this second minimum. The head is mirrored in the plane across its thinnest direction,
-        then along the optical axis: together a rotation. With f free, a third start is near the camera.
+        Coarse image points have a second minimum there. Its start is the head mirrored across its thinnest direction
+        and then along the optical axis; both reflections together are a rotation. With f free, a third start is near
+        the camera.
         """
         fits = [self.fit(self.start())]
         thinnest = np.linalg.svd(self.points, full_matrices=False)[2][:, 2]

@@ -1,4 +1,4 @@
-"""The points of the head: names, places in the head's frame, and whether they can determine a camera.
+"""The points of the head: their names, their positions in the head's frame, and whether they determine a camera.
 
 The frame is the paper's, right-handed: x forward, y up, z to the person's right (Lee & Chen 1985, §2.1).
 """
@@ -62,7 +62,7 @@ class HeadPoints(Record):
 
     @classmethod
     def from_mapping(cls, points: Mapping[str, ArrayLike]) -> HeadPoints:
-        """Make a head of points by name, any names, in the mapping's order; metres."""
+        """Make head points from a mapping of names to positions, metres; names are free, and the order is kept."""
         return cls(names=tuple(points), points=np.array(list(points.values()), dtype=np.float64))
 
     def with_points(self, points: Mapping[str, ArrayLike]) -> HeadPoints:

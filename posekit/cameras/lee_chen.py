@@ -1,4 +1,4 @@
-r"""The camera of the 1985 paper, whose conventions are converted here and nowhere else.
+r"""The camera of Lee & Chen 1985; this module alone converts the paper's conventions to posekit's.
 
 The paper's frame is left-handed: x right, y up, z away from the camera, with the origin *on the image plane*, f in
 front of the centre of projection, so that :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6).
@@ -60,7 +60,7 @@ class LeeChenCamera(Camera):
         return LeeChenCamera(f=self.f[rows]) if isinstance(self.f, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the camera as files spell it, f in `unit`."""
+        """Return the fields of the camera in a file, with f in `unit`."""
         return {"model": "lee-chen", "f": None if self.f is None else from_metres(self.f, unit).tolist()}
 
 
@@ -101,7 +101,7 @@ def transformation_matrix(R: Array, t: Array, f: float | Array) -> Array:
 
 
 def _forward(f: float | Array, ndim: int) -> Array:
-    """Shape (0, 0, f) to broadcast against an array (F, ..., 3) of `ndim` axes."""
+    """Return (0, 0, f) in a shape that broadcasts against an array (F, ..., 3) with `ndim` axes."""
     distances = np.asarray(f, dtype=np.float64)
     distances = distances.reshape(*distances.shape, *(1,) * max(ndim - distances.ndim, 1))
     return np.asarray(distances * np.array([0.0, 0.0, 1.0]))

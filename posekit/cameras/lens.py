@@ -87,7 +87,7 @@ def lens_radius(normalized: Array, *, fisheye: bool = False) -> Array:
 
 
 def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
-    r"""Return the `lens_radius` where the image folds back or breaks up; infinite if it never does.
+    r"""Return the `lens_radius` at which the image folds back or the model has a pole; infinite if there is none.
 
     It is the first zero of the slope of the radial function, or of its denominator. Beyond it a polynomial fitted to a
     lens does not describe the lens.
@@ -105,7 +105,7 @@ def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
 
 
 def _first_root(ascending: list[Array]) -> float:
-    """Return the root of the smallest positive zero in r^2 of polynomials that are 1 at zero."""
+    """Return the square root of the smallest positive zero of polynomials in r^2 that are 1 at zero."""
     smallest = 0.0
     for coefficients in ascending:
         # In 1 / r^2 the leading coefficient is one, however small the lens's own are.

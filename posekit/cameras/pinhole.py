@@ -1,4 +1,4 @@
-"""The pinhole camera with OpenCV's frame, lens models and pose in the world, calibrated or guessed."""
+"""The pinhole camera, calibrated or guessed, with OpenCV's frame, lens models and pose in the world."""
 
 from __future__ import annotations
 
@@ -170,11 +170,11 @@ class PinholeCamera(Camera):
         return np.asarray(scale @ lens.lens_jacobian(normalized, self.distortion, fisheye=self.fisheye))
 
     def take(self, rows: Any) -> PinholeCamera:
-        """Return the camera of some frames: the same for all."""
+        """Return the camera of some frames, which is the same for all frames."""
         return self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the camera as files spell it, with t in `unit`."""
+        """Return the fields of the camera in a file, with t in `unit`."""
         optional = {
             "distortion": None if self.distortion is None else self.distortion.tolist(),
             "fisheye": self.fisheye,

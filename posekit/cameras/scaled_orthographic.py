@@ -87,7 +87,7 @@ class ScaledOrthographicCamera(Camera):
         return replace(self, scale=self.scale[rows]) if isinstance(self.scale, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the camera as files spell it, the scale in pixels a `unit`."""
+        """Return the fields of the camera in a file, with the scale in pixels per `unit`."""
         scale = None if self.scale is None else (np.asarray(self.scale) / PER_METRE[unit]).tolist()
         fields: dict[str, Any] = {"model": "scaled-orthographic", "scale": scale}
         return fields if self.aspect == 1 else {**fields, "aspect": self.aspect}

@@ -1,4 +1,4 @@
-"""`View`: what one camera saw of one person, in metres and OpenCV's image convention."""
+"""`View`: the image points of one person in one camera, over one or more frames."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class View(Record):
     length_deviation : float, optional
         Relative standard deviation of the person's lengths, 0 to 0.3; 0 if they are exact.
     derived : tuple of str
-        Joints of `image` that no detector saw: they were placed between others that it saw.
+        Joints of `image` that the detector does not report: they were placed between joints that it reports.
     head_points : mapping of str to array (3,), optional
         Points of the rigid head in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them,
         and any number of others under names of their own (Lee & Chen 1985, §2.1, recommend more than six).

@@ -12,8 +12,8 @@ from posekit.geometry.vectors import Array, unit
 def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
     r"""Return how far points are beyond convex hulls, along a plane.
 
-    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u: it is
-    greatest for the normal of an edge, or for the way from the nearest corner.
+    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u: the maximum is
+    at the normal of an edge, or at the direction from the nearest corner to x.
 
     Parameters
     ----------

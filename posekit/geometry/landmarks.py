@@ -38,7 +38,7 @@ def hips_from_markers(right: Array, left: Array, back: Array) -> tuple[Array, Ar
 
 
 def place_neck(found: Mapping[str, Array]) -> Array:
-    """Place the neck (T, 3) in the frame of shoulders and pelvis, at an offset in proportion to the median spine."""
+    """Place the neck (T, 3) at a fixed offset in the frame of shoulders and pelvis, in spine lengths."""
     spine = np.linalg.norm(found["mid_shoulders"] - found["mid_hips"], axis=-1)
     spine = spine[np.isfinite(spine)]
     left = unit(found["left_shoulder"] - found["right_shoulder"])

@@ -1,4 +1,4 @@
-"""Least squares over frames and over bounds: smooth sequences, and the smallest steps into bounds."""
+"""Two least-squares problems: smooth values over time, and move states into their bounds by the smallest steps."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def into_bounds(
     free : sequence of int
         Entries of a step that may differ from zero.
     margins : callable
-        Returns the margins (n, K) of states, metres, negative where a bound is violated. It is differentiated by
-        differences.
+        Returns the margins (n, K) of states, metres, negative where a bound is violated. Its derivatives are computed
+        by finite differences.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def into_bounds(
 
 
 def smoothed(values: Array, loose: Flags, strength: float) -> Array:
-    r"""Smooth the columns of values (T, K, …) in the frames that are loose (T, K); other frames stay.
+    r"""Smooth values (T, K, …) over time where the mask `loose` (T, K) is True; all other values stay.
 
     Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the loose frames (Whittaker 1923; Eilers 2003, *A perfect
     smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.

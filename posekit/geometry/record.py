@@ -28,7 +28,7 @@ class Record:
         return f"{type(self).__name__}({cut_text(', '.join(self._facts()), MAX_REPR_CHARACTERS)})"
 
     def _facts(self) -> list[str]:
-        """List the entries of the line; a subclass may choose others."""
+        """List the entries of the repr; a subclass may choose other entries."""
         held = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)  # type: ignore[arg-type]
         return [f"{name}={short(value)}" for name, value in held if not _is_empty(value)]
 

@@ -96,7 +96,7 @@ def relative_rotation(R_a: Array, R_b: Array) -> Array:
 
 
 def turned_near(angles: Array, middle: Array | float, *, half_turn: float = np.pi) -> Array:
-    """Add full turns so that angles lie within half a turn of a middle.
+    """Add full turns so that each angle lies within half a turn of a given centre.
 
     Parameters
     ----------
@@ -118,6 +118,6 @@ def turned_near(angles: Array, middle: Array | float, *, half_turn: float = np.p
 
 
 def _rodrigues(cross_matrices: Array, first: Array, second: Array) -> Array:
-    """Return I + first K + second K^2."""
+    """Return I + a K + b K^2 for cross-product matrices K and coefficients a (`first`) and b (`second`)."""
     square = cross_matrices @ cross_matrices
     return np.asarray(np.eye(3) + first[..., None, None] * cross_matrices + second[..., None, None] * square)

@@ -1,4 +1,4 @@
-"""Units of length of files; in memory every length is in metres."""
+"""Conversion between the units of length in files and metres, the unit of every length in memory."""
 
 from __future__ import annotations
 

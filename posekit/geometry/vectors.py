@@ -57,5 +57,5 @@ def runs(which: Flags) -> list[tuple[int, int]]:
 
 
 def groups(at: Ints, apart: int) -> list[Ints]:
-    """Split ascending frame numbers (N,) where two neighbours differ by more than `apart`."""
+    """Split ascending frame numbers (N,) into groups wherever two neighbours differ by more than `apart`."""
     return np.split(at, np.flatnonzero(np.diff(at) > apart) + 1) if len(at) else []

@@ -1,4 +1,4 @@
-"""Robots: any URDF, checked and loaded once, with limits, collisions, and the places of the 14 joints."""
+"""Robots: any URDF, checked and loaded once, with joint limits, collision bodies, and the 14 joints' positions."""
 
 from posekit.robots.columns import Mimic as Mimic
 from posekit.robots.find import robot_names as robot_names

@@ -54,7 +54,7 @@ def set_pairs(
 
 
 def _part(body: str) -> str:
-    """Return the part that a body stands for: its name without the number at the end."""
+    """Return the part of the figure that a body represents: the body's name without the number at its end."""
     return re.sub(r"_\d+$", "", body)
 
 
@@ -161,7 +161,7 @@ class SelfCollision:
         return Contacts(hit, row[kept], pair[kept], distance[kept])
 
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
-        """Return rows and pairs that can be nearer than the margin, and the distances of capsules, NaN for others."""
+        """Return rows and pairs possibly nearer than the margin, and their distances; NaN where coal is needed."""
         frames, centre = self._kinematics.place(q)
         axes = np.einsum("jbin,bjk->ikbn", frames, self._axes).reshape(3, 3, -1)
         places, count = centre.transpose(1, 0, 2), len(q)

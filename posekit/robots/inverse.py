@@ -59,11 +59,11 @@ class _Problem:
         self.follow = follow[:, self.free]
 
     def gaps(self, positions: Array, rows: Ints) -> Array:
-        """Return the offsets (n, P, 3) of points from their targets, metres; zero for unknown targets."""
+        """Return the vectors (n, P, 3) from targets to points, metres; zero for unknown targets."""
         return np.where(self.known[rows, :, None], positions - self.targets[rows], 0.0)
 
     def away(self, q: Array, start: Array) -> Array:
-        """Return the differences of hinges and slides from the start, as entries of v (n, nv), zero elsewhere."""
+        """Return the differences of single-axis joints from the start, in v (n, nv); zero for other joints."""
         out = np.zeros((len(q), self.model.nv))
         out[:, self.at_v] = q[:, self.at_q] - start[:, self.at_q]
         return out
@@ -110,7 +110,7 @@ class _Problem:
         return np.asarray(np.linalg.norm(gaps, axis=2).max(axis=1, initial=0.0))
 
     def laid(self, q: Array) -> Array:
-        """Repeat a configuration (nq,) for N postures, with its floating root moved so that the trunk fits best."""
+        """Return a configuration (nq,) for each posture, with the floating root placed where the trunk fits best."""
         out = np.tile(q, (len(self.targets), 1))
         if not self.robot.free_flyer:
             return out
@@ -174,7 +174,7 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
 
 
 def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Array, Array]:
-    """Search for the postures `rows` from configurations (n, nq); return the final ones and their costs (n,), m^2."""
+    """Minimise the cost of the postures `rows` from a start (n, nq); return configurations and costs (n,), m^2."""
     q, damping = q.copy(), np.full(len(q), DAMPING[0])
     cost = problem.cost(q, start, rows)
     for first in range(0, len(q), BLOCK):

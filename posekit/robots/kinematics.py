@@ -1,4 +1,4 @@
-"""Forward kinematics of a Pinocchio model for a batch of configurations, and points on its joints."""
+"""Batched forward kinematics of a Pinocchio model: positions and Jacobians of points that are fixed to its joints."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Kinematics:
 
     The results equal those of Pinocchio's `forwardKinematics` and joint Jacobians up to rounding, at about 30 times the
     speed of a loop over them. Arrays inside have the batch as their last axis, and a frame lists its axes x, y, z as
-    rows. The frame of each joint is turned so that the joint rotates about z, or slides along z. A hinge then changes x
-    and y alone.
+    rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a hinge then
+    changes the axes x and y alone.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def frame_places(model: pin.Model, q: Array, frames: Sequence[int]) -> Array:
 
 
 def _mix(parent: Array, translation: Array, rotation: Array) -> Array:
-    """Return the axes x, y, z and the origin of a frame (4, 3) in the turned axes of its parent.
+    """Return the axes x, y, z and the origin of a frame (4, 3) in the chosen axes of its parent.
 
     `rotation` (3, 3) and `translation` (3,), metres, place the frame in its parent; the parent's own axes are turned by
     the rotation `parent` (3, 3).

@@ -87,7 +87,7 @@ class Robot(Record):
         _ = self.model, self.geometry
 
     def __getstate__(self) -> dict[str, object]:
-        """Pickle the texts and settings: a model is built from them in milliseconds."""
+        """Pickle the texts and settings; the model is built from them again in milliseconds."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     @cached_property
@@ -355,7 +355,7 @@ class Robot(Record):
         return solve(self, joints, start=start)
 
     def scaled(self, joints: ArrayLike) -> Robot:
-        """Return the robot with the segment lengths of a person: see `posekit.robots.scaling`."""
+        """Return the robot scaled to the segment lengths of a person: see `posekit.robots.scaling`."""
         return scaled(self, joints)
 
     @cached_property
@@ -363,7 +363,7 @@ class Robot(Record):
         return SelfCollision(self.model, self.geometry)
 
     def _limits(self, given: Array, none: float) -> Array:
-        """Keep the given limits (nq,) of joints with one entry of q; the entries of other joints have no limit."""
+        """Return limits (nq,) in which only joints with one entry of q keep their limit; other entries have none."""
         return read_only(np.where(np.repeat(self.model.nqs, self.model.nqs) == 1, given, none))
 
 
@@ -396,7 +396,7 @@ def load_robot(
     Raises
     ------
     InputError
-        If a name, a file, a mesh or a number is wrong. The message says how in one line.
+        If a name, a file, a mesh or a number is wrong. The message names the fault and the remedy in one line.
 
     Examples
     --------
