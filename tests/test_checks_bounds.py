@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from posekit.motion import Motion
 from posekit.settings import ValidateSettings
-from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENTS, both, segment_name
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, LIMB_SEGMENTS, POINTS, SEGMENTS, both, segment_name
 from posekit.validators import Report, validate_motion
 from posekit.validators.motion.profile import MOTION_CHECKS
 from tests.test_checks_motion import FIGURE, RATE, gesture, held, lengthened, slid, swapped
@@ -359,6 +359,27 @@ def elbow_of_the_figure_is_judged_at(bend: float) -> bool:
     return elbow_is_judged_at(bend, angle_tolerance=10.0, strict=True, ranges="urdf")
 
 
+# The person in the frames
+
+
+def is_nobodys_size(size: float) -> bool:
+    return found(size * gesture(), "rigid-parts")
+
+
+def has_nobodys_forearm(length: float) -> bool:
+    joints = gesture()
+    joints[:, WRISTS[1]] = joints[:, JOINT["left_elbow"]] + length * (
+        joints[:, WRISTS[1]] - joints[:, JOINT["left_elbow"]]
+    )
+    return found(joints, "rigid-parts")
+
+
+def is_noisy_in(frames: float) -> bool:
+    joints = gesture()[: int(frames)]
+    joints += np.random.default_rng(0).normal(0, 0.01, joints.shape)
+    return float(judged(joints, "drift", noise=None).settings["noise"]) > 0.005
+
+
 AIR = 0.03 + np.hypot(0.75 * 0.152, 0.039) * STATURE - 0.039 * STATURE
 """Height of a body in the air without toes: 3 cm, and the rise of an ankle over the tips of the toes."""
 
@@ -415,6 +436,11 @@ AIR = 0.03 + np.hypot(0.75 * 0.152, 0.039) * STATURE - 0.039 * STATURE
         (lambda frames: has_a_belt(frames=int(frames)), 58, 61),
         (begins_with_another_posture, 2, 3),
         (elbow_is_judged_at, 14.9, 15.1),
+        (is_nobodys_size, 1.59, 1.61),  # times the figure
+        (lambda size: not is_nobodys_size(size), 0.249, 0.251),
+        (has_nobodys_forearm, 1.59, 1.61),
+        (lambda length: not has_nobodys_forearm(length), 0.59, 0.61),
+        (is_noisy_in, 9, 10),
         # An angle with a tolerance of 45 degrees is not determined.
         (
             elbow_of_the_figure_is_judged_at,
@@ -509,6 +535,33 @@ def test_bones_may_differ_by_what_bodies_and_noise_give() -> None:
         }.get(name, ())
         ends = np.array([table.lower[name], table.upper[name]])
         assert ends == pytest.approx(length + np.array([-1, 1]) * math.hypot(bone, *gives)), name
+
+
+def test_noise_is_the_scatter_of_limbs_and_an_end_may_be_worse() -> None:
+    """Noise is 1.4826 / sqrt(2) median deviations: of the middle half of the limbs, or of a limb up to thrice that."""
+    rng, joints = np.random.default_rng(0), gesture()
+    joints += rng.normal(0, 0.004, joints.shape)
+    joints[:, WRISTS[0]] += rng.normal(0, 0.01, (120, 3))
+    joints[:, ANKLES[0]] += rng.normal(0, 0.1, (120, 3))
+    joints[50] *= 2.0
+    lengths = {
+        segment_name(one): np.linalg.norm(joints[:, one[0]] - joints[:, one[1]], axis=1)
+        for one in LIMB_SEGMENTS
+    }
+    scatter = {
+        name: round(1.4826 / np.sqrt(2) * float(np.median(abs(one - np.median(one)))), 5)
+        for name, one in lengths.items()
+    }
+    noise = round(float(np.mean(sorted(scatter.values())[2:6])), 5)
+    report = judged(joints, "rigid-parts", noise=None)
+    assert report.settings["noise"] == noise
+    table = report.to_pandas()
+    for name in ("right_elbow-right_wrist", "right_knee-right_ankle"):
+        row = table[(table.place == name) & (table.frame == 50)].iloc[0]
+        own = min(max(scatter[name], noise), 3 * noise)
+        assert (row.upper - row.lower) / 2 == pytest.approx(math.hypot(0.03, 3 * np.sqrt(2) * own)), name
+        assert (row.upper + row.lower) / 2 == pytest.approx(np.median(lengths[name]), abs=1e-5)
+    assert scatter["right_elbow-right_wrist"] < 3 * noise < scatter["right_knee-right_ankle"]
 
 
 def test_directions_may_differ_by_what_bodies_and_noise_give() -> None:

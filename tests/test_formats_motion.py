@@ -382,6 +382,8 @@ def test_opensims_angles_are_read(tmp_path: Path, stated: str, scale: float) -> 
     rows = "time\tpelvis_tilt\tpelvis_tx\tknee_angle_r\n0.0\t10\t0.5\t-20\n0.01\t11\t0.6\t-21\n"
     (tmp_path / "ik.mot").write_text(head + rows)
     motion = posekit.open(tmp_path / "ik.mot")
+    assert any("give a URDF" in note for note in motion.notes)
+    assert not any("give a URDF" in note for note in posekit.open(tmp_path / "ik.mot", urdf="human").notes)
     assert motion.q_names == ("pelvis_tilt", "pelvis_tx", "knee_angle_r")
     assert np.allclose(motion.q[1], [11 * scale, 0.6, -21 * scale])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +11,7 @@ import pytest
 import yourdfpy
 
 import posekit
+from posekit.errors import InputError
 from posekit.robots import Robot, load_robot
 from posekit.skeleton import JOINTS
 from tests.test_robots import LIMIT, configurations, joint, link, text
@@ -97,3 +99,63 @@ def test_a_joint_may_be_beyond_reach_by_the_tolerance_of_lengths() -> None:
 
     worst = found(1e-4).table()["value"].max()
     assert 0.03 < worst < 0.4 and not found(None).ok and not found(0.99 * worst).ok and found(1.01 * worst).ok
+
+
+def chain(count: int) -> str:
+    joints = (joint(f"j{k}", f"l{k}", f"l{k + 1}", "fixed", "") for k in range(count - 1))
+    return text(*(link(f"l{k}", "") for k in range(count)), *joints)
+
+
+def star(count: int, kind: str = "fixed") -> str:
+    joints = (joint(f"j{k}", "l0", f"l{k}", kind, "") for k in range(1, count))
+    return text(*(link(f"l{k}", "") for k in range(count)), *joints)
+
+
+def bodies(count: int) -> str:
+    return text(f'<link name="a">{link("a").partition(">")[2].removesuffix("</link>") * count}</link>')
+
+
+def long(count: int) -> str:
+    urdf = text(link("a"), "<!---->")
+    return urdf.replace("<!---->", f"<!--{'x' * (count - len(urdf))}-->")
+
+
+def two(**about: Any) -> str:
+    return text(link("a"), link("b"), joint("j", "a", "b", **about))
+
+
+def limited(most: float, kind: str = "revolute", number: int = 2) -> str:
+    """Return hinges or sliders with an upper limit."""
+    own = [LIMIT.replace('"2"', f'"{most}"')] * number + [LIMIT] * (2 - number)
+    return text(*map(link, "abc"), *(joint(n, "a", n, kind, one) for n, one in zip("bc", own, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside", "words"),
+    [
+        (chain(250), chain(251), "more than 250 links"),
+        (star(1000), star(1001), "1,001 links"),
+        (star(201, "continuous"), star(202, "continuous"), "201 degrees of freedom"),
+        (bodies(500), bodies(501), "501 bodies"),
+        (
+            text(link("a"), "<x>" * 63 + "</x>" * 63),
+            text(link("a"), "<x>" * 64 + "</x>" * 64),
+            "65 nested elements",
+        ),
+        (long(10_000_000), long(10_000_001), "10,000,001 bytes"),
+        (two(z=1e6), two(z=1_000_001), "3 finite numbers"),
+        (limited(14.9), limited(15.1), "15.1 rad, and 1 more"),
+        (limited(721), limited(719), "719 rad, and 1 more"),
+        (limited(100, number=1), limited(100), "100 rad"),
+        (limited(100, "prismatic"), limited(100), "100 rad"),
+        (two(kind="prismatic", axis="0 1.0009 0"), two(kind="prismatic", axis="0 1.0011 0"), "length 1"),
+        (two(kind="prismatic", axis="0 0.9991 0"), two(kind="prismatic", axis="0 0.9989 0"), "length 1"),
+        (two(axis="0 1.1e-6 0"), two(axis="0 0.9e-6 0"), "length 1"),
+        (two(kind="fixed", inside="", axis="0 0 0"), two(axis="0 0 0"), "length 1"),
+    ],
+    ids=lambda urdf: urdf[-20:],
+)
+def test_a_urdf_is_refused_beyond_a_bound(inside: str, outside: str, words: str) -> None:
+    Robot(urdf=inside, bodies="none")
+    with pytest.raises(InputError, match=words):
+        Robot(urdf=outside, bodies="none")
