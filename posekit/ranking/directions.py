@@ -1,4 +1,4 @@
-r"""A posture as unit vectors in the frame of its torso. Unlike angles they have no singularities.
+r"""A posture described by unit vectors in the frame of its torso. Unlike angles they have no singularities.
 
 The torso's axes are x forward, y left and z from the pelvis to the neck. The vectors are the left and the down axis of
 the hips, the directions of the eight limb segments, and the direction against gravity if it is known.
@@ -72,7 +72,7 @@ def directions(joints: Array, up: Array | None = None) -> Array:
 
 
 def log_room(joints: Array) -> Array:
-    r"""Return the logarithm of the solid angle of directions per area of the image, minus its mean (N,).
+    r"""Return the logarithm (N,) of the solid angle of segment directions per area of the image, minus its mean.
 
     A direction is a point on the unit sphere, and its image is the projection of that point:
     :math:`d\omega = dA / |\cos\theta|`, with :math:`\theta` the angle between segment and ray. The same area of the

@@ -1,4 +1,4 @@
-r"""The prior of postures: mixtures of Student's t distributions over directions, and the weights of all log terms.
+r"""The prior of postures: mixtures of t distributions of segment directions, and the weights of all log terms.
 
 .. math::
 
@@ -59,7 +59,7 @@ class StudentMixture(Record):
 
     @cached_property
     def whitening(self) -> Array:
-        """Lower triangular W with W' W = S^-1: its first k rows whiten the first k coordinates."""
+        """Lower triangular matrix W with W' W = S^-1; its first k rows whiten the first k coordinates."""
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.scale)))
 
     def part(self, rows: Any) -> StudentMixture:
@@ -67,7 +67,7 @@ class StudentMixture(Record):
         return replace(self, means=self.means[:, rows], scale=self.scale[rows][:, rows])
 
     def widened(self, variance: Array) -> StudentMixture:
-        """Return the mixture with a variance (d,) added to each coordinate."""
+        """Return the mixture with variances (d,) added to the coordinates."""
         return replace(self, scale=self.scale + np.diag(variance))
 
     def excess(self, x: Array, count: int) -> Array:
@@ -139,8 +139,8 @@ class Prior(Record):
     Parameters
     ----------
     blocks : sequence of (names, StudentMixture, bool)
-        Names of directions, their joint distribution, and whether only the density of `up`, given the other
-        directions, counts.
+        For each block: names of directions, their joint distribution, and whether only the conditional density of `up`
+        given the other directions is used.
     temperature : float
         Metres. The log-density of directions of exact postures is divided by 1 + deviation / temperature, because the
         directions of a posture with errors of a centimetre vary by more than the prior's fine structure.

@@ -46,7 +46,7 @@ class Up(Record):
     deviation : float
         Standard deviation of the direction, degrees.
     source : str
-        Description of where the direction comes from; a result states it.
+        Description of the direction's origin, for the result.
     """
 
     direction: Array
@@ -64,7 +64,7 @@ class Up(Record):
 
 
 def deviation_of_tolerance(rigid: float) -> float:
-    """Return the standard deviation (m) of a tree's survivors, given its tolerance of rigid distances (m)."""
+    """Return the standard deviation (m) of the joints of exact survivors that follows from the tree's tolerance (m)."""
     return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
 
 
@@ -88,7 +88,7 @@ def log_terms(
     deviation : float
         Deviation of the joints of exact postures, metres.
     chi2 : array (N,), optional
-        Misfit of modes under noise. Without it the errors of the four rigid distances count.
+        Chi-square of modes under noise. Without it, the errors of the four rigid distances are used.
     log_volume : array (N,), optional
         Half the log determinant of the covariance of each mode.
     lengths : array (17,), optional

@@ -1,4 +1,4 @@
-r"""Standing: horizontal distance between centre of mass and support, and height of one ankle above the other.
+r"""Balance of a standing person: the centre of mass against the support, and the heights of the ankles.
 
 One picture does not show the height of the ground. A standing person is supported by the lower foot, and by both feet
 if both are low. The support is the line from the lower ankle towards the higher one, times

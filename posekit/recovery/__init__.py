@@ -1,4 +1,4 @@
-"""From a view to every posture that can be behind it: root, tree or solver, certify, rank, answer."""
+"""Recovery of every posture behind a view: find the root, grow the tree or solve, certify, rank, answer."""
 
 from posekit.recovery.recovery import Answer as Answer
 from posekit.recovery.recovery import Frames as Frames

@@ -1,4 +1,4 @@
-"""One answer a frame: the expected posture, how sure it is, and the few postures that stand for the rest."""
+"""The answer of a frame: the expected posture, the probability that it is right, and a few representative postures."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TAIL_SCALE: Final = 1.960 / 2.776
 
 
 def _tailed_draws() -> Array:
-    """Return fixed t distributed numbers (64, 42), each row with its negative, so that their mean is zero."""
+    """Return fixed t-distributed numbers (64, 42); every row also occurs negated, so that the mean is zero."""
     rng = np.random.default_rng(1985)
     normal = rng.normal(size=(N_SAMPLES // 2, 42))
     spread = np.sqrt(TAIL_DEGREES_OF_FREEDOM / rng.chisquare(TAIL_DEGREES_OF_FREEDOM, len(normal)))
@@ -64,11 +64,11 @@ def answers_of(
     relative: Flags,
     unlisted: Array,
 ) -> dict[str, Any]:
-    r"""Answer K frames; the result of each depends on that frame alone.
+    r"""Return the answers of K frames; the answer of a frame depends on that frame alone.
 
-    Under noise the joints of the answer are the probability-weighted mean of the modes, laid onto the
-    lengths. `sure` is :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m, \Sigma_m))`,
-    by samples.
+    Under noise, the joints of the answer are the probability-weighted mean of the modes, moved to the nearest posture
+    with the person's lengths. `sure` is :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m,
+    \Sigma_m))`, by samples.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def answers_of(
     covariance : array (N, 42, 42), optional
         Covariance of the joints of each posture, square metres; None for exact postures.
     lengths : array (17,)
-        The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. Answers have them in the mean
-        size of their survivors.
+        The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. An answer has these lengths,
+        scaled to the mean size of its survivors.
     relative : bool array (K,)
         Whether distances are measured relative to the neck, whose depth is not known.
     unlisted : array (K,)
@@ -139,7 +139,7 @@ def answers_of(
 
 
 def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Array]:
-    """Choose few postures of a frame so that postures within 5 cm of them have a given total probability.
+    """Choose a few postures of a frame such that the postures within 5 cm of them have a given total probability.
 
     Parameters
     ----------
@@ -153,9 +153,10 @@ def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Arr
     Returns
     -------
     rows : int array (R,)
-        Representatives; the one that stands for the most probability comes first.
+        Representatives; the one with the largest `held` comes first.
     held : array (R,)
-        Probability of each representative and of the postures near it that no earlier one stands for.
+        Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
+        earlier representative.
     """
     near, rest = _near(shape[:MAX_COMPARED]).astype(np.float64), weight[:MAX_COMPARED]
     found: list[tuple[float, int]] = []
@@ -172,7 +173,7 @@ def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Arr
 
 
 def _near(places: Array) -> Flags:
-    r"""Return which postures (N, 14, 3) are within 5 cm of each other in every joint (N, N).
+    r"""Return whether each two of the postures (N, 14, 3) are within 5 cm of each other in every joint (N, N).
 
     :math:`a \cdot b - a^2 / 2 - b^2 / 2 = -|a - b|^2 / 2`, relative to the likeliest.
     """
@@ -198,7 +199,7 @@ def joint_radius(covariance: Array) -> Array:
 
 
 def _drawn(covariance: Array, relative: Flags) -> Array:
-    """Return samples of the errors of modes (N, S, 14, 3), metres; relative to the neck if `relative` (N,)."""
+    """Return S samples of the errors of N modes (N, S, 14, 3), metres; relative to the neck where `relative` (N,)."""
     floor = ROUNDING * (1.0 + np.einsum("nii->n", covariance))
     symmetric = (covariance + covariance.transpose(0, 2, 1)) / 2
     root = np.linalg.cholesky(symmetric + floor[:, None, None] * np.eye(covariance.shape[1]))

@@ -1,4 +1,4 @@
-"""Certification: checks of postures, with tolerances that allow for the noise of the view."""
+"""Certification: postures are judged by the checks, with tolerances that allow for the noise of the view."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def noisy_judge(
 ) -> PostureJudge:
     """Return a judge of postures whose tolerances allow for noise.
 
-    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. The error of a
-    length may also be three standard deviations. It includes the error of the body size, except in a photograph, where
+    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. A length may also
+    have an error of three standard deviations. This error includes that of the body size, except in a photograph, where
     the solver fits the size. Bodies may overlap, and the side on which the shoulders lie may be undetermined.
     """
     deviation = {name: lengths.own[name] if photograph else lengths.total(name) for name in figure.lengths}

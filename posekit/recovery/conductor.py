@@ -1,4 +1,4 @@
-"""One view in, every physically possible posture out: root, tree or solver, certify, rank, answer."""
+"""From a view to all of its possible postures: find the root, grow the tree or solve, certify, rank, answer."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class _Conductor:
         )
 
     def stages(self) -> Iterator[tuple[Callable[[Ints], None], int]]:
-        """Yield the stages in order: a function of open frames, and how many of them it takes at once."""
+        """Yield the stages in order: a function of open frames, and the largest number of frames per call."""
         found = self.found
         if self.judged == "tolerated":
             yield self._grow, GROWN_AT_ONCE
@@ -182,7 +182,7 @@ class _Conductor:
             self.found.frames["levels"][k] = levels[k].tolist()
 
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
-        """Return the frames with exact image points: in them a branch closes torso and hips exactly."""
+        """Return the frames with exact image points: some branch satisfies all distances of torso and hips."""
         start, end = np.array(RIGID_SEGMENTS).T
         apart = np.linalg.norm(joints[:, start] - joints[:, end], axis=2)
         off = np.abs(apart - self.found.lengths[-len(RIGID_SEGMENTS) :])
@@ -231,7 +231,7 @@ class _Conductor:
         return found + x[:, :, None] * x[:, None]
 
     def _diagnose(self, sight: Sight, problem: Problem, empty: list[int]) -> None:
-        """State why frames `empty` have no posture: the largest residuals of a solution with larger deviations."""
+        """Store why frames `empty` have no posture: the largest residuals of a solution with larger deviations."""
         some = np.flatnonzero(np.isin(sight.frame, empty))
         if not len(some):
             return

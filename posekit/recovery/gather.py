@@ -1,4 +1,4 @@
-"""From postures to a `Recovery`: list them, compute their probabilities, and answer."""
+"""From postures to a `Recovery`: list the postures, compute their probabilities, and answer each frame."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Gathering:
         self.survivors: list[Survivors] = []
 
     def close(self, *frames: int, **about: Any) -> None:
-        """Set columns of `Frames` for some frames, and take these frames off the open ones."""
+        """Set columns of `Frames` for some frames, and remove these frames from the open ones."""
         for k in frames:
             for name, value in about.items():
                 self.frames[name][k] = value
@@ -77,7 +77,7 @@ class Gathering:
         *,
         leave: bool = False,
     ) -> None:
-        """List the postures that pass, by frame and falling probability, and answer their frames.
+        """Add the postures that pass, sorted by frame and decreasing probability, and answer their frames.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class Gathering:
             self._keep(found, table, None if covariance is None else covariance(rows), improbable[found])
 
     def _keep(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
-        """Keep the survivors of frames `found` (K,); frames under noise are answered at once, exact ones when read."""
+        """Store the survivors of frames `found` (K,); noisy frames are answered now, exact ones when read."""
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
@@ -218,7 +218,7 @@ def frozen(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def group_of(joints: Array, within: float) -> Ints:
-    """Return the groups of postures (N, 14, 3), likeliest first: all joints are `within` metres of the likeliest's."""
+    """Return the group of each posture (N, 14, 3): its joints are `within` metres of the group's likeliest."""
     group = np.full(len(joints), -1, dtype=np.intp)
     for k, leader in enumerate(joints):
         if group[k] < 0:

@@ -1,4 +1,4 @@
-"""The person: a figure with the view's lengths, and how well these lengths are known."""
+"""The person in a view: a figure with the view's segment lengths, and the uncertainty of these lengths."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _person(
     shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
-    """Return the figure of a person; it is kept, because the frames of one person often come in several views."""
+    """Return the figure of a person; it is cached, because one person often comes in several views."""
     if stature is None and not lengths and not shoulders and not head_points:
         return figure
     behind = None if shoulders is None else shoulders == "behind"

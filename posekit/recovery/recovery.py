@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 
 def column(*shape: int, fill: Any = np.nan) -> Any:
-    """Declare a column of a table: the shape of a row, and the value that fills a column that is not given."""
+    """Declare a column of a table: the shape of one row, and the value that fills the column by default."""
     return field(default=None, metadata={"shape": shape, "fill": fill})
 
 
 def listed(fill: Any) -> Any:
-    """Declare a sequence with one entry a row, and the entry that fills a sequence that is not given."""
+    """Declare a sequence with one entry per row, and the entry that fills it by default."""
     return field(default=(), metadata={"entry": fill})
 
 
@@ -65,7 +65,7 @@ class Table(Record):
 
 
 class Derived:
-    """A field that may be given as a function without arguments: it is called when the field is first read."""
+    """A field whose value may be a function without arguments, which is called when the field is first read."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -193,10 +193,11 @@ class Answer(Table):
     survivor : int array (F,)
         Row of the survivor nearest to the answer; -1 if the frame has no survivor.
     representatives : sequence of F int arrays
-        Rows of few survivors: postures within 5 cm of one of them in every joint have 95 % of the probability. The one
-        with the most probability near it comes first.
+        Rows of a few survivors: the postures within 5 cm of one of them in every joint have 95 % of the probability.
+        The representative with the largest share of it comes first.
     represented : sequence of F arrays
-        Probability of each representative and of the postures near it that no earlier one stands for.
+        Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
+        earlier representative.
     nearer : int array (F, 13)
         For each segment of the tree the most probable of three cases: 1 if its outer end is nearer to the camera by
         more than 5 cm, -1 if it is farther, 0 if neither.

@@ -45,7 +45,8 @@ LONGEST_TOO_SHORT: Final = 0.3
 def point_offsets(points: Array, scale: Array) -> Array:
     """Return the deviations (N, 14) of the points (N, 14, 2) of photographs at scales (N,), metres.
 
-    Nearer parts look larger, by the unknown distance of the camera: more so far from the middle.
+    Parts of the body that are nearer to the camera look larger. The distance of the camera is unknown, so the deviation
+    grows with the distance of a point from the middle of the body.
     """
     metres = (points - np.nanmean(points[:, :6], axis=1, keepdims=True)) / scale[:, None, None]
     aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
@@ -56,8 +57,8 @@ def point_offsets(points: Array, scale: Array) -> Array:
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
     r"""Turn a scaled orthographic problem into that of a perspective camera at the usual distance d from the person.
 
-    Nearer parts look larger before every real camera. A posture of depth z about the plane of the scale is seen at
-    :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
+    In every real picture, nearer parts of the body look larger. A posture of depth z about the plane of the scale is
+    seen at :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array)
 
 
 def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]:
-    """Move solved postures of `from_usual_distance` into the frame of a scaled orthographic camera.
+    """Move the solutions of a problem of `from_usual_distance` into the frame of the scaled orthographic camera.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`Sight`: image points, their noise, and the neck of each frame, known before postures are sought."""
+"""`Sight`: the facts of a view before the search: image points, their noise, and the position of each frame's neck."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ENOUGH_HEAD_POINTS: Final = 1 + len(HEAD_POINTS)
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sight(Record):
-    """A view by rows: a row is a frame, or one of the scales that a frame may have.
+    """The facts of a view in rows: one row per frame, or one per scale if a frame has several possible scales.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _unseen(view: View) -> list[str]:
 
 
 def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Return the sight of a calibrated camera; the neck is the given one, or found from six head points."""
+    """Return the sight of a calibrated view; the neck is given, or found from six head points."""
     count, model, reasons = len(view), view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert not isinstance(model, ScaledOrthographicCamera)
@@ -224,7 +224,7 @@ def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) 
 
 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
-    """Return facts about the camera of frame k; before Lee & Chen's camera, [R] and position are those of Table 2."""
+    """Return facts about the camera of frame k; for Lee & Chen's camera, rotation and position are those of Table 2."""
     model = view.camera
     record: dict[str, Any] = dict.fromkeys(("f", "rotation", "position", "residual"))
     if isinstance(model, LeeChenCamera) and model.f is not None:

@@ -1,11 +1,11 @@
 r"""Joint ranges and their couplings as arrays of numbers, which the solver and the check of joint ranges share.
 
-A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball
-joint in the parent's frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. The same two
-directions can be written in up to four ways; the limb is legal if every angle of one writing is between its bounds.
-A bound is a constant, or a piecewise linear function of another angle (a coupling), and may shrink where other
-angles of the joint are near their ends (a sinus). An arm whose elevation is bounded is judged by elevation, plane
-and turn instead of flexion and abduction, because an arm stretched out sideways stands at a pole of these two.
+A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball joint in the parent's
+frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. Up to four sets of angles give the same two
+directions. The limb is within its limits if every angle of one set is between its bounds. A bound is a constant or a
+piecewise linear function of another angle (a coupling). A range may also shrink where other angles of the joint are
+near the ends of their ranges (a joint sinus). An arm whose elevation is bounded is judged by elevation, plane of
+elevation and turn. Flexion and abduction have a singularity at an arm that is stretched out sideways.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ class Limits:
         above_hips : float
             Distance of the pelvis joint from the line between the hips, metres.
         pelvis_between_hips : bool
-            Whether the pelvis joint is on the line between the hips; the hips' frame then hangs on the spine, and the
-            pelvis may be flexed within its range.
+            Whether the pelvis joint is on the line between the hips. The frame of the hips then follows from the spine,
+            and the pelvis may be flexed within its range.
 
         Returns
         -------
@@ -147,18 +147,18 @@ class Limits:
     def read(
         self, limb: int, rotations: Array, tolerance: float = 0.0, writing: Ints | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the angles of limbs, and their bounds, in all W sets of Euler angles.
+        """Return the angles of limbs and the bounds of these angles, for all W equivalent sets of Euler angles.
 
         Parameters
         ----------
         limb : int
-            Of `LIMBS`.
+            Index in `LIMBS`.
         rotations : array (N, 4)
             Angles of the closed form (`posekit.body.angles.limb_branch`), radians.
         tolerance : float
-            Radians that widen the sinus.
+            Tolerance of the joint sinus, radians.
         writing : int array (N,), optional
-            Number of the only set to return for each limb; all sets if not given.
+            Number of the set of angles to return for each limb; all sets if not given.
 
         Returns
         -------
@@ -210,7 +210,7 @@ class Limits:
         lower, upper : array (N, W, 4)
             Bounds of the four angles, radians.
         turns : dict of int to array (N, W)
-            Bounds of an arm's turn: 0 lower, 1 upper.
+            Bounds of the turn of an arm: key 0 is the lower bound, key 1 the upper.
         outward : list of two arrays (N, W)
             Angles by which valgus widens the rotation's lower and upper bound, radians.
         """
@@ -249,9 +249,9 @@ class Limits:
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
         r"""Return the excess of limb angles over their limits (N, 4), radians, and the set of Euler angles used (N,).
 
-        If no set is given in `writing`, the least violated one is used. A rotation that exceeds its limit by v counts
-        :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`, which vanishes for a straight limb, whose rotation is not
-        determined. The first angle is weighted in the same way near its pole.
+        Without `writing`, the set of angles that violates its limits least is used. A rotation that exceeds its limit
+        by v has the residual :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`, which vanishes for a straight limb, whose
+        rotation is not determined. The first angle is weighted in the same way near its pole.
         """
         value, lower, upper, _ = self.read(limb, rotations, writing=writing)
         above, below = value - upper, lower - value
@@ -290,12 +290,12 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -
 
 
 def _place(kind: int, angle: str) -> int:
-    """Return the index of a limb angle: 0 to 3 for the four angles of the closed form, from 4 on for `READINGS`."""
+    """Return the index of a limb angle: 0 to 3 for the four angles of the closed form, 4 and more for `READINGS`."""
     return KINDS[kind].index(angle) if angle in KINDS[kind] else 4 + READINGS.index(angle.split(".")[1])
 
 
 def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
-    r"""Return the error of rotations due to valgus, radians, and whether the hinge is bent in its natural sense.
+    r"""Return the error of axial rotations due to valgus, radians, and whether the hinge bends naturally.
 
     The rotation is computed from the lower segment. If this segment leaves the hinge's plane by the angle v, the
     rotation is wrong by :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`. Ranges of
@@ -310,7 +310,7 @@ def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
 def _round_off(
     n: NDArray[np.void], limb: int, angles: Array, bounds: list[Array], means: list[Array], slack: float
 ) -> None:
-    """Narrow the bounds of abduction and rotation, in place, where the angles before them are far from their middles.
+    """Narrow the bounds of abduction and rotation in place where the preceding angles are far from mid-range.
 
     `slack` is the tolerance of angles, radians; it widens the ranges that measure the distance from the middle.
     """

@@ -1,4 +1,4 @@
-"""The modes of a frame's posterior: their evidence and covariance, and which minima are the same mode."""
+"""The modes of a frame's posterior: evidence, covariance, and the test whether two minima are one mode."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ KNOWN: Final = np.array([UNKNOWN_PLACE_METRES**-2, HIDDEN_METRES**-2, TURN_INFOR
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Modes:
-    """M modes of the frames of a problem, by frame, the best chi2 first.
+    """M modes of the frames of a problem, sorted by frame and then by chi2, the smallest first.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Modes:
 
     @property
     def size(self) -> Array:
-        """Logarithm of the size of each body over the given lengths (M,)."""
+        """Logarithm of the ratio of each body's size to the given lengths (M,)."""
         return self.x[:, 42]
 
     def take(self, rows: Ints | Flags | slice) -> Modes:
@@ -119,7 +119,7 @@ def distinct(
     within: float | Array,
     sure: bool = False,
 ) -> Flags:
-    """Return which bodies (N, 43), sorted by chi2 in each group, differ from every better body that is kept.
+    """Return a mask of the bodies (N, 43), sorted by chi2 in each group, that differ from every better kept body.
 
     Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` metres, a number
     or (N,). With `sure`, they are also the same if their difference is within their uncertainty (`MERGE_CHI2`).

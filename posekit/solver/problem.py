@@ -1,4 +1,4 @@
-r"""Knowledge of a body before any posture: image points, the root, lengths and limits, each with its deviation.
+r"""The data of the solver: image points, root, segment lengths and joint limits, each with its standard deviation.
 
 The unknowns of a frame are its 14 joint positions in the camera frame and the logarithm s of a size that all lengths
 share. With :math:`\pi` the projection, the residuals are
@@ -98,12 +98,13 @@ class Problem:
         limits: Limits | None = None,
         robust: bool = False,
     ) -> Problem:
-        """Make the problem of image points that a camera saw.
+        """Make the problem of a view: image points of a camera, and the prior knowledge of the person.
 
         Parameters
         ----------
         camera : Camera
-            Pinhole, scaled orthographic or Lee & Chen's; its first axis, where it has one, counts frames.
+            Pinhole, scaled orthographic or Lee & Chen's camera; a focal length or scale with an axis has one entry per
+            frame.
         image : array (F, 14, 2)
             Image points, pixels; NaN where a joint is hidden.
         deviation : float or array broadcastable to (F, 14)
@@ -117,7 +118,7 @@ class Problem:
         limits : Limits, optional
             Joint ranges.
         robust : bool
-            Whether the residuals of image points are bounded; detectors make gross errors.
+            Whether the residuals of image points are bounded (robust), because detectors make gross errors.
         """
         rays = camera.normalize(image)
         hidden = np.asarray(np.isnan(rays).any(axis=-1))
@@ -173,8 +174,9 @@ class Problem:
     def freedom(self) -> Ints:
         """Degrees of freedom of chi2 (F,): image coordinates and priors in excess of the unknowns.
 
-        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. Torso points and
-        the root exceed the six unknowns of the torso's pose, and hip points the three of the hips' orientation.
+        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. Counted are the
+        coordinates of torso points and root beyond the six unknowns of the torso's pose, and those of hip points beyond
+        the three unknowns of the hips' orientation.
         """
         seen = self.seen_joints
         priors = (self.records["root_weight"] != 0).any(axis=2).sum(axis=1) - self.sized

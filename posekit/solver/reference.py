@@ -1,4 +1,4 @@
-"""The solver in NumPy: the residuals and steps of `solver.cpp` for all starts at once.
+"""The solver in NumPy: the same residuals and steps as `solver.cpp`, computed for all starts at once.
 
 Unknowns x (N, 43) are the 14 joint positions and the logarithm of the size that all lengths share. The bits of `parts`
 select the unknowns that are free: bit 0 the trunk (six joints and the size), bits 1 to 4 the four limbs.
@@ -140,9 +140,9 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
 
 
 def _laid(blocks: Array, to_joints: Array) -> Array:
-    """Return matrices (N, 3F, 3F) along F joints from blocks (N, P, 3, 3) along P points.
+    """Return matrices (N, 3F, 3F) over F joints from blocks (N, P, 3, 3) over P points.
 
-    Points, which are joints or segments, are `to_joints` (P, F) times joints.
+    A point is a joint or a segment: the combination `to_joints` (P, F) of joints.
     """
     pairs = to_joints[:, :, None] * to_joints[:, None]
     laid = np.tensordot(blocks, pairs, (1, 0)).transpose(0, 3, 1, 4, 2)
@@ -164,8 +164,8 @@ def image_terms(records: Records, joints: Array) -> tuple[Array, Array, Flags]:
 def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) -> tuple[Array, Array, Array]:
     """Return residuals (N, S) of the log-lengths of some segments, and their derivatives (N, S, 3) along the segments.
 
-    The third array is their curvature (N, S, 3, 3): a segment that turns becomes longer. Negative curvature is set to
-    zero.
+    The third array is their curvature (N, S, 3, 3): to second order, moving an end sideways lengthens the segment.
+    Negative curvature is set to zero.
     """
     line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
     square, w = dot(line, line), records["length_weight"][:, some]
@@ -177,8 +177,8 @@ def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
     """Yield the excess of angles over their limits, radians, and its derivatives along the joints.
 
-    The first pair (N, 3), (N, 3, 14, 3) is of the pelvis, if the trunk is free; a pair (N, 5), (N, 5, 14, 3) of each
-    free limb follows. The fifth row of a limb is curvature without a residual: see `_limb_slopes`.
+    If the trunk is free, the first pair (N, 3), (N, 3, 14, 3) belongs to the pelvis. A pair (N, 5), (N, 5, 14, 3) for
+    each free limb follows; its fifth row is curvature without a residual: see `_limb_slopes`.
     """
     frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
@@ -202,7 +202,7 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Arr
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
-    """Add to `d` (M, K, 14, 3) the derivatives of w (M, K, 3) times the rotation vector of torso or hips."""
+    """Add to `d` (M, K, 14, 3) the derivatives of w (M, K, 3) dot the rotation vector of torso or hips."""
     forward, left, up = (R[:, None, :, k] for k in range(3))
     between = bool(limits.numbers["between_hips"])
     (a, b), (s, t) = ((0, 3), (1, 2)) if torso else ((4, 5), (0, 3) if between else (3, 4))
@@ -272,8 +272,8 @@ def descend(
 ) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts by Levenberg-Marquardt.
 
-    A step that is refused may have run into joint limits that its start does not violate. These limits are added to
-    the model of the next step, which would otherwise run into them again.
+    A rejected step may violate joint limits that its start does not violate. The model of the next step includes these
+    limits, because otherwise it would violate them again.
 
     Parameters
     ----------
@@ -284,11 +284,12 @@ def descend(
     start : array (N, 43)
         Joints, camera frame, metres, and the logarithm of the size.
     parts : int
-        Parts of the body that are free, as bits.
+        Bits of the parts of the body that are free.
     most : int
         Largest number of steps.
     hopeless : array (N,)
-        A start whose chi2 is above this value is given up if its next step promises to remove less than half of it.
+        A start whose chi2 is above this value is abandoned if the model of its next step predicts less than half of
+        that chi2 as reduction.
     damping : array (N,)
         Damping of the first step, 1/m^2: `FIRST_DAMPING`, or the final damping of an earlier descent. A start with
         infinite damping stays where it is.
@@ -298,7 +299,7 @@ def descend(
     Returns
     -------
     x, chi2, damping : array (N, 43), (N,), (N,)
-        Damping is infinite if a start has converged or is given up.
+        Damping is infinite for a start that has converged or is abandoned.
     """
     column = np.append((3 * free_joints(parts)[:, None] + np.arange(3)).ravel(), SIZE)
     x, damping = np.array(start, dtype=np.float64), np.array(damping, dtype=np.float64)
@@ -342,10 +343,10 @@ def descend(
 
 
 def information(problem: Problem, which: Ints, x: Array, known: Array, parts: int = 31) -> Array:
-    """Return the information (N, C, C) on the unknowns: the matrix of `evaluate`, and priors of places and turns.
+    """Return the information matrices (N, C, C): those of `evaluate`, plus weak priors of positions and turns.
 
-    `known` (3,) has three numbers: the information on the place of any joint, and of a hidden joint, both in 1/m^2; and
-    the factor of the information on turns (`posekit.solver.modes.TURN_INFORMATION`).
+    `known` (3,) has three numbers: the prior information on the position of a joint, and of a hidden joint, both in
+    1/m^2; and the factor of the information on rotations (`posekit.solver.modes.TURN_INFORMATION`).
     """
     p, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
     H = evaluate(problem, which, x, parts).matrix + FLOOR * np.eye(3 * len(free) + 1)
@@ -370,7 +371,7 @@ def covariance(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
 
 
 def log_determinants(problem: Problem, which: Ints, x: Array, known: Array) -> Array:
-    """Return the logarithms of the determinants of the information (N,)."""
+    """Return the logarithms (N,) of the determinants of the information matrices."""
     return np.asarray(np.linalg.slogdet(information(problem, which, x, known))[1])
 
 
@@ -385,7 +386,7 @@ def distinct(
     level: float,
     known: Array,
 ) -> Flags:
-    """Return which bodies (N,), sorted by chi2 in each group, differ from every better body that is kept.
+    """Return a mask (N,) of the bodies, sorted by chi2 in each group, that differ from every better kept body.
 
     Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` (N,) metres.
     They are also the same if no joint differs by more than `reach` metres and their difference d has

@@ -1,4 +1,4 @@
-"""The method: minimise chi2 of trunks, then of limbs on each trunk, then of whole bodies that combine both."""
+"""The method: minimise chi2 of trunks, then of each limb on each trunk, then of whole bodies made of both."""
 
 from __future__ import annotations
 
@@ -99,12 +99,12 @@ def solve(
 
 
 def _rank(group: Ints) -> Ints:
-    """Return the place of each entry within its group; groups are ascending."""
+    """Return the rank of each entry within its group; the groups ascend."""
     return np.arange(len(group)) - np.searchsorted(group, group)
 
 
 def _best(problem: Problem, most: Array, frame: Ints, x: Array, chi2: Array, parts: int) -> Ints:
-    """Return the rows of distinct bodies with a chi2 of at most `most` (F,) of their frame, the best first."""
+    """Return the rows of distinct bodies whose chi2 is at most the limit `most` (F,) of their frame, the best first."""
     order = np.lexsort((chi2, frame))
     order = order[np.isfinite(chi2[order]) & (chi2[order] <= most[frame[order]])]
     within, sure = (SAME_TRUNK_METRES, False) if parts == 1 else (MERGE_DISTANCE_METRES, True)
@@ -145,7 +145,7 @@ def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
 def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -> tuple[Ints, Array]:
     """Return all combinations of trunk and limbs that can pass: rows of the trunks (B,) and unknowns (B, 43).
 
-    Only the `most` best positions of each limb on a trunk are combined.
+    The chi2 of a combination is the sum of the chi2 of its parts; it must be below `LOOSE_BODY`. Only the `most` best positions of each limb on a trunk are combined.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2

@@ -1,4 +1,4 @@
-"""Starts of the solver: seen joints near and far on their rays, at a few depths; hidden joints in many directions."""
+"""Starts of the solver: seen joints near and far on their rays, hidden joints in many directions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
 
 
 def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array, far: Flags | bool) -> Array:
-    """Return the ends (N, 3) of segments on a joint's ray, near or far.
+    """Return the near or the far ends (N, 3) of segments on the ray of a joint.
 
     If a segment is too short to reach the ray, its end is the point of the ray nearest to its start.
     """
@@ -114,8 +114,8 @@ def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
 def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
     """Place the hidden joints of torso or hips: fit a straight trunk of the person's lengths to the seen joints.
 
-    One or two seen joints leave a rotation open. The trunk is then fitted in `DIRECTIONS` rotations, by one more point
-    beside it.
+    One or two seen joints leave a rotation undetermined. The trunk is then fitted in `DIRECTIONS` different rotations,
+    each fixed by one more point beside the trunk.
     """
     seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
     seen[:, part] = problem.seen_joints[frame, part]

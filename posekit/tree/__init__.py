@@ -1,4 +1,4 @@
-"""The exact interpretation tree: all near-far choices of 13 joints, pruned level by level by checks."""
+"""The exact interpretation tree: all combinations of near and far for 13 joints, pruned level by level by checks."""
 
 from posekit.tree.tree import Trees as Trees
 from posekit.tree.tree import grow as grow

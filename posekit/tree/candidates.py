@@ -1,4 +1,4 @@
-"""All positions that each joint can have.
+"""The candidate positions of every joint: one for each combination of near and far on its path from the root.
 
 A node at level j of the tree is a code of j bits, one for each joint in tree order, the highest bit for the first
 joint: 0 near, 1 far. The position of a joint depends only on the bits of the joints on its path from the root.
@@ -47,7 +47,7 @@ def support_of(points: tuple[int, ...]) -> tuple[int, ...]:
 
 @lru_cache(maxsize=512)
 def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return the bits of some joints for every code at a level (2^level,); the highest bit is the first joint's."""
+    """Return the bits of some joints in every code (2^level,) of a level; the first joint has the highest bit."""
     codes = np.arange(1 << level, dtype=np.int64)
     picked = np.zeros_like(codes)
     for joint in joints:
@@ -91,7 +91,7 @@ class Candidates:
     def lifted(
         camera: Camera, image: Array, root: Array, lengths: Array, head: Array, slack: float
     ) -> Candidates:
-        """Lift every joint from every candidate of its parent.
+        """Compute the candidates of every joint: its near and far position for each candidate of its parent.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Candidates:
         head : array (F, 5, 3)
             Head points, metres; NaN where not known.
         slack : float
-            Metres. A segment that is too short by less is treated as tangent to the ray of its image point.
+            Metres. A segment that misses the ray of its image point by less is treated as tangent to the ray.
         """
         frames = len(image)
         table = np.full((frames, HEAD_COLUMN + 6, 3), np.nan)

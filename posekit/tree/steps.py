@@ -1,4 +1,4 @@
-"""Steps of the compiled tree: branches, and posekit's own checks written as numbers."""
+"""Steps of the compiled tree: the choice of near or far for a joint, and posekit's own checks as numbers."""
 
 from __future__ import annotations
 

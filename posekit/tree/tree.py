@@ -1,8 +1,8 @@
 """The binary interpretation tree (Lee & Chen 1985, section 3.1), grown level by level over many frames at once.
 
 A node is a frame and a code. The judgement of a check depends only on the branches of the few joints that the check
-reads. Each check therefore judges every remaining combination of these branches once, for all nodes that share it: the
-four limbs are judged independently of each other.
+reads. Therefore a check judges each remaining combination of these branches once, for all nodes that share the
+combination. The four limbs, for example, are judged independently of each other.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ NOTHING: Final = Pruned(*np.zeros((4, 0), dtype=np.int64), *np.zeros((3, 0)))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trees:
-    """Remaining branches of the trees of F frames, by frame, then by code, and the reasons for pruning the others.
+    """The survivors of the trees of F frames, by frame and code, and the pruned branches with the reason of each.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def grow(
     head: Array | None = None,
     tolerance: float = 0.0,
 ) -> Trees:
-    """Grow the trees of F frames, pruning each branch at the first level where a check can judge it.
+    """Grow the trees of F frames; a branch is pruned at the first level at which a check can reject it.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def grow(
     head : array (F, 5, 3), optional
         Head points, metres. A check that reads head points judges no frame without them.
     tolerance : float
-        Metres. A segment that is too short by less is treated as tangent to the ray of its image point.
+        Metres. A segment that misses the ray of its image point by less is treated as tangent to the ray.
 
     Returns
     -------
@@ -222,7 +222,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check with the level at which it judges and the points that it reads; None in place of a check to branch."""
+    """A check, the level at which it judges, and the points that it reads; the check None branches a joint."""
 
     level: int
     check: Any
