@@ -145,7 +145,8 @@ def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
 def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -> tuple[Ints, Array]:
     """Return all combinations of trunk and limbs that can pass: rows of the trunks (B,) and unknowns (B, 43).
 
-    The chi2 of a combination is the sum of the chi2 of its parts; it must be below `LOOSE_BODY`. Only the `most` best positions of each limb on a trunk are combined.
+    The chi2 of a combination is the sum of the chi2 of its parts; it must be below `LOOSE_BODY`. Only the `most` best
+    positions of each limb on a trunk are combined.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2
