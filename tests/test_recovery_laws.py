@@ -16,7 +16,7 @@ import posekit
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
-from posekit.skeleton import JOINTS, other_side
+from posekit.skeleton import JOINTS, SEGMENT_NAMES, other_side
 from posekit.synthesis import forget_camera, random_views
 from tests.test_cli import folder, run
 
@@ -250,3 +250,20 @@ def test_flips_of_an_object_that_are_given_by_hand_are_kept(given: int, run: Any
     kept = [one["points"] for one in every if hand.items() <= one["flips"].items()]
     assert 0 < len(kept) < len(every)
     assert [one["points"] for one in postures("--settings", str(settings))] == kept
+
+
+@pytest.mark.parametrize("proportions", ["auto", "figure", "people", "taylor"])
+def test_lengths_grow_with_the_stature_whoever_states_it(view: posekit.View, proportions: str) -> None:
+    """Without lengths a calibrated view shows the figure, scaled to the stature."""
+    one = replace(view.take([0]), lengths={})
+    one = forget_camera(one) if proportions == "taylor" else one
+    settings = posekit.RecoverSettings(proportions=proportions)
+    tall, small = (posekit.recover(one, settings, stature=size).lengths for size in (1.95, 1.3))
+    by_view = posekit.recover(replace(one, stature=1.95), settings).lengths
+    assert by_view == tall and set(tall) == set(small) == set(SEGMENT_NAMES)
+    for name in SEGMENT_NAMES:
+        assert tall[name] / small[name] == pytest.approx(1.95 / 1.3, rel=1e-6)
+    if proportions in ("auto", "figure"):
+        assert tall == pytest.approx(posekit.load_figure().scaled(stature=1.95).lengths)
+    else:
+        assert tall != pytest.approx(posekit.load_figure().scaled(stature=1.95).lengths, rel=0.01)

@@ -356,6 +356,35 @@ def test_plots_of_angles_are_to_scale(folder: Path, motion: posekit.Motion) -> N
         np.testing.assert_allclose(degrees, drawn_angles, atol=0.5, err_msg=DOFS[k])
 
 
+def test_plots_of_a_robots_joints_are_to_scale(folder: Path) -> None:
+    """A joint has a panel; the root of a robot has none, and limits of more than a turn end at a turn."""
+    (folder / "chain.urdf").write_text(CHAIN, encoding="utf-8")
+    robot = posekit.load_robot(folder / "chain.urdf")
+    names = list(robot.configuration_names)
+    q = np.tile(robot.neutral, (12, 1))
+    q[:, 7:] += np.random.default_rng(2).uniform(-0.3, 0.3, (12, len(names) - 7))
+    columns = [*names[:7], *names[:6:-1]]
+    shuffled = posekit.Motion(
+        q=q[:, [names.index(name) for name in columns]],
+        q_names=columns,
+        robot=str(folder / "chain.urdf"),
+        time=np.arange(12) / 10,
+    )
+    posekit.render(shuffled, folder / "robot.svg", which="angles")
+    text = (folder / "robot.svg").read_text(encoding="utf-8")
+    lines, outside = paths_of(text, "angle"), paths_of(text, "outside")
+    assert len(lines) == len(names) - 7
+    assert all(f"<!-- {name.replace('_', ' ')} -->" in text for name in names[7:])
+    lower, upper = np.degrees([robot.lower[7:], robot.upper[7:]]).clip(-360, 360)
+    for k, line in enumerate(lines):
+        low, high = outside[2 * k][:, 1].min(), outside[2 * k + 1][:, 1].max()
+        degrees = lower[k] + (line[:, 1] - low) / (high - low) * (upper[k] - lower[k])
+        drawn_angles = np.interp(
+            line[:, 0], np.linspace(line[0, 0], line[-1, 0], 12), np.degrees(q[:, 7 + k])
+        )
+        np.testing.assert_allclose(degrees, drawn_angles, atol=0.5, err_msg=names[7 + k])
+
+
 def test_timelines_are_to_scale(folder: Path) -> None:
     report = posekit.validate(gesture(broken=slice(20, 26)))
     posekit.render(report, folder / "timeline.svg")
