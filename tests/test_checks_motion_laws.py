@@ -249,6 +249,35 @@ def test_speeds_of_robots_are_shares_of_the_limits_of_their_urdf(share: float, f
     assert set(rows.place) <= {name} and rows.value.to_numpy() == pytest.approx(share)
 
 
+SLIDER = """<robot name="slider"><link name="base"/><link name="arm"/><link name="hand"/><link name="tool"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+<joint name="wheel" type="continuous"><parent link="arm"/><child link="hand"/><origin xyz="0 0 0.3"/>
+<axis xyz="0 1 0"/></joint>
+<joint name="slide" type="prismatic"><parent link="hand"/><child link="tool"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.98, False), (1.02, True)])
+@pytest.mark.parametrize(("profile", "most"), [("holomotion", 20.0), ("protomotions", 40.0)])
+def test_a_profile_bounds_the_speed_of_every_joint_that_turns(
+    profile: str, most: float, share: float, found: bool, tmp_path: Path
+) -> None:
+    """The bound replaces the limits of the URDF; joints that slide have none."""
+    (tmp_path / "slider.urdf").write_text(SLIDER, encoding="utf-8")
+    robot = posekit.load_robot(tmp_path / "slider.urdf", fixed_base=True)
+    angle = share * most / 100.0 * (np.arange(11) - 5)
+    columns = {"turn": [angle], "wheel": [np.cos(angle), np.sin(angle)], "slide": [angle]}
+    names = [name for name, values in columns.items() for _ in values]
+    q = np.concatenate([columns[name] for name in columns]).T
+    assert [name.partition(".")[0] for name in robot.configuration_names] == names
+    motion = Motion(q=q, robot=str(tmp_path / "slider.urdf"), time=np.arange(11) / 100.0, up="+z")
+    settings = posekit.ValidateSettings(profile=profile, checks="joint-velocity")
+    rows = rows_of(posekit.Validator(robot, settings).check(motion), "joint-velocity")
+    assert sorted(rows.place) == sorted(["turn", "wheel"] * 10 * found)
+    assert rows.value.to_numpy() == pytest.approx(share)
+
+
 # Numbers that are known
 
 
