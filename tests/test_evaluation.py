@@ -27,7 +27,7 @@ from posekit.evaluation import (
 )
 from posekit.geometry import rotation_from_vector
 from posekit.motion import Motion
-from posekit.recovery import Answer, Frames, Recovery, Survivors
+from posekit.recovery import Answer, Frames, Paths, Recovery, Survivors
 from posekit.skeleton import JOINTS, PARENTS, POINTS
 from posekit.synthesis import Walker, builtin_view, mocap_view
 
@@ -71,6 +71,17 @@ def test_errors_are_those_of_the_survivors() -> None:
     assert summary["retained"] == {"10 mm": 0.0, "35 mm": 1.0, "branch": 1.0}
     assert summary["error_mm"]["first"]["mpjpe"]["median"] == pytest.approx(100)
     assert summary["survivors"]["median"] == 2 and "path" not in summary["error_mm"]
+
+
+def test_the_likeliest_path_is_compared_with_the_truth() -> None:
+    found = result((0.10, 0.03))
+    joints = TRUTH + np.array([[[[0.02, 0.0, 0.0]]], [[[0.5, 0.0, 0.0]]]])
+    paths = Paths(survivor=np.zeros(joints.shape[:2]), probability=np.array([0.7, 0.3]), joints=joints)
+    followed = evaluate(replace(found, path=paths), TRUTH)
+    assert followed.columns["path_mpjpe"] == pytest.approx(0.02) and followed.columns[
+        "path_worst"
+    ] == pytest.approx(0.02)
+    assert followed.summary()["error_mm"]["path"]["mpjpe"]["median"] == pytest.approx(20)
 
 
 def test_similarities_and_shifts_do_not_count_in_aligned_measures() -> None:
@@ -208,6 +219,15 @@ def test_a_method_is_evaluated_at_levels_of_noise() -> None:
     exact, noisy = (found.summary(rows) for _, rows in found.conditions(["noise"]))
     assert exact["retained"]["10 mm"] == 1.0 and noisy["without_survivor"] == 0
     assert exact["error_mm"]["best"]["pa"]["median"] < 0.1 < noisy["error_mm"]["best"]["pa"]["median"] < 60
+
+
+def test_a_view_that_is_refused_has_no_survivor_in_any_frame() -> None:
+    view = builtin_view("seq1")
+    outside = replace(view, camera=LeeChenCamera(f=None), head_image=view.head_image * np.nan)
+    found = evaluate_method([({"name": "a"}, view), ({"name": "b"}, outside)], noise=(0.0,))
+    assert found.columns["name"].tolist() == ["a"] * len(view) + ["b"] * len(view)
+    assert found.columns["survivors"][len(view) :].tolist() == [0] * len(view)
+    assert found.summary()["without_survivor"] == len(view)
 
 
 @pytest.mark.parametrize(

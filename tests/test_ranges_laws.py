@@ -144,3 +144,31 @@ def test_own_ranges_judge_by_their_own_ends(tmp_path: Path) -> None:
     for angle, places in ((5.0, {"right_elbow.flexion"}), (30.0, set()), (55.0, {"right_elbow.flexion"})):
         found = validator.check(posed(right_elbow__flexion=angle, left_elbow__flexion=30.0)).table()
         assert set(found["place"]) == places
+
+
+@pytest.mark.parametrize("joint", ["right_elbow_Z", "left_hip_Z", "middle_lumbar_Z", "right_shoulder_Y"])
+@pytest.mark.parametrize("end", [0, 1])
+def test_joints_of_a_robot_are_judged_by_the_ends_of_a_table(joint: str, end: int) -> None:
+    limits = tomllib.loads((RANGES / "human_as_stick_figure.toml").read_text(encoding="utf-8"))["limits"]
+    robot = posekit.load_robot("human", bodies="none")
+    q = np.tile(robot.neutral, (2, 1))
+    inward = 1 if end == 0 else -1
+    q[:, robot.configuration_names.index(joint)] = np.radians(
+        limits[joint][end] + np.array([0.2, -0.2]) * inward
+    )
+    validator = posekit.Validator(robot, checks=["joint-range"], ranges="human_as_stick_figure")
+    found = validator.check(posekit.Motion(q=q, robot="human")).table()
+    assert found["frame"].tolist() == [1] and found["place"].tolist() == [joint]
+    assert found["value"] == pytest.approx(limits[joint][end] - 0.2 * inward)
+    allowed = np.array([-1e-3, 1e-3])  # degrees, for rounding
+    assert [found["lower"][0], found["upper"][0]] == pytest.approx(limits[joint] + allowed, abs=1e-9)
+
+
+def test_the_table_of_a_robots_joints_names_its_bad_limits(tmp_path: Path) -> None:
+    words = (RANGES / "human_as_stick_figure.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        words.replace("right_knee_Z = [0.0, 130.0]", "right_knee_Z = [130.0, 0.0]"), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"mine\.toml: limits\.right_knee_Z"):
+        posekit.Validator("human", ranges=str(path)).check(posekit.load_robot("human").neutral[None])

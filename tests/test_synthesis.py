@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -224,6 +225,27 @@ def test_robots_are_drawn_within_their_limits_and_seen_orthographically() -> Non
     assert np.ptp(np.linalg.norm(truth[:, 0] - truth[:, 1], axis=-1)) < 1e-9
     document = object_document(names, image, truth)
     assert document["frames"][2]["image"]["panda_joint4"] == image[2, 1].tolist()
+
+
+MOBILE = """<robot name="mobile"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+<limit lower="2" upper="12" velocity="1" effort="1"/></joint>
+<joint name="wheel" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="2" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_joints_of_every_kind_are_drawn_over_their_whole_range(tmp_path: Path) -> None:
+    """A range of more than a turn is drawn over the turn nearest to zero."""
+    (tmp_path / "mobile.urdf").write_text(MOBILE, encoding="utf-8")
+    robot = load_robot(tmp_path / "mobile.urdf")
+    q = random_configurations(robot, 2000, np.random.default_rng(0))
+    assert robot.checked(q) is not None and (q[:, :3] == 0).all()
+    assert np.ptp(q[:, 3:7], axis=0).min() > 1.9
+    turn, wheel, slide = q[:, 7], np.arctan2(q[:, 9], q[:, 8]), q[:, 10]
+    for values, low, high in ((turn, 2.0, 2.0 + 2 * np.pi), (wheel, -np.pi, np.pi), (slide, -1.0, 2.0)):
+        assert low <= values.min() < low + 0.05 and high - 0.05 < values.max() <= high
+        assert values.mean() == pytest.approx((low + high) / 2, abs=0.15)
 
 
 @pytest.mark.parametrize(
