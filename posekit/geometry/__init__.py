@@ -1,4 +1,4 @@
-"""Vectors, quaternions, rotations, rigid fits and distances, each formula once.
+"""Functions on vectors, quaternions, rotations, rigid alignments and distances.
 
 Arrays are batches: vectors (..., 3), quaternions (..., 4) in Pinocchio's order x, y, z, w, rotations (..., 3, 3).
 NaN marks an unknown value and propagates. A result never depends on the size of the batch.

@@ -10,17 +10,17 @@ from posekit.geometry.vectors import Array, unit
 
 
 def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
-    r"""Return how far points are beyond convex hulls, along a plane.
+    r"""Return the signed distances of points from convex hulls, both projected onto a plane.
 
-    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over directions u: the maximum is
-    at the normal of an edge, or at the direction from the nearest corner to x.
+    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over unit directions u. The
+    maximum is at the normal of an edge, or at the direction from the nearest corner to the point.
 
     Parameters
     ----------
     points : array (T, 3)
-        Metres.
+        Points, metres.
     corners : array (T, P, 3)
-        Points that span the hulls; NaN where there is none.
+        Corners of each hull, metres; a corner that is NaN is ignored.
     normal : array (3,)
         Unit normal of the plane.
 
@@ -38,6 +38,6 @@ def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
     ways = unit(np.concatenate([normals, at[:, None] - corners], axis=1))
     reach = np.fmax.reduce(np.einsum("tdi,tpi->tdp", ways, corners), axis=2)
     beyond = np.fmax.reduce(np.einsum("tdi,ti->td", ways, at) - reach, axis=1)
-    # A point on the only corner has no way from it.
+    # If the point is the hull's only corner, no direction leads from the corner to it: the distance is zero.
     on_it = (at[:, None] == corners).all(axis=2).any(axis=1)
     return np.asarray(np.where(np.isnan(beyond) & on_it, 0.0, beyond))

@@ -1,4 +1,4 @@
-"""Joint centres from other landmarks of a body: hips from markers of the pelvis, neck and pelvis of the figure."""
+"""Joint centres estimated from other landmarks: hips from pelvis markers, neck and pelvis from shoulders and hips."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 
 from posekit.geometry.vectors import Array, cross, perpendicular, unit
 
-#: Place of the built-in figure's pelvis on the line from the middle of the shoulders (0) to that of the hips (1).
+#: Position of the built-in figure's pelvis on the line from the midpoint of the shoulders (0) to that of the hips (1).
 PELVIS_SHARE: Final = 0.8200545021161334
-#: The figure's neck from the middle of the shoulders, as shares of that line's length: forward, left, up.
+#: Offset of the figure's neck from the midpoint of the shoulders: forward, left, up, as fractions of that line's
+#: length.
 NECK_OFFSET: Final = (0.06720811867953341, 0.0, -0.002995656796876607)
 
 
 def middles(found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the middles (..., D) of the shoulders and of the hips, where both sides are among the landmarks."""
+    """Return the midpoints (..., D) of shoulders and hips; a pair is omitted if one of its landmarks is missing."""
     return {
         f"mid_{part}s": (found[f"right_{part}"] + found[f"left_{part}"]) / 2
         for part in ("shoulder", "hip")
@@ -25,10 +26,11 @@ def middles(found: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def hips_from_markers(right: Array, left: Array, back: Array) -> tuple[Array, Array]:
-    """Place right and left hip (T, 3) from the anterior spines of the pelvis and the sacrum (T, 3).
+    """Estimate the right and left hip (T, 3) from markers on the pelvis's anterior spines and on the sacrum (T, 3).
 
-    From the middle of the spines, as shares of their distance: 0.36 to the side, 0.19 backward, 0.30 down (Bell,
-    Brand & Pedersen 1989, *Prediction of hip joint centre location from external landmarks*, Human Movement Science 8).
+    The hips lie 0.36 sideways, 0.19 backward and 0.30 down from the midpoint of the spines, as fractions of the
+    distance between the spines (Bell, Brand & Pedersen 1989, *Prediction of hip joint centre location from external
+    landmarks*, Human Movement Science 8).
     """
     width = np.linalg.norm(left - right, axis=-1, keepdims=True)
     to_left, middle = unit(left - right), (left + right) / 2
@@ -38,7 +40,7 @@ def hips_from_markers(right: Array, left: Array, back: Array) -> tuple[Array, Ar
 
 
 def place_neck(found: Mapping[str, Array]) -> Array:
-    """Place the neck (T, 3) at a fixed offset in the frame of shoulders and pelvis, in spine lengths."""
+    """Estimate the neck (T, 3) from shoulders and pelvis, at an offset proportional to the median spine length."""
     spine = np.linalg.norm(found["mid_shoulders"] - found["mid_hips"], axis=-1)
     spine = spine[np.isfinite(spine)]
     left = unit(found["left_shoulder"] - found["right_shoulder"])

@@ -1,4 +1,4 @@
-"""Two least-squares problems: smooth values over time, and move states into their bounds by the smallest steps."""
+"""Least-squares smoothing of sequences, and the smallest steps that bring states inside bounds."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from posekit.geometry.vectors import Array, Flags
 
-#: Coefficients of the third difference: smoothing leaves motion unchanged whose acceleration changes evenly.
+#: Coefficients of the third difference, the penalty of smoothing: it is zero for constant acceleration.
 THIRD_DIFFERENCE: Final = (-1.0, 3.0, -3.0, 1.0)
-#: Weight of a frame that stays; a smoothed frame has weight one.
+#: Weight of a frame that keeps its values; a smoothed frame has weight one.
 STAYS: Final = 1e9
-#: Largest number of steps, and of bounds in one step; largest change of an entry in one step, radians or metres.
+#: Maximum number of steps, number of bounds in one step, and change of an entry in one step (radians or metres).
 MOST_STEPS, MOST_BOUNDS, MOST_STEP = 12, 12, 0.2
-#: Step by which margins are differentiated, radians or metres.
+#: Step of the finite differences of margins, radians or metres.
 DIFFERENCE: Final = 1e-3
-#: Damping, added to the diagonal of the normal matrix of a step, m²/rad².
+#: Damping added to the diagonal of a step's normal matrix, m²/rad².
 SOFTNESS: Final = 1e-6
 
 
@@ -28,7 +28,7 @@ def into_bounds(
     free: Sequence[int],
     margins: Callable[[Array], Array],
 ) -> Array:
-    """Move states (n, …) inside bounds by the shortest steps: damped Newton steps on the negative margins.
+    """Move states (n, …) inside bounds by the shortest steps: damped Newton steps that raise negative margins to zero.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ def into_bounds(
     free : sequence of int
         Entries of a step that may differ from zero.
     margins : callable
-        Returns the margins (n, K) of states, metres, negative where a bound is violated. Its derivatives are computed
-        by finite differences.
+        Returns the margins (n, K) of states, metres, negative where a bound is violated. Its derivatives are finite
+        differences.
 
     Returns
     -------
     array (n, …)
-        States; bounds that the steps cannot meet stay violated.
+        Moved states; bounds that no steps satisfy stay violated.
     """
     for _ in range(MOST_STEPS):
         margin = margins(state)
@@ -70,10 +70,10 @@ def into_bounds(
 
 
 def smoothed(values: Array, loose: Flags, strength: float) -> Array:
-    r"""Smooth values (T, K, …) over time where the mask `loose` (T, K) is True; all other values stay.
+    r"""Smooth values (T, K, …) over time in the frames that a mask `loose` (T, K) selects.
 
-    Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the loose frames (Whittaker 1923; Eilers 2003, *A perfect
-    smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
+    Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the selected frames, and keeps the values of all other frames
+    (Whittaker 1923; Eilers 2003, *A perfect smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
     """
     from scipy import sparse
     from scipy.sparse.linalg import spsolve

@@ -15,7 +15,7 @@ def quaternion_rotate(q: Array, vectors: Array) -> Array:
 
 
 def quaternion_log(q: Array) -> Array:
-    """Turn unit quaternions (..., 4) into rotation vectors (..., 3) no longer than pi."""
+    """Convert unit quaternions (..., 4) to rotation vectors (..., 3) with lengths of at most pi."""
     turned = shorter_quaternion(q)
     sine = np.linalg.norm(turned[..., :3], axis=-1, keepdims=True)
     angle = 2 * np.arctan2(sine, turned[..., 3:])  # well conditioned at all angles, unlike the arc cosine
@@ -23,12 +23,12 @@ def quaternion_log(q: Array) -> Array:
 
 
 def shorter_quaternion(q: Array) -> Array:
-    """Return q or -q (..., 4), whichever has w >= 0 and so an angle of at most pi."""
+    """Return q or -q (..., 4), whichever has w >= 0 and therefore a rotation angle of at most pi."""
     return np.asarray(q * np.where(q[..., 3:] < 0, -1.0, 1.0))
 
 
 def quaternion_from_rotation(R: Array, *, shorter: bool = True) -> Array:
-    """Turn rotations into unit quaternions.
+    """Convert rotation matrices to unit quaternions.
 
     The squares of the four entries sum to one. The largest is computed first, so that the square root of a small
     number is never a divisor (Shepperd 1978, *Quaternion from rotation matrix*, J. Guidance and Control 1(3)).
@@ -62,7 +62,7 @@ def quaternion_from_rotation(R: Array, *, shorter: bool = True) -> Array:
 
 
 def rotation_from_quaternion(q: Array) -> Array:
-    """Turn unit quaternions (..., 4) into rotations (..., 3, 3)."""
+    """Convert unit quaternions (..., 4) to rotation matrices (..., 3, 3)."""
     x, y, z, w = np.moveaxis(np.asarray(q), -1, 0)
     entries = [
         *(1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),

@@ -1,4 +1,4 @@
-"""Base of the frozen dataclasses that users hold: a short repr and read-only arrays."""
+"""Base of the public frozen dataclasses, with a short repr and read-only arrays."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from posekit.geometry.vectors import Array
 
 MAX_REPR_CHARACTERS: Final = 240
 MAX_TEXT_CHARACTERS: Final = 40
-#: Longest sequence whose members a repr lists; a longer one is shown by its length.
+#: Longest sequence whose members a repr lists; a longer sequence is shown by its length.
 MAX_LISTED: Final = 4
 
 
 class Record:
-    """Print a dataclass as one line: each array by its shape, None and empty fields left out.
+    """Base of dataclasses whose repr is one line: it shows arrays by their shapes and omits None and empty fields.
 
     A subclass is decorated with ``@dataclass(frozen=True, kw_only=True, eq=False, repr=False)``.
     """
 
     def __repr__(self) -> str:
-        """Return the line."""
+        """Return the class's name and its fields on one line."""
         return f"{type(self).__name__}({cut_text(', '.join(self._facts()), MAX_REPR_CHARACTERS)})"
 
     def _facts(self) -> list[str]:
-        """List the entries of the repr; a subclass may choose other entries."""
+        """List the fields of the repr as ``name=value``; a subclass may list others."""
         held = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)  # type: ignore[arg-type]
         return [f"{name}={short(value)}" for name, value in held if not _is_empty(value)]
 
@@ -39,7 +39,7 @@ class Record:
         object.__setattr__(self, name, value)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a pickle; fields that are computed on reading are computed now."""
+        """Return the fields to pickle; fields that are computed on first access are computed now."""
         return {name: getattr(self, name) for name in vars(self)}
 
 

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from posekit.geometry.vectors import Array, Flags, Ints
 
-#: Any two points align exactly with any two others: a distance needs three.
+#: Minimum number of known points for an alignment: any two points align exactly with any other two.
 MIN_ALIGNED_POINTS: Final = 3
 
-#: Spread of a set over its distance from the origin below which all its points coincide.
+#: Ratio of a point set's spread to its mean's distance from the origin; below it all points coincide.
 NO_EXTENT: Final = 1e-12
 
 
@@ -20,21 +20,21 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
     r"""Return the rotations nearest to matrices: they maximise :math:`tr(R^T M)`.
 
     With :math:`M = U D V^T` the singular value decomposition, :math:`R = U S V^T` where
-    :math:`S = diag(1, 1, \det U V^T)` keeps R from being a reflection (Kabsch 1976, Acta Cryst. A32; Umeyama 1991, IEEE
-    Trans. PAMI 13(4), eqs. 40-43). For a covariance :math:`\sum_p y_p x_p^T` it turns the x onto the y with the least
-    squared distance; for a rounded rotation it is the polar factor (Higham 1989).
+    :math:`S = diag(1, 1, \det U V^T)` ensures that R is no reflection (Kabsch 1976, Acta Cryst. A32; Umeyama 1991, IEEE
+    Trans. PAMI 13(4), eqs. 40-43). For a covariance :math:`\sum_p y_p x_p^T` R rotates the x onto the y with the least
+    squared distance. For a rotation matrix with rounding errors, R is the polar factor (Higham 1989).
 
     Parameters
     ----------
     matrix : array (..., 3, 3)
-        M.
+        The matrices M.
 
     Returns
     -------
     rotation : array (..., 3, 3)
-        R; NaN if M is.
+        R; NaN if M has a NaN.
     values : array (..., 3)
-        The diagonal of D S: singular values in descending order, the last negative if M mirrors. The best rotation
+        The diagonal of D S: singular values in descending order; the last is negative if det M < 0. The best rotation
         is unique if the sum of the last two is positive.
     """
     known = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
@@ -49,19 +49,19 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
 
 
 def fit_rotation(offsets: Array, turned: Array) -> Array:
-    r"""Return the rotations that turn rigid offsets into others best: least :math:`\sum_p |y_p - R x_p|^2`.
+    r"""Return the rotations R that best map rigid offsets x to vectors y: they minimise :math:`\sum_p |y_p - R x_p|^2`.
 
     Parameters
     ----------
     offsets : array (P, 3)
-        The x, in the body's frame.
+        The offsets x, in the frame of the rigid object.
     turned : array (N, P, 3)
-        The y, the same vectors in the camera frame.
+        The vectors y: the same offsets in the camera frame.
 
     Returns
     -------
     array (N, 3, 3)
-        NaN if a turned offset is NaN.
+        R; NaN if one of the vectors y is NaN.
     """
     return best_rotation(np.einsum("npi,pj->nij", turned, offsets))[0]
 
@@ -72,7 +72,7 @@ class Alignment(NamedTuple):
     Attributes
     ----------
     rotation : array (..., 3, 3)
-        R, never a reflection. NaN if nothing can be aligned.
+        R, never a reflection; NaN if the points cannot be aligned.
     translation : array (..., 3)
         t, in the target's unit.
     scale : array (...)
@@ -169,7 +169,7 @@ def _squared(x: Array, y: Array, known: Flags) -> Array:
 
 
 def mean_known(values: Array) -> Array:
-    """Return the mean of the known entries along the last axis (...); NaN if there are none."""
+    """Return the mean (...) of the known entries along the last axis; NaN if no entry is known."""
     known = ~np.isnan(values)
     count = known.sum(axis=-1)
     total = np.where(known, values, 0.0).sum(axis=-1)
@@ -177,7 +177,7 @@ def mean_known(values: Array) -> Array:
 
 
 def known_median(values: Array | Ints) -> float:
-    """Return the median of the known numbers of an array; NaN if there are none."""
+    """Return the median of an array's known numbers; NaN if no number is known."""
     known = np.sort(values[np.isfinite(values)])
     # NumPy's median would load numpy.ma.
     return float(known[(len(known) - 1) // 2] + known[len(known) // 2]) / 2 if len(known) else np.nan

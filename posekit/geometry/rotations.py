@@ -1,4 +1,4 @@
-"""Rotations as matrices (..., 3, 3): from axes, angles and vectors, and back."""
+"""Rotation matrices (..., 3, 3) from axes, angles and rotation vectors, and the inverse conversions."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def coordinate_rotation(axis: int, angle: Array) -> Array:
 
 
 def frame_along(axis: Array) -> Array:
-    """Complete unit vectors (..., 3) to rotations (..., 3, 3) that have them as first column.
+    """Return rotations (..., 3, 3) whose first columns are given unit vectors (..., 3).
 
     The basis is continuous except at z = 0 (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1),
     listing 3).
@@ -76,7 +76,7 @@ def frame_along(axis: Array) -> Array:
 
 
 def rotation_between(start: Array, end: Array) -> Array:
-    """Return the shortest rotations (..., 3, 3) that turn unit vectors (..., 3) into others."""
+    """Return the shortest rotations (..., 3, 3) from unit vectors `start` (..., 3) to unit vectors `end` (..., 3)."""
     axis = cross(start, end)
     sine = np.linalg.norm(axis, axis=-1)
     # Opposite vectors are joined by half a turn about any perpendicular axis.
@@ -86,12 +86,12 @@ def rotation_between(start: Array, end: Array) -> Array:
 
 
 def rotate_back(R: Array, vectors: Array) -> Array:
-    """Return R^T v: camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
+    """Return R^T v: convert vectors (N, 3) from the camera frame to the frames R_cam_part (N, 3, 3)."""
     return np.asarray(np.einsum("nji,nj->ni", R, vectors))
 
 
 def relative_rotation(R_a: Array, R_b: Array) -> Array:
-    """Return R_a^T R_b (N, 3, 3): frames R_cam_b (N, 3, 3) seen from frames R_cam_a."""
+    """Return R_a_b = R_cam_a^T R_cam_b (N, 3, 3), the rotations of frames b relative to frames a."""
     return np.asarray(np.einsum("nji,njk->nik", R_a, R_b))
 
 

@@ -1,4 +1,4 @@
-"""The distance between two segments."""
+"""The distance between two line segments."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import numpy as np
 
 from posekit.geometry.vectors import Array, cross, dot
 
-#: Squared sine of the angle of two segments below which they are parallel.
+#: Squared sine of the angle between two segments; below it they count as parallel.
 PARALLEL: Final = 1e-30
 
 
 def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
     r"""Return the distance between two segments, in closed form.
 
-    Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained minimum is
-    clamped in s, t follows and is clamped, and s follows that (Ericson 2005, *Real-Time Collision Detection*, §5.1.9).
-    If the segments are nearly parallel that minimum is ill-conditioned; the four ends, each against the other segment,
-    are tried as well.
+    Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained minimiser
+    is clamped in s; then t is computed and clamped, and s is computed again (Ericson 2005, *Real-Time Collision
+    Detection*, §5.1.9). For nearly parallel segments this is ill-conditioned, so the distances of the four ends from
+    the other segment are computed as well.
 
     Parameters
     ----------
     gap : array (N, 3)
-        From a's middle to b's, metres.
+        Vector from the middle of segment a to the middle of segment b, metres.
     half_a, half_b : array (N, 3)
-        From each middle to one end, metres; zero for a point.
+        Vector from the middle of each segment to one of its ends, metres; zero for a point.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Conversion between the units of length in files and metres, the unit of every length in memory."""
+"""Length units and axis names of files; in memory every length is in metres."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from posekit.geometry.vectors import Array
 
-#: Units in one metre. They are whole numbers, so that a division by them is correctly rounded.
+#: Number of units in one metre. The numbers are whole, so that divisions by them are correctly rounded.
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 
 #: Largest accepted coordinate, metres or pixels.
