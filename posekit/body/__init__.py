@@ -1,4 +1,4 @@
-"""The figure: a URDF, its lengths and capsules, and the closed forms between joint positions and configurations."""
+"""The figure: a URDF, its lengths and capsules, and the closed forms that convert joint positions to configurations."""
 
 from posekit.body.angles import ClosedForm as ClosedForm
 from posekit.body.angles import Limits as Limits

@@ -1,11 +1,12 @@
-r"""Joint angles of a posture in closed form: all Euler branches, and the choice of one by the joint limits.
+r"""Closed-form joint angles of a posture: all Euler branches, and the choice among them by joint limits.
 
-A ball joint of the figure is three revolutes, :math:`R = R_y(\alpha) R_x(\beta) R_z(\gamma)` in the parent's
-frame (x forward, y left, z up); a hinge below it turns about y by :math:`\varepsilon`. A limb hangs along -z,
-so that its upper segment points along
+A ball joint of the figure is three revolute joints, :math:`R = R_y(\alpha) R_x(\beta) R_z(\gamma)` in the parent's
+frame (x forward, y left, z up); a hinge below it rotates about y by :math:`\varepsilon`. At zero angles a limb hangs
+along -z, so that its upper segment points along
 :math:`R(-e_z) = (-\sin\alpha \cos\beta, \sin\beta, -\cos\alpha \cos\beta)`.
 
-Returned angles are those of the URDF's joints: each is an angle above times the sign of the joint's axis.
+Functions return the angles of the URDF's joints: each is the angle of the formula times the sign of the joint's axis.
+An angle is free if the posture does not determine it.
 """
 
 from __future__ import annotations
@@ -21,30 +22,31 @@ from posekit.geometry import Array, Flags, cross, fit_rotation, unit
 from posekit.geometry.rotations import coordinate_rotation, relative_rotation, rotate_back, turned_near
 from posekit.skeleton import DOFS, HEAD, JOINT, SIDES
 
-#: Sine below which an angle is free: the limb is straight, or points along the abduction axis.
+#: Sine below which an angle counts as free, because the limb is straight or points along the abduction axis.
 #:
-#: Turning a free angle to its limit moves the limb's end by less than this times its length.
+#: A change of a free angle moves the limb's end by less than this sine times the limb's length.
 FREE_ANGLE_SINE: Final = 1e-6
 
-#: Sine below which a limb's bend is rounding, and its axial rotation is set to zero.
+#: Sine of a limb's bend below which the bend is a rounding error; the axial rotation is then set to zero.
 STRAIGHT_LIMB_SINE: Final = 1e-10
 
-#: Violation of limits for which a free angle is not turned: below the tolerance of the range check.
+#: Violation of limits up to which a free angle is left unchanged; smaller than the tolerance of the joint-range check.
 NEGLIGIBLE_VIOLATION_RADIANS: Final = 1e-5
 
-#: Difference of violations below which two branches tie, radians; they differ by rounding if the hinge is the worst.
+#: Difference of violations below which two Euler branches tie, radians. If the hinge has the largest violation, the
+#: violations of both branches differ only by rounding.
 TIED_ANGLES_RADIANS: Final = 1e-8
 
-#: Angles of a whole limb: three of its ball joint and one of its hinge.
+#: Number of angles of a whole limb: three of its ball joint and one of its hinge.
 N_LIMB_ANGLES: Final = 4
 
-#: Plane of elevation at which the turn of an arm jumps, radians: behind the back, on the other arm's side.
+#: Plane of elevation, radians, at which an arm's axial turn is discontinuous: behind the back, toward the other arm.
 SEAM: Final = np.radians(-115.0)
 
 HIP_FLEXIONS: Final = tuple(DOFS.index(f"{side}_hip.flexion") for side in SIDES)
 PELVIS_FLEXION: Final = DOFS.index("pelvis.flexion")
 
-#: First angle and the three joints of each limb: right arm, left arm, right leg, left leg.
+#: Index of the first angle, and indices of the three joints, of each limb: right arm, left arm, right leg, left leg.
 LIMBS: Final = tuple(
     (6 + 8 * k + 4 * i, tuple(JOINT[f"{side}_{name}"] for name in names))
     for k, names in enumerate((("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")))
@@ -69,7 +71,7 @@ class Limits:
     upper: Array
 
     def part(self, first: int, count: int) -> Limits:
-        """Return the limits of `count` consecutive joints from the joint `first` on."""
+        """Return the limits of `count` consecutive revolute joints, from index `first`."""
         part = (..., slice(first, first + count))
         return Limits(sign=self.sign[part], lower=self.lower[part], upper=self.upper[part])
 
@@ -78,7 +80,7 @@ class Limits:
         return Limits(sign=self.sign[rows], lower=self.lower[rows], upper=self.upper[rows])
 
     def clip(self, k: int, angle: Array | float) -> Array:
-        """Bring the k-th angle into its limits."""
+        """Clip the k-th angle to its limits."""
         return np.clip(angle, self.lower[..., k], self.upper[..., k])
 
     def nearest_turn(self, angles: Array) -> Array:
@@ -88,8 +90,8 @@ class Limits:
     def cost(self, angles: Array) -> Array:
         """Return the cost (...) of Euler branches (..., K): the largest violation of a limit, radians.
 
-        The axial rotation of a whole limb (K = 4) is weighted by how far it turns the lower segment: little if
-        the limb is almost straight.
+        The violation by a whole limb's axial rotation (K = 4) is multiplied by the sine of the hinge angle, because
+        axial rotation hardly moves the lower segment of an almost straight limb.
         """
         outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
         if self.sign.shape[-1] == N_LIMB_ANGLES:
@@ -97,7 +99,7 @@ class Limits:
         return np.asarray(outside.max(axis=-1))
 
     def violation(self, angles: Array) -> Array:
-        """Return the largest violation (...) of angles (..., K), radians; 0 inside."""
+        """Return the largest violation (...) of the limits by angles (..., K), radians; 0 if all are inside."""
         return np.asarray(np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0).max(axis=-1))
 
 
@@ -108,13 +110,12 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Limits of all 22 angles. They choose the Euler branch. An angle that the posture does not determine is set
-        inside its limits.
+        Limits of all 22 angles. They decide among Euler branches; a free angle is set inside its limits.
     head_offsets : array (5, 3)
-        From the neck to the head's points, head link's frame, metres.
+        Vectors from the neck to the head points, in the head link's frame, metres.
     middle_pelvis : bool
-        Whether the pelvis is between the hips, so that the spine gives their orientation. Then the pelvis flexes by the
-        smallest angle that brings both hips inside their limits, if there is one.
+        Whether the pelvis joint is between the hips. The spine then determines the orientation of the hips, and the
+        pelvis gets the smallest flexion for which the flexion of both hips is inside its limits, if possible.
     """
 
     limits: Limits
@@ -122,11 +123,11 @@ class ClosedForm:
     middle_pelvis: bool = False
 
     def with_limits(self, lower: Array, upper: Array) -> ClosedForm:
-        """Return the same inverse kinematics with other limits (22,) of the figure's angles, radians."""
+        """Return a copy with other limits (22,) of the figure's angles, radians."""
         return replace(self, limits=Limits(sign=self.limits.sign, lower=lower, upper=upper))
 
     def angles(self, points: Array) -> Array:
-        """Find the 22 angles of postures.
+        """Compute the 22 angles of postures.
 
         Parameters
         ----------
@@ -142,7 +143,7 @@ class ClosedForm:
         angles = np.empty((len(points), len(DOFS)))
         angles[:, :3] = self.neck(R_torso, points[:, 0], points[:, HEAD])
         angles[:, 3:6] = self.pelvis(R_torso, R_hips)
-        # The four limbs one after the other.
+        # The four limbs are stacked along the first axis.
         starts, middles, ends = (
             list(joints) for joints in zip(*(joints for _, joints in LIMBS), strict=True)
         )
@@ -161,11 +162,11 @@ class ClosedForm:
         return angles
 
     def head_frame(self, neck: Array, head: Array) -> Array:
-        """Fit the figure's head to head points (N, 5, 3): R_cam_head (N, 3, 3), NaN if they are unknown."""
+        """Fit the figure's head to head points (N, 5, 3); return R_cam_head (N, 3, 3), NaN if a point is unknown."""
         return fit_rotation(self.head_offsets, head - neck[:, None])
 
     def neck(self, R_torso: Array, neck: Array, head: Array) -> Array:
-        """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
+        """Compute flexion, bending and rotation of the neck (N, 3), radians, from the head points (N, 5, 3)."""
         angles = np.full((len(neck), 3), np.nan)
         seen = np.isfinite(head).all(axis=(1, 2))
         if seen.any():
@@ -174,15 +175,15 @@ class ClosedForm:
         return angles
 
     def pelvis(self, R_torso: Array, R_hips: Array) -> Array:
-        """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
+        """Compute flexion, bending and rotation of the pelvis (N, 3), radians."""
         return ball_angles(relative_rotation(R_torso, R_hips), self.limits.part(3, 3))
 
     @cached_property
     def _choosing(self) -> Limits:
-        """Limits that choose the Euler branch; with a pelvis between the hips, hip flexion includes pelvis flexion.
+        """Limits that decide among Euler branches; with a pelvis between the hips, hip flexion includes pelvis flexion.
 
-        The points do not show how pelvis and hips share that flexion: a turn of the pelvis about the line between the
-        hips changes hip flexion alone.
+        The posture does not determine how much of the flexion is the pelvis's: rotating the hips link about the line
+        between the hips changes only hip flexion.
         """
         if not self.middle_pelvis:
             return self.limits
@@ -201,7 +202,7 @@ class ClosedForm:
         return min(ends), max(ends)
 
     def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
-        """Flex pelvises in `angles` (N, 22) by the smallest angles that bring both hips inside their limits."""
+        """Give the pelvis the smallest flexion for which both hips are inside their limits (angles (N, 22)), if possible."""
         low, high = self._pelvis_turn
         least, most = np.full(len(angles), low), np.full(len(angles), high)
         for k in HIP_FLEXIONS:
@@ -217,9 +218,9 @@ class ClosedForm:
 
 
 def ball_angles(R: Array, limits: Limits) -> Array:
-    """Decompose rotations (N, 3, 3) of a part in its parent's frame into three angles (N, 3), radians.
+    """Decompose rotations (N, 3, 3) of a link relative to its parent into three angles (N, 3), radians.
 
-    Both Euler branches are tried; the one that violates the limits less is returned.
+    Of the two Euler branches, the branch with the smaller violation of the limits is returned.
     """
     return _least_violating(np.stack([ball_branch(R, k) for k in range(2)]) * limits.sign, limits)
 
@@ -227,13 +228,13 @@ def ball_angles(R: Array, limits: Limits) -> Array:
 def ball_branch(R: Array, branch: int = 0) -> Array:
     """Return the three angles (N, 3) of rotations (N, 3, 3) in one Euler branch; branch 0 has cos beta >= 0."""
     alpha, beta = direction_branches(-R[:, :, 2])[branch].T
-    # gamma is computed after alpha and beta: if alpha is free (beta = +-90 deg), gamma makes up for it.
+    # gamma is computed from alpha and beta: if alpha is free (beta = +-90 deg), gamma compensates for its value.
     x, y, _ = into_ball(R[:, :, 0], alpha, beta).T
     return np.stack([alpha, beta, np.arctan2(y, x)], axis=-1)
 
 
 def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
-    """Return alpha, beta, gamma and epsilon (N, 4), radians, in the branch with cos beta >= 0 and epsilon >= 0.
+    """Return alpha, beta, gamma and epsilon (N, 4), radians, in the Euler branch with cos beta >= 0 and epsilon >= 0.
 
     Parameters
     ----------
@@ -248,24 +249,23 @@ def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
-    r"""Find the four angles of a ball joint and the hinge below it.
+    r"""Compute the three angles of a ball joint and the angle of the hinge below it.
 
-    There are four candidates: two Euler branches, each with both signs of the hinge. A straight limb leaves its axial
-    rotation free. An upper segment along the abduction axis leaves the first angle free. If all four candidates violate
-    the limits, the free angles are turned to bring one candidate inside.
+    There are four solutions: two Euler branches times two signs of the hinge. The axial rotation is free if the limb is
+    straight. The first angle is free if the upper segment lies along the abduction axis. If no solution is inside the
+    limits, the free angles are changed to bring a solution inside.
 
     Parameters
     ----------
     upper, lower : array (N, 3)
         Unit directions of the two segments in the parent's frame.
     limits : Limits
-        Limits of the four revolutes of each limb (N, 4): ball joint, then hinge.
+        Limits of the four revolute joints of each limb (N, 4): ball joint, then hinge.
 
     Returns
     -------
     array (N, 4)
-        Radians; NaN if a direction is unknown. If only `lower` is unknown, only the axial rotation and the hinge angle
-        are NaN.
+        Radians; NaN if `upper` is unknown. If only `lower` is unknown, only axial rotation and hinge angle are NaN.
     """
     angles = np.full((len(upper), N_LIMB_ANGLES), np.nan)
     both = np.asarray(np.isfinite(upper).all(axis=1) & np.isfinite(lower).all(axis=1))
@@ -288,18 +288,18 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
 
 
 def _upper_angles(upper: Array, limits: Limits) -> Array:
-    """Find flexion and abduction (N, 2) of a limb from the direction (N, 3) of its upper segment alone."""
+    """Compute flexion and abduction (N, 2) from upper-segment directions (N, 3) if the lower segment is unknown."""
     angles = _least_violating(direction_branches(upper) * limits.sign, limits)
     angles[:, 0] = np.where(_along_abduction_axis(upper), limits.clip(0, angles[:, 0]), angles[:, 0])
     return angles
 
 
 def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
-    r"""Return elevation, plane of elevation, and turn of an arm without axial rotation (N,), radians.
+    r"""Return elevation, plane of elevation, and axial turn (N,), radians, of an arm with zero axial rotation.
 
-    The turn is the twist of the swing-twist decomposition less the twist of an arm that is carried around the
-    vertical: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)
-    - (1 - \cos e)(90^\circ - p)`.
+    The axial turn is the twist of the swing-twist decomposition minus the twist that carrying the arm around the
+    vertical causes: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)`
+    minus :math:`(1 - \cos e)(90^\circ - p)`, with elevation e and plane p.
     """
     forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
     down = np.cos(flexion) * np.cos(abduction)
@@ -311,11 +311,11 @@ def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
 
 
 def other_branch(angles: Array) -> Array:
-    r"""Return the angles of the other Euler branch: the same rotation, with the second angle beyond a quarter turn.
+    r"""Return the angles of the same rotation in the other Euler branch.
 
     :math:`(\alpha, \beta, \gamma) \to (\alpha + \pi, \pi - \beta, \gamma + \pi)` for rotations about three mutually
-    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). Both branches give the third axis the same
-    direction, and a hinge after the three joints keeps its angle.
+    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). The first two angles alone preserve the direction
+    of the third axis. A fourth angle, the hinge's, is unchanged.
 
     Parameters
     ----------
@@ -329,15 +329,15 @@ def other_branch(angles: Array) -> Array:
 
 
 def continuous(angles: Array) -> Array:
-    """Choose, for each rotation, the equivalent angles (T, J, 3) that change least from frame to frame.
+    """Replace angles (T, J, 3) by angles of the same rotations that change least from frame to frame.
 
-    The angles of the first frame stay. In later frames neither a full turn nor a change to the other branch a + pi, pi
-    - b, c + pi (Diebel 2006, *Representing Attitude*, section 5.6) is left.
+    The first frame is unchanged. Full turns, and jumps to the other Euler branch (a + pi, pi - b, c + pi), are removed
+    (Diebel 2006, *Representing Attitude*, section 5.6).
     """
     angles = np.array(angles, dtype=np.float64)
     if len(angles) < 2:
         return angles
-    # A frame's branch against the one before is the same for both branches of that one: parity adds up.
+    # Whether the branch changes between two frames does not depend on the branch of the first: changes add modulo 2.
     step = turned_near(np.diff(angles, axis=0), 0.0)
     other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)
     odd = np.zeros(angles.shape[:2], dtype=bool)
@@ -347,7 +347,7 @@ def continuous(angles: Array) -> Array:
 
 
 def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
-    """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment after two turns."""
+    """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment from `into_ball`."""
     across = np.hypot(local[:, 0], local[:, 1])
     gamma = np.where(across < STRAIGHT_LIMB_SINE, 0.0, np.arctan2(-side * local[:, 1], -side * local[:, 0]))
     epsilon = side * np.arctan2(across, -local[:, 2])
@@ -355,11 +355,11 @@ def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: 
 
 
 def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits) -> Array:
-    r"""Turn the free angles of limbs (N) so that the limbs lie inside their limits, if such angles exist.
+    r"""Return the angles (N, 4) of limbs, with free angles changed if that reduces the violation of the limits.
 
-    A straight limb's axial rotation is put into its limits. At beta = +-90 deg,
-    :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
-    their limits, then also with one of the two at a limit, or with alpha at zero.
+    A straight limb's axial rotation is clipped to its limits. At beta = +-90 deg,
+    :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends only on :math:`\gamma \mp \alpha`. If some alpha and gamma are
+    both inside their limits, then a pair with alpha zero, or with one of the two angles at a limit, is inside as well.
     """
     branches = direction_branches(upper)
     pinned, straight = _along_abduction_axis(upper), _parallel(upper, lower)
@@ -380,25 +380,25 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
 
 
 def _parallel(upper: Array, lower: Array) -> Flags:
-    """Return which directions (N, 3) lie on one line: a straight or folded limb."""
+    """Return which limbs are straight or folded: both directions (N, 3) lie on one line."""
     return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE_ANGLE_SINE)
 
 
 def _along_abduction_axis(upper: Array) -> Flags:
-    """Return which directions (N, 3) of an upper segment leave the first angle (flexion) free."""
+    """Return which directions (N, 3) lie along the abduction axis, so that the first angle is free."""
     return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
 def direction_branches(upper: Array) -> Array:
-    """Return the two pairs (alpha, beta) that point the upper segment along directions (N, 3): an array (2, N, 2)."""
-    alpha = np.arctan2(-upper[:, 0], 0.0 - upper[:, 2])  # 0 along the abduction axis
+    """Return alpha and beta (2, N, 2) of directions (N, 3) in both Euler branches."""
+    alpha = np.arctan2(-upper[:, 0], 0.0 - upper[:, 2])  # alpha is 0 along the abduction axis
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
     return np.stack([first, other_branch(first)])
 
 
 def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
-    """Return the directions `lower` in the frame after the turns alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
+    """Convert directions to the frame after the rotations alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     x, y, z = lower[:, 0], lower[:, 1], lower[:, 2]
     forward = sa * x + ca * z
@@ -406,7 +406,7 @@ def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Return the candidate (N, K) of candidates (B, N, K) that violates the limits least; the first of a tie."""
+    """Return, of B branches (B, N, K), the branch (N, K) with the smallest violation of limits; the first in a tie."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)

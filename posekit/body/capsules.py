@@ -1,4 +1,4 @@
-"""The figure's collision bodies: capsules along the lines between its points."""
+"""The figure's collision capsules, whose axes lie on lines between its points."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from posekit.skeleton import HEAD, JOINT, PARTS
 if TYPE_CHECKING:
     import pinocchio as pin
 
-#: For each link with a capsule: the points whose mean starts its axis, and those whose mean ends it.
+#: By link with a capsule: the points whose mean is the start of the capsule's axis, and the points whose mean is its
+#: end.
 CAPSULE_AXES: Final[dict[str, tuple[tuple[int, ...], tuple[int, ...]]]] = {
     **{part: ((JOINT[start],), (JOINT[end],)) for part, (start, end) in PARTS.items()},
     "head": ((JOINT["neck"],), HEAD),
 }
 
-#: Largest distance of a capsule's ends from the line of its link.
+#: Largest accepted distance of a capsule's ends from the line between its points.
 OFF_AXIS_METRES: Final = 1e-9
 
 
@@ -34,7 +35,7 @@ class Capsule:
     link : str
         The URDF link.
     start, end : tuple of int
-        Indices of points: the mean of each set is one end of the axis.
+        Points whose mean is the start of the axis, and points whose mean is its end.
     center : float
         Distance from the start to the capsule's middle along the axis, metres.
     half_length : float
@@ -52,16 +53,16 @@ class Capsule:
 
     @property
     def points(self) -> tuple[int, ...]:
-        """Indices of the points that determine the capsule's position."""
+        """The points that determine the capsule's place."""
         return self.start + self.end
 
     def place(self, points: Array) -> tuple[Array, Array]:
-        """Place the capsule along the points of postures.
+        """Compute the capsule's middle and axis in postures.
 
         Parameters
         ----------
         points : array (N, 19, 3)
-            Postures, metres; NaN in the points that are unknown.
+            Postures, metres; unknown points are NaN.
 
         Returns
         -------
@@ -76,7 +77,7 @@ class Capsule:
 def read_capsules(
     model: pin.Model, geometry: pin.GeometryModel, neutral: Array, source: str
 ) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
-    """Read the capsules and the pairs to check from Pinocchio's geometry model.
+    """Read the capsules, and the pairs to check for collision, from Pinocchio's geometry model.
 
     Parameters
     ----------
@@ -88,12 +89,12 @@ def read_capsules(
     Returns
     -------
     capsules, pairs
-        The capsules, and index pairs into them.
+        The capsules, and the pairs to check as indices of capsules.
 
     Raises
     ------
     FigureError
-        If a body is missing, is not a capsule, has no positive size, or does not lie on its link's line.
+        If a link has no capsule or another shape, or if a capsule's size is not positive or its axis is off its line.
     """
     import coal
     import pinocchio as pin
@@ -129,10 +130,10 @@ def read_capsules(
 
 
 def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule, ...]:
-    """Scale capsules with the parts of the body: from the neutral points (19, 3) of one figure to those of another.
+    """Scale capsules with their links, from the neutral points (19, 3) of one figure to those of another.
 
-    A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with the same
-    ratio, the torso's with the width of the shoulders.
+    A capsule's position and length along its line scale with the line's length. Its radius has the same scale, except
+    that the torso's radius scales with the width of the shoulders.
     """
     shoulders = float(np.linalg.norm(new[1] - new[2]) / np.linalg.norm(old[1] - old[2]))
     found = []

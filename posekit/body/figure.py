@@ -1,4 +1,4 @@
-"""The stick figure: one URDF, its Pinocchio model, and closed forms between joint positions and q."""
+"""The stick figure: one URDF, its Pinocchio model, and closed forms that convert joint positions to q and back."""
 
 from __future__ import annotations
 
@@ -48,34 +48,34 @@ from posekit.skeleton import (
     urdf_joint_name,
 )
 
-#: The URDF link whose origin is each point.
+#: Name of the URDF link whose origin is at each point.
 LINK_OF_POINT: Final = {
     **{point: point for point in POINTS},
     **{start: part for part, (start, _) in PARTS.items()},
     "pelvis": "hips",
 }
 
-#: Flexion turns about y, bending and abduction about x, rotation about z, in this order.
+#: Coordinate axis of each angle: flexion rotates about y, then bending or abduction about x, then rotation about z.
 AXIS_OF_ANGLE: Final = {"flexion": 1, "bending": 0, "abduction": 0, "rotation": 2}
 
-#: Largest difference of a torso's distances that leaves it the same torso.
+#: Largest change of the torso's lengths, metres, for which the torso counts as unchanged.
 SAME_TORSO_METRES: Final = 1e-4
 
-#: Postures whose angles are found at once: few enough to stay in the processor's cache.
+#: Number of postures whose angles are computed in one call: few enough for the processor's cache.
 ROWS_AT_ONCE: Final = 2048
 
-#: Largest distance between a point by Pinocchio and by the closed form, in a URDF of the stick figure's layout.
+#: Largest accepted distance between a point by Pinocchio's forward kinematics and by the closed form.
 SAME_POINT_METRES: Final = 1e-6
 
 
 class Configurations(NamedTuple):
-    """Configurations, and the distance of their joints from the postures that they were computed from.
+    """Configurations, and the distances between their joints and the postures' joints.
 
     Attributes
     ----------
     q : array (N, nq)
-        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. Angles of unknown joints are NaN; an
-        unknown head has its neutral orientation.
+        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. Angles of unknown joints are NaN; the neck
+        angles are zero if the head is unknown.
     distance : array (N,)
         The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
     """
@@ -91,14 +91,14 @@ class Figure(Robot):
     Parameters
     ----------
     urdf, srdf : str
-        Text of the URDF and of the SRDF. The model, lengths, limits, capsules and collision pairs are read from them.
+        URDF and SRDF texts, from which the model, lengths, limits, capsules and capsule pairs are read.
     source : str
-        Name of the URDF in errors.
+        Name of the URDF in error messages.
     side_known : bool
-        Whether it is known on which side of the line from neck to pelvis the shoulders lie: a URDF determines it,
-        lengths do not.
+        Whether it is known if the shoulders lie in front of the line from neck to pelvis or behind it. A URDF
+        determines the side; lengths do not.
     moved_lengths : mapping
-        Changes of lengths, metres, by segment name, that made the distances within torso and hips consistent.
+        Changes that `scaled` made to lengths that no torso or hips can have, metres, by segment name.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class Figure(Robot):
     moved_lengths: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the texts and settings: a model is built from them in milliseconds."""
+        """Pickle the texts and settings only: the model is built from them in milliseconds."""
         settings = {one.name: getattr(self, one.name) for one in fields(self)}
         return _figure, (settings | {"moved_lengths": dict(self.moved_lengths)},)
 
@@ -140,7 +140,7 @@ class Figure(Robot):
 
     @cached_property  # type: ignore[misc]
     def urdf(self) -> str:
-        """The text of the URDF. A figure made by `scaled` writes its URDF when this property is first read."""
+        """The URDF text as given; for a figure made by `scaled`, the text is generated on first access."""
         return str(vars(self)["_writer"]())
 
     @cached_property
@@ -149,7 +149,7 @@ class Figure(Robot):
         return read_only(self._placed(self.neutral))
 
     def _placed(self, q: Array) -> Array:
-        """Place the points (19, 3) of one configuration (nq,) by Pinocchio."""
+        """Compute the points (19, 3) of one configuration (nq,) with Pinocchio."""
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, q)
         frames = [self.model.getFrameId(LINK_OF_POINT[point]) for point in POINTS]
@@ -157,7 +157,7 @@ class Figure(Robot):
 
     @cached_property
     def lengths(self) -> Mapping[str, float]:
-        """The 17 lengths, metres, by segment name."""
+        """The 17 segment lengths, metres, by segment name."""
         return MappingProxyType(segment_lengths(self.neutral_points[None]))
 
     @property
@@ -167,31 +167,31 @@ class Figure(Robot):
 
     @property
     def shoulder_side(self) -> Literal["front", "behind", "undecided"]:
-        """Side of the line from neck to pelvis on which the shoulders lie; undecided if unknown or zero."""
+        """Side of the line from neck to pelvis on which the shoulders lie; undecided if unknown or on it."""
         if not self.side_known or self.shoulder_offset == 0:
             return "undecided"
         return "behind" if self.shoulder_offset < 0 else "front"
 
     @cached_property
     def pelvis_between_hips(self) -> bool:
-        """Whether the pelvis is so near to the line between the hips that it spans no plane with them."""
+        """Whether the pelvis is too near to the line between the hips to define a plane with them."""
         pelvis, right = self.neutral_points[[JOINT["pelvis"], JOINT["right_hip"]]]
         return bool(pelvis[2] - right[2] < MIDDLE_PELVIS_PART * self.lengths["right_hip-left_hip"])
 
     @cached_property
     def head_points(self) -> Array:
-        """Neck and the five head points in the paper's head frame (6, 3): x forward, y up, z right, from the neck."""
+        """Neck and the five head points (6, 3) in the paper's head frame: origin neck, x forward, y up, z right."""
         head = self.neutral_points[[0, *HEAD]]
         return np.stack([head[:, 0], head[:, 2], -head[:, 1]], axis=-1)
 
     @property
     def capsules(self) -> tuple[Capsule, ...]:
-        """The collision bodies."""
+        """The collision capsules."""
         return self._bodies[0]
 
     @property
     def capsule_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Index pairs into `capsules` that are checked for collision."""
+        """Pairs of capsules to check for collision, as indices of `capsules`."""
         return self._bodies[1]
 
     @cached_property
@@ -217,13 +217,13 @@ class Figure(Robot):
 
     @cached_property
     def ik(self) -> ClosedForm:
-        """The closed form from points to angles."""
+        """The closed-form inverse kinematics, from points to angles."""
         offsets = self.neutral_points[list(HEAD)] - self.neutral_points[0]
         return ClosedForm(limits=self.limits, head_offsets=offsets, middle_pelvis=self.pelvis_between_hips)
 
     @cached_property
     def angle_index(self) -> Ints:
-        """Index in q of each of `posekit.skeleton.DOFS`."""
+        """Index in q of each angle of `posekit.skeleton.DOFS`."""
         return np.array([self.model.idx_qs[self.model.getJointId(urdf_joint_name(dof))] for dof in DOFS])
 
     def scaled(  # type: ignore[override]
@@ -235,33 +235,34 @@ class Figure(Robot):
         behind: bool | None = None,
         known: LengthUncertainty = MEASURED_LENGTHS,
     ) -> Figure:
-        """Return the figure with other lengths; its capsules are scaled with the parts of the body.
+        """Return a figure with other lengths; capsules scale with their links.
 
-        Lengths that are inconsistent within torso or hips are replaced by the nearest consistent lengths
-        (`posekit.body.lengths`); `moved_lengths` has the changes. Lengths do not determine whether the shoulders lie in
-        front of the line from neck to pelvis or behind it. Without `behind`, the new figure does not know the side
-        (`side_known`), unless the torso is unchanged.
+        Lengths that no torso or hips can have are replaced by the nearest possible lengths (`posekit.body.lengths`),
+        and `moved_lengths` has the changes. Lengths do not determine whether the shoulders lie in front of the line
+        from neck to pelvis or behind it. The new figure's `side_known` is False unless `behind` is given or the torso
+        is unchanged.
 
         Parameters
         ----------
         lengths : mapping, optional
-            Metres, by segment name ``a-b``, a before b in tree order; others are unchanged. Left and right are
-            separate.
+            Metres, by segment name ``a-b``, a before b in tree order. Left and right are separate. Other lengths are
+            unchanged.
         head_points : mapping, optional
-            Head points in the paper's head frame, metres; if ``neck`` is among them, the others are relative to it.
+            Head points in the paper's head frame, metres; if ``neck`` is given, the other points are relative to it.
         stature : float, optional
-            Height of the person, metres: lengths that are not given follow from it (`lengths_from_stature`), and the
-            head is scaled with the stature.
+            Height of the person, metres. Lengths that are not given are estimated from it (`lengths_from_stature`), and
+            the head scales with it.
         behind : bool, optional
-            Whether the shoulders lie behind the line from neck to pelvis; `shoulders_are_behind` finds it from
+            Whether the shoulders lie behind the line from neck to pelvis. `shoulders_are_behind` computes it from joint
             positions.
         known : LengthUncertainty
-            Uncertainty of the lengths. If the lengths are inconsistent, the less certain ones change more.
+            Uncertainty of the lengths: if impossible lengths are replaced, uncertain lengths change more.
 
         Raises
         ------
         FigureError
-            If a length is unknown, not positive, or no torso or hips have lengths near these.
+            If a segment name is unknown, a length is not positive, or no possible torso or hips have lengths near the
+            given lengths.
         """
         lengths, head_points = dict(lengths or {}), dict(head_points or {})
         if stature is not None:
@@ -278,7 +279,7 @@ class Figure(Robot):
         neutral = self._neutral_of(closed, head, behind=side)
         capsules = grown(self.capsules, self.neutral_points, neutral)
         unchanged = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
-        # The new text differs from the checked one in checked lengths only, so that it is not checked again.
+        # The new URDF differs from the checked URDF only in lengths that were checked, so it is not checked again.
         figure = object.__new__(Figure)
         figure.__dict__.update(
             {one.name: getattr(self, one.name) for one in fields(self) if one.name != "urdf"}
@@ -295,7 +296,7 @@ class Figure(Robot):
         return figure
 
     def _neutral_of(self, lengths: Mapping[str, float], head: Array, *, behind: bool) -> Array:
-        """Return the neutral points (19, 3) of the same figure with other lengths."""
+        """Return the neutral points (19, 3) of this figure with other lengths."""
         points, torso = self.neutral_points.copy(), torso_points(lengths, behind=behind)
         points[[JOINT[name] for name in TORSO]] = torso
         points[[JOINT[name] for name in HIPS]] = hips_points(lengths) + torso[3]
@@ -305,23 +306,23 @@ class Figure(Robot):
         return points
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
-        """Return the figure, with an unknown side of the shoulders if lengths so uncertain do not determine it."""
+        """Return the figure, with `side_known` False if uncertain lengths do not determine the shoulders' side."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
         return replace(self, side_known=False)
 
     def with_limits(self, limits: Mapping[str, tuple[float, float]]) -> Figure:
-        """Make the same figure with other joint limits (radians), by name in `posekit.skeleton.DOFS`."""
+        """Return a figure with other joint limits (radians), by angle name of `posekit.skeleton.DOFS`."""
         named = {urdf_joint_name(dof): bounds for dof, bounds in limits.items()}
         return replace(self, urdf=replace_limits(self.urdf, named))
 
     def write(self, path: str | Path) -> None:
-        """Write the URDF to `path` and the SRDF beside it; `load_figure` reads them again."""
+        """Write the URDF to `path` and the SRDF beside it; `load_figure` reads both."""
         Path(path).with_suffix(".srdf").write_text(self.srdf or "", encoding="utf-8")
         Path(path).write_text(self.urdf, encoding="utf-8")
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
-        """Return the positions of the 19 points at configurations.
+        """Compute the 19 points of configurations.
 
         Parameters
         ----------
@@ -331,7 +332,7 @@ class Figure(Robot):
         Returns
         -------
         array (N, 19, 3)
-            Metres; NaN for points that depend on an unknown entry of q.
+            Metres; points that depend on an unknown entry of q are NaN.
         """
         q = np.asarray(q, dtype=np.float64)
         angles, neutral = q[:, self.angle_index] * self.limits.sign, self.neutral_points
@@ -356,7 +357,7 @@ class Figure(Robot):
         return points
 
     def points(self, q: ArrayLike) -> Array:
-        """Place the 14 joints (N, 14, 3), metres, of configurations (N, nq)."""
+        """Compute the 14 joints (N, 14, 3), metres, of configurations (N, nq)."""
         return self.forward_kinematics(q)[:, : len(JOINTS)]
 
     def configurations(
@@ -366,21 +367,21 @@ class Figure(Robot):
         *,
         start: ArrayLike | None = None,
     ) -> Configurations:
-        """Turn postures into configurations, in closed form.
+        """Convert postures to configurations in closed form.
 
-        Several sets of angles give the same directions. The set inside the joint limits is returned, or else the set
-        that violates them least. If the posture has the figure's lengths, forward kinematics returns its joints.
-        Otherwise forward kinematics returns the figure's lengths with the directions of the posture's segments, and
-        `distance` is the largest difference of a joint. Every posture with 14 finite joints has a finite configuration.
+        Several sets of angles have the same segment directions: the set inside the joint limits is returned, or else
+        the set with the smallest violation. If the posture has the figure's lengths, forward kinematics reproduces its
+        joints. Otherwise torso and hips have the figure's shape, every limb segment keeps its direction, and `distance`
+        is the largest error of a joint. Every posture with 14 finite joints has a finite configuration.
 
         Parameters
         ----------
         joints : array (N, 14, 3) or (N, 19, 3)
-            Joints, and the head's five points if they are known, metres, any right-handed frame.
+            Joints, and in the second form the five head points, metres, in any right-handed frame.
         head : array (N, 5, 3), optional
-            The head's points, NaN if unknown.
+            The head points, metres; unknown points are NaN.
         start
-            Has no effect: the closed form needs no start.
+            Has no effect: the closed form needs no initial configuration.
         """
         points = with_head(joints, head)
         q = self.inverse_kinematics(points)
@@ -389,7 +390,7 @@ class Figure(Robot):
         return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
 
     def inverse_kinematics(self, points: Array) -> Array:
-        """Return only the configurations (N, nq) of postures (N, 19, 3): see `configurations`."""
+        """Return only the configurations (N, nq) of postures (N, 19, 3); see `configurations`."""
         if len(points) > ROWS_AT_ONCE:
             rows = range(0, len(points), ROWS_AT_ONCE)
             return np.concatenate([self.inverse_kinematics(points[k : k + ROWS_AT_ONCE]) for k in rows])
@@ -398,7 +399,8 @@ class Figure(Robot):
         q[:, :3] = points[:, 0]
         q[:, 3:7] = quaternion_from_rotation(R_torso)
         angles = self.ik.angles(points)
-        # An unknown head is at neutral; so is an angle that degenerate points leave undetermined.
+        # The neck angles are zero if the head is unknown. Angles that degenerate points do not determine are at
+        # neutral.
         angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
         whole = np.isfinite(points[:, : len(JOINTS)]).all(axis=(1, 2))
         neutral = np.clip(0.0, self.limits.lower, self.limits.upper)
@@ -407,7 +409,7 @@ class Figure(Robot):
         return q
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
-        """Return the five head points in the head link's frame, some of them replaced."""
+        """Return the five head points in the head link's frame, with the given points replaced."""
         for name, point in head_points.items():
             if name not in ("neck", *HEAD_POINTS) or np.shape(point) != (3,):
                 got, expected = f"shape {np.shape(point)}", f"x, y, z of neck, {', '.join(HEAD_POINTS)}"
@@ -424,7 +426,7 @@ class Figure(Robot):
         return head
 
     def _check_layout(self) -> None:
-        """Raise an error if a joint of the URDF has another position or parent than the closed forms assume."""
+        """Raise `FigureError` if Pinocchio and the closed form place the points differently."""
         q = self.neutral[None].copy()
         q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
         near = np.linalg.norm(self.forward_kinematics(q)[0] - self._placed(q[0]), axis=-1) < SAME_POINT_METRES
@@ -461,7 +463,8 @@ def load_figure(path: str | Path | None = None) -> Figure:
     Parameters
     ----------
     path : path, optional
-        A URDF with the stick figure's joints; an SRDF of the same name beside it, or the built-in one.
+        URDF file with the stick figure's joints. The SRDF file of the same name is read if it exists; otherwise the
+        built-in SRDF is used.
 
     Raises
     ------
@@ -492,7 +495,7 @@ def _ball(angles: Array) -> Array:
 
 
 def _completed_frames(points: Array, R_torso: Array) -> Array:
-    """Replace torso frames (N, 3, 3) that are undetermined, because the shoulders lie in line with the spine."""
+    """Complete torso frames (N, 3, 3) that are undetermined because the shoulders are in line with the spine."""
     rows = np.isnan(R_torso).any(axis=(1, 2)) & np.isfinite(points[:, : len(JOINTS)]).all(axis=(1, 2))
     if rows.any():
         up = unit(points[rows, 0] - points[rows, JOINT["pelvis"]])

@@ -1,7 +1,7 @@
-"""The frames of torso and hips in a posture given by its points.
+"""Coordinate frames of the torso and the hips, computed from a posture's points.
 
-Each is a rotation R_cam_part with the part's URDF axes (x forward, y left, z up) as columns. The paper's
-torso axes (y down, z left, x forward) are the same three directions under other names.
+Each is a rotation R_cam_part with the part's URDF axes (x forward, y left, z up) as columns. The paper names the same
+three directions of the torso differently: y down, z left, x forward.
 """
 
 from __future__ import annotations
@@ -13,16 +13,17 @@ import numpy as np
 from posekit.geometry import Array, cross, perpendicular, unit
 from posekit.skeleton import HIPS, JOINT, TORSO
 
-#: Height of the pelvis over the hips' line, as a fraction of the hips' distance, below which it is between them.
+#: Height of the pelvis above the line between the hips, as a fraction of the distance between the hips. Below it the
+#: pelvis counts as between the hips.
 #:
-#: Lengths with an error of 2 % move a pelvis in the middle that far, and a plane through so short a distance would turn
-#: by 30 degrees with a joint that is off by a centimetre. Pelvis joints of skeletons that have one are half the hips'
-#: distance away.
+#: Length errors of 2 % move a pelvis that is between the hips by this height. A plane through hips and pelvis would
+#: then rotate by 30 degrees for a joint error of 1 cm. In skeletons with a pelvis joint above the hips, the height is
+#: half the distance between the hips.
 MIDDLE_PELVIS_PART: Final = 0.1
 
 
 def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis: Array) -> Array:
-    """Return the torso's frame: down is neck to pelvis, left the shoulders' line made perpendicular to it.
+    """Return the torso's frame: down is from neck to pelvis, left is along the shoulders and perpendicular to down.
 
     Lee and Chen 1985, §3.1.
 
@@ -34,7 +35,7 @@ def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis
     Returns
     -------
     array (..., 3, 3)
-        R_cam_torso; NaN if a point is, or if the points are on one line.
+        R_cam_torso; NaN if a point is NaN or the points are on one line.
     """
     down = unit(pelvis - neck)
     left = unit(perpendicular(left_shoulder - right_shoulder, down))
@@ -42,23 +43,23 @@ def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis
 
 
 def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | None = None) -> Array:
-    """Return the hips' frame: left is the hips' line, down points from the pelvis perpendicular to it.
+    """Return the hips' frame: left is from right to left hip, down is from the pelvis and perpendicular to left.
 
-    A pelvis between the hips spans no plane with them. Then down is the direction from the neck to the pelvis, made
-    perpendicular to the hips' line. This is smooth unless the spine is along that line; the flexion of the pelvis is
-    not determined.
+    A pelvis between the hips defines no plane with them. Then down is from the neck to the pelvis, made perpendicular
+    to the hips' line. This is continuous unless the spine is along that line. It does not determine the flexion of the
+    pelvis.
 
     Parameters
     ----------
     pelvis, right_hip, left_hip : array (..., 3)
         Points in the camera frame.
     neck : array (..., 3), optional
-        For a figure whose pelvis is between its hips (`Figure.pelvis_between_hips`).
+        Given only if the figure's pelvis is between its hips (`Figure.pelvis_between_hips`).
 
     Returns
     -------
     array (..., 3, 3)
-        R_cam_hips; NaN if a point is, or if the points are on one line.
+        R_cam_hips; NaN if a point is NaN or the points are on one line.
     """
     left = unit(left_hip - right_hip)
     down = unit(perpendicular(right_hip - pelvis if neck is None else pelvis - neck, left))
@@ -68,7 +69,7 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
 def trunk_frames(points: Array, middle_pelvis: bool = False) -> tuple[Array, Array]:
     """Return R_cam_torso and R_cam_hips (N, 3, 3) of postures (N, 14 or more, 3).
 
-    `middle_pelvis` tells whether the pelvis is between the hips: see `hips_frame`.
+    `middle_pelvis` is whether the pelvis is between the hips; see `hips_frame`.
     """
     hips = (*HIPS, "neck") if middle_pelvis else HIPS
     torso_points, hips_points = ([points[:, JOINT[joint]] for joint in part] for part in (TORSO, hips))

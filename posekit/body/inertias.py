@@ -1,11 +1,12 @@
-"""Mass, centre of mass and moments of inertia of each part of the body.
+"""Mass, centre of mass and moments of inertia of each link of the body.
 
-Masses, centres and radii of gyration are de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment inertia
-parameters", J Biomech 29:1223, Table 4, means of women and men: fractions of the body's mass and of a segment's length.
-The trunk reaches from the cervicale to the middle of the hips, the shank to the ankle's centre. Parts without a segment
-of their own in the figure use the length of another one: head and trunk the distance from the neck to the middle of the
-hips, the hand the forearm's length, the foot (placed at the ankle) the shank's. Below the navel the trunk moves with
-the hips; the torso has the remaining moments of the whole trunk, by Steiner's theorem.
+Masses, centres of mass and radii of gyration are from de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment
+inertia parameters", J Biomech 29:1223, Table 4. They are means of women and men, as fractions of body mass and segment
+length. The trunk extends from the cervicale to the middle of the hips, the shank to the centre of the ankle. Body parts
+that are no segment of the figure use another length: head and trunk use the distance from the neck to the middle of the
+hips, the hand uses the forearm's length, and the foot (placed at the ankle) uses the shank's length. The trunk below
+the navel belongs to the hips link. The torso link has the moments of the whole trunk minus those of the lower trunk
+(Steiner's theorem).
 """
 
 from __future__ import annotations
@@ -19,21 +20,22 @@ from posekit.body.lengths import hips_points, stature_from_lengths
 from posekit.geometry import Array
 from posekit.skeleton import SIDES
 
-#: Body mass over squared stature, kg/m^2: mean mass of de Leva's women and men (61.9 and 73 kg) over their mean stature
-#: (1.735 and 1.741 m) squared.
+#: Body mass divided by squared stature, kg/m^2: mean mass of de Leva's women and men (61.9 and 73 kg) over their mean
+#: stature (1.735 and 1.741 m) squared.
 MASS_OF_STATURE_SQUARED: Final = 22.33
 
-#: Parts by link, on the line from the neck to the middle of the hips: mass, as a share of the body's; place of the
-#: centre along the line, from the end nearer to the trunk, as a fraction of its length; radii of gyration about the
-#: axes that point forward, left and up in a standing body with hanging arms, as fractions of the length. The torso is
-#: the trunk above the navel, the hips the trunk below it.
+#: Head and trunk by link: mass, as a fraction of body mass; position of the centre of mass on the line from the neck to
+#: the middle of the hips, as a fraction of the line's length; radii of gyration about the forward, left and upward axes
+#: of a standing body with hanging arms, as fractions of that length. The torso is the trunk above the navel, the hips
+#: the trunk below it.
 TRUNK_PARTS: Final = {
     "head": (0.0681, -0.203, (0.1146, 0.1218, 0.1043)),
     "torso": (0.31195, 0.3640, (0.2433, 0.2116, 0.1653)),
     "hips": (0.1182, 0.8781, (0.1382, 0.1259, 0.1364)),
 }
 
-#: The same by link and the two joints of its line, without the side; the links of wrist and ankle are hand and foot.
+#: The same values for limbs, by link, start joint and end joint of the line, without the side. The links "wrist" and
+#: "ankle" are hand and foot.
 LIMB_PARTS: Final = {
     ("upper_arm", "shoulder", "elbow"): (0.0263, 0.5763, (0.2815, 0.2645, 0.1530)),
     ("forearm", "elbow", "wrist"): (0.0150, 0.4567, (0.2685, 0.2610, 0.1075)),
@@ -45,18 +47,18 @@ LIMB_PARTS: Final = {
 
 
 def inertias(lengths: Mapping[str, float]) -> dict[str, tuple[float, Array, Array]]:
-    """Return mass, centre and principal moments of each link that is a part of the body.
+    """Return mass, centre of mass and principal moments of inertia of each link.
 
     Parameters
     ----------
     lengths : mapping
-        The 17 lengths, metres. Mass grows with the square of the stature that fits the limbs.
+        The 17 lengths, metres. Body mass is proportional to the square of the stature that is estimated from the limbs.
 
     Returns
     -------
     dict
-        By link: mass, kg; centre (3,), metres, and moments about it (3,), kg m^2, along the link's axes (x forward,
-        y left, z up).
+        By link: mass, kg; centre of mass (3,), metres; moments about the centre (3,), kg m^2. Axes are the link's: x
+        forward, y left, z up.
     """
     body = MASS_OF_STATURE_SQUARED * stature_from_lengths(lengths) ** 2
     to_pelvis = lengths["neck-pelvis"]

@@ -1,14 +1,14 @@
-r"""Segment lengths: torso and hips from their distances, the nearest consistent lengths, and lengths from stature.
+r"""Segment lengths: rigid parts from their lengths, the nearest possible lengths, and lengths from stature.
 
-Six distances make a torso, and three make hips, only if triangles close and the four points of the torso fit into
-space. Medians over frames, tape measurements and rounded numbers miss these conditions by a little. The nearest lengths
-that satisfy them lie at the edge of the feasible set, where the torso's points are in one plane, or the hips' on one
-line:
+Six lengths determine a torso, and three determine hips. Lengths are possible (they close) if points with these
+distances exist in space. Medians over frames, taped lengths and rounded lengths may not close by a small amount. The
+nearest lengths that close lie on the boundary of the feasible set, where the torso's points are in one plane or the
+hips' points on one line:
 
 .. math:: \min_p \sum_i \left(\frac{\log d_i(p) - \log l_i}{\sigma_i}\right)^2
 
-over places p of the points in that plane or on that line, for lengths l of relative standard deviations :math:`\sigma`.
-A common unknown size has no effect: consistent lengths stay consistent if all are scaled.
+over positions p of the points in that plane or on that line, for lengths l with relative standard deviations
+:math:`\sigma`. An unknown common size has no effect, since closing does not depend on size.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from posekit.skeleton import JOINT, LIMB_SHARES, SEGMENT_NAMES, SEGMENTS, SIDES,
 #: Metres by segment name.
 Lengths = Mapping[str, float]
 
-#: Squared depth (m^2) down to which a torso that cannot quite close counts as flat (rounded lengths).
+#: Tolerance of negative squared depths (m^2): within it a torso counts as flat, and its lengths as rounded.
 FLAT_DEPTH_SQUARED: Final = 1e-9
 
-#: The six distances inside the torso.
+#: The six lengths of the torso.
 TORSO_LENGTHS: Final = (
     *("neck-right_shoulder", "neck-left_shoulder", "neck-pelvis"),
     *("right_shoulder-left_shoulder", "right_shoulder-pelvis", "left_shoulder-pelvis"),
 )
 
-#: The three distances inside the hips.
+#: The three lengths of the hips.
 HIPS_LENGTHS: Final = ("pelvis-right_hip", "pelvis-left_hip", "right_hip-left_hip")
 
-#: Largest relative change of a length that is made to close.
+#: Largest accepted relative change of a length when lengths are made to close.
 #:
-#: Adults' segments vary beside their size with a standard deviation of 5 % (`posekit.body.uncertainty.UNKNOWN_ADULT`):
-#: beyond four of them they are not the lengths of a person.
+#: Adults' proportions vary with a standard deviation of 5 % (`posekit.body.uncertainty.UNKNOWN_ADULT`). A change of
+#: more than four standard deviations means that the lengths are not a person's.
 MAX_MOVED: Final = 0.2
 
-#: Smallest distance of a starting point from the middle, as a fraction of the breadth: on the line itself no distance
-#: has a gradient.
+#: Smallest initial distance of a shoulder from the spine, as a fraction of the shoulders' width: on the spine the
+#: lengths have no sideways gradient.
 MIN_WIDTH_PART: Final = 0.25
 
 #: Width of the shoulders and of the hips, and height of the shoulders over the hips, as fractions of stature: Drillis
@@ -54,12 +54,12 @@ MIN_WIDTH_PART: Final = 0.25
 WIDTH_SHARES: Final = (0.259, 0.191)
 TRUNK_SHARE: Final = 0.818 - 0.530
 
-#: Accepted statures: beyond those ever recorded a number is more likely in another unit.
+#: Accepted statures, metres. Nobody outside this interval is recorded; the number is probably in another unit.
 STATURE_METRES: Final = (0.4, 2.8)
 
 
 def check_lengths(lengths: Lengths) -> None:
-    """Raise `FigureError` if a length is unknown, not finite or not positive."""
+    """Raise `FigureError` if a segment name is unknown, or a length is not finite or not positive."""
     for name, length in lengths.items():
         if name not in SEGMENT_NAMES:
             remedy = nearest(name, SEGMENT_NAMES)
@@ -82,7 +82,7 @@ def lengths_in_frames(joints: Array) -> Array:
 def segment_lengths(joints: Array) -> dict[str, float]:
     """Return the median length of each of the 17 segments over postures (N, 14, 3) or (N, 19, 3), metres.
 
-    Segments whose two ends are never known together, or whose length is zero, are left out.
+    A segment is omitted if its two ends are never known in the same posture, or if its length is zero.
     """
     medians = zip(SEGMENT_NAMES, map(known_median, lengths_in_frames(joints)), strict=True)
     return {name: length for name, length in medians if length > 0}
@@ -101,13 +101,13 @@ def shoulders_are_behind(joints: Array) -> bool | None:
 
 
 def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
-    r"""Place neck, right shoulder, left shoulder and pelvis by their six distances.
+    r"""Compute positions of neck, right shoulder, left shoulder and pelvis from their six distances.
 
     With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that line: height
     :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for neck-shoulder a,
-    neck-pelvis b, shoulder-pelvis c. The distance between the shoulders gives the angle between the two circles'
-    points, and its part across the body gives the left axis. The distances do not determine whether the shoulders lie
-    in front of the line or behind it.
+    neck-pelvis b, shoulder-pelvis c. The distance between the shoulders determines the angle between them about that
+    line. The left axis is the component of the shoulders' line perpendicular to the spine. The distances do not
+    determine whether the shoulders are in front or behind.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     Raises
     ------
     FigureError
-        If no such body exists: one distance of a triangle exceeds the sum of the other two, or the shoulders are too
-        far apart or too near.
+        If no such torso exists: a triangle does not close, or the distance between the shoulders is too large or too
+        small.
     """
     right, left, forward_squared = _torso(lengths)
     if forward_squared < -FLAT_DEPTH_SQUARED:
@@ -142,12 +142,12 @@ def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
 
 
 def hips_points(lengths: Lengths) -> Array:
-    """Place pelvis, right hip and left hip by their three distances; the pelvis may lie between the hips.
+    """Compute positions of pelvis, right hip and left hip from their three distances.
 
     Returns
     -------
     array (3, 3)
-        Hips frame of the URDF: origin the pelvis, y along the line of the hips, z up; metres.
+        Hips frame of the URDF: origin pelvis, y from right to left hip, z up; metres.
     """
     base = lengths["right_hip-left_hip"]
     offset, height = _apex("right_hip", "pelvis", "left_hip", lengths)
@@ -157,8 +157,8 @@ def hips_points(lengths: Lengths) -> Array:
 def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: float = 3.0) -> bool:
     r"""Return whether uncertain lengths distinguish a torso from its mirror image.
 
-    The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. Small
-    errors of the lengths change :math:`f^2`, and so the deviation of f is that of :math:`f^2` over :math:`2 f`.
+    The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. The
+    standard deviation of f is the standard deviation of :math:`f^2` divided by :math:`2 f`.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
         for factor in (1 + step, 1 - step):
             try:
                 ends.append(_torso({**lengths, name: lengths[name] * factor})[2])
-            except FigureError:  # a triangle is at its edge: the other end is enough
+            except FigureError:  # the changed triangle does not close: leave the length unchanged
                 ends.append(_torso(lengths)[2])
         variance += (known.own[name] * (ends[0] - ends[1]) / (2 * step)) ** 2
     # f > n sd(f^2) / (2 f)
@@ -187,25 +187,25 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
 def closed_lengths(
     lengths: Lengths, known: LengthUncertainty = MEASURED_LENGTHS
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the nearest lengths with which a torso and hips exist; consistent lengths are unchanged.
+    """Return the nearest lengths that close; lengths that already close are unchanged.
 
     Parameters
     ----------
     lengths : mapping
         All 17, metres, by segment name.
     known : LengthUncertainty
-        Uncertainty of each length beside the common size. If some lengths of a part (torso or hips) are exact, all
-        lengths of that part have equal weight.
+        Uncertainty of each length. If a length of the torso is exact, all lengths of the torso have equal weights; the
+        same holds for the hips.
 
     Returns
     -------
     lengths, moved : dict
-        Metres, by segment name; `moved` lists the changes, for changed lengths only.
+        Metres, by segment name; `moved` has the changes of the lengths that were changed.
 
     Raises
     ------
     FigureError
-        If a length would have to change by more than the share `MAX_MOVED`.
+        If a length would change by more than the fraction `MAX_MOVED`.
     """
     check_lengths(lengths)
     out, moved = dict(lengths), dict[str, float]()
@@ -223,15 +223,16 @@ def closed_lengths(
     return out, moved
 
 
-#: Half the difference of squared lengths at which laying a posture onto them ends, and that at which it has failed.
+#: Half differences of squared lengths, m^2: below the first `lay` has converged, above the second it has failed.
 LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 
 
 def lay(joints: Array, lengths: Array) -> Array:
     r"""Move postures (F, 14, 3) to the nearest ones with given segment lengths (F, 17).
 
-    Newton's steps for :math:`\min |x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. A posture with a segment of
-    length zero is placed joint by joint, outward from the neck. Segments with an unknown end are left out.
+    Newton steps minimise :math:`|x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. If they do not converge, e.g.
+    because a segment has length zero, joints are placed one by one from the neck outward, along the given directions.
+    Segments with an unknown end are ignored.
     """
     a, b = np.array(SEGMENTS).T
     x, known = np.nan_to_num(joints), np.isfinite(joints[:, :, 0])
@@ -260,7 +261,7 @@ def lay(joints: Array, lengths: Array) -> Array:
 
 
 def stature_from_lengths(lengths: Lengths) -> float:
-    """Estimate a person's stature (m) from the limbs: their total length over its share (Drillis & Contini 1966)."""
+    """Estimate stature (m) as the limbs' total length divided by its fraction of stature (Drillis & Contini 1966)."""
     total = sum(lengths[f"{side}_{a}-{side}_{b}"] for side in SIDES for a, b in LIMB_SHARES)
     return total / (2 * sum(LIMB_SHARES.values()))
 
@@ -268,8 +269,8 @@ def stature_from_lengths(lengths: Lengths) -> float:
 def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]:
     """Estimate the 17 lengths of a person of a given stature.
 
-    Limbs and widths are fractions of stature. Neck and pelvis joint have the reference figure's proportions: their
-    sideways offsets scale with the widths of shoulders and hips, their heights with the height of the shoulders above
+    Limbs and widths are fractions of stature. Neck and pelvis have the reference figure's proportions: their sideways
+    offsets scale with the widths of shoulders and hips, and their heights scale with the height of the shoulders above
     the hips.
 
     Parameters
@@ -287,7 +288,7 @@ def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]
     Raises
     ------
     FigureError
-        If the stature is not a person's in metres.
+        If the stature is outside `STATURE_METRES`.
     """
     low, high = STATURE_METRES
     if not low <= stature <= high:
@@ -308,9 +309,10 @@ def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]
 
 
 def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Return height below the neck, distance from the spine and leftward position of right and left shoulder, metres.
+    """Return distance below the neck, distance from the spine and leftward position of right and left shoulder, metres.
 
-    The third value is the square of their forward position, negative if the six distances contradict each other.
+    The third value is the squared forward position of the shoulders; it is negative if the six distances are
+    impossible.
     """
     right = _apex("neck", "right_shoulder", "pelvis", lengths)
     left = _apex("neck", "left_shoulder", "pelvis", lengths)
@@ -327,7 +329,7 @@ def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, f
 
 
 def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, float]:
-    """Return the position of a triangle's corner along the line from start to end, and its distance from that line."""
+    """Return the position of a triangle's apex along the line from start to end, and its distance from that line."""
     base, near, far = (
         lengths[f"{a}-{b}"] if f"{a}-{b}" in lengths else lengths[f"{b}-{a}"]
         for a, b in ((start, end), (start, apex), (apex, end))
@@ -375,7 +377,7 @@ def _nearest(names: tuple[str, ...], lengths: Lengths, known: LengthUncertainty)
 
 
 def _torso_start(lengths: Lengths) -> Array:
-    """Place the shoulders beside the neck as far as their triangles close, and the pelvis below it (5,)."""
+    """Return initial values (5,) for `_nearest`: right and left shoulder (2 each), and the height of the pelvis."""
     down, width = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"]
     start = []
     for side, sign in (("right", -1.0), ("left", 1.0)):
@@ -387,7 +389,7 @@ def _torso_start(lengths: Lengths) -> Array:
 
 
 def _hips_start(lengths: Lengths) -> Array:
-    """Place the hips on both sides of the pelvis, or on one if that is nearer (2,)."""
+    """Return initial values (2,) for `_nearest`: the hips on both sides of the pelvis, or on one if that is nearer."""
     right, left, width = (lengths[name] for name in HIPS_LENGTHS)
     if width >= max(right, left):
         return np.array([-right, left])

@@ -1,12 +1,13 @@
-r"""The person in the frames of a recording: lengths, the side of the shoulders, and the noise of measuring.
+r"""A person measured in a recording: segment lengths, side of the shoulders, and measurement noise.
 
-Bones keep their length, so the scatter of a segment's length over time is measurement noise. Two ends with independent
-errors of standard deviation :math:`\sigma` in each coordinate have a distance of deviation :math:`\sqrt 2\,\sigma`, so
+Bones keep their length, so the variation of a limb segment's length over time is measurement noise. If the coordinates
+of both ends have independent errors of standard deviation :math:`\sigma`, the length has standard deviation
+:math:`\sqrt 2\,\sigma`, so
 
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 
 over the eight segments i of arms and legs; mid is the mean of the middle half. The median absolute deviation (Rousseeuw
-& Croux 1993, J Am Stat Assoc 88:1273) and the middle half are robust against broken spans and limbs that drift.
+& Croux 1993, J Am Stat Assoc 88:1273) and the middle half are robust against wrong frames and drifting limbs.
 """
 
 from __future__ import annotations
@@ -27,17 +28,18 @@ from posekit.skeleton import JOINT, LIMB_JOINTS, LIMB_SEGMENTS, SEGMENT_NAMES, s
 
 LIMB_NAMES: Final = tuple(map(segment_name, LIMB_SEGMENTS))
 
-#: Standard deviation of normal numbers over their median absolute deviation.
+#: Ratio of the standard deviation to the median absolute deviation of a normal distribution.
 DEVIATION_OF_MAD: Final = 1.4826
 
-#: Least number of frames for an estimate of noise: with ten frames and eight limbs its error is below a quarter.
+#: Minimum number of frames for an estimate of noise: with ten frames and eight segments its relative error is below 25
+#: %.
 LEAST_FRAMES: Final = 10
 
-#: Summed distance of both knees in front of the middles between hip and ankle, metres, above which a frame shows the
-#: side.
+#: Sum over both knees of the distance in front of the midpoint of hip and ankle, metres. In frames above it the knees
+#: bend forward, so left and right are not exchanged.
 BENT_METRES: Final = 0.04
 
-#: Largest plausible noise of a limb, in multiples of the usual noise: a larger value is a defect.
+#: Largest plausible noise of one limb segment, in multiples of the overall noise; a larger value is a defect.
 WORST_OF_USUAL: Final = 3.0
 
 #: Sizes of people, in multiples of the figure (1.75 m): newborns 0.28, the tallest man known 1.55.
@@ -55,16 +57,16 @@ class Person(Record):
     Parameters
     ----------
     lengths : mapping
-        Median length of each segment, metres, by segment name; segments that are never seen are left out.
+        Median length of each segment, metres, by segment name; segments that are never known are omitted.
     behind : bool or None
         Whether the shoulders lie behind the line from neck to pelvis in most frames.
     noise : float
-        Standard deviation of measured coordinates, metres; NaN for fewer than ten frames.
+        Standard deviation of measured coordinates, metres; NaN if fewer than ten frames are known.
     limb_noise : mapping
-        The same standard deviation, estimated from each limb segment alone, by segment name.
+        The same standard deviation, estimated from each limb segment alone.
     hips_forward : float
-        Angle at the pelvis by which the hips lie in front of the line from neck to pelvis, median over frames, degrees;
-        NaN for fewer than ten frames.
+        Median angle at the pelvis by which the middle of the hips lies in front of the extended line from neck to
+        pelvis, degrees; NaN if fewer than ten frames are known.
     """
 
     lengths: Mapping[str, float]
@@ -74,9 +76,9 @@ class Person(Record):
     hips_forward: float
 
     def noise_of(self, segment: str) -> float:
-        """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse.
+        """Return the standard deviation of the coordinates of a segment's ends, metres; wrists and ankles are noisier.
 
-        0 if too few frames show the segment.
+        0 if the recording has too few frames for an estimate.
         """
         if math.isnan(self.noise):
             return 0.0
@@ -85,7 +87,7 @@ class Person(Record):
 
 
 def person_of(joints: Array, lengths_of: Array) -> Person:
-    """Measure the person in a recording (T, 14, 3), metres, with segment lengths (17, T); NaN marks unknown joints.
+    """Measure a person from joints (T, 14, 3) and segment lengths (17, T) of a recording, metres; NaN is unknown.
 
     Lengths are rounded to 0.01 mm and angles to whole degrees, so that clips of one skeleton share one figure.
     """
@@ -127,7 +129,7 @@ def _hips_forward(joints: Array) -> float:
 
 
 def _shoulders_behind(joints: Array) -> bool | None:
-    """Return whether the shoulders lie behind, from frames without exchanged sides: their knees bend forward."""
+    """Return the shoulders' side in frames whose knees bend forward: in others left and right may be exchanged."""
     neck, pelvis, right, left = (
         joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
     )
@@ -147,17 +149,18 @@ def _shoulders_behind(joints: Array) -> bool | None:
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
     """Return a figure with the lengths of a person, as far as they are plausible.
 
-    Implausible lengths are replaced by the figure's lengths at the person's size. If no consistent body is near the
-    lengths, all lengths except those of the limbs are replaced. Clips of one skeleton share a figure.
+    Implausible lengths are replaced by the figure's lengths at the person's size. If no plausible body is near the
+    lengths, all lengths except the limbs' are replaced. Results are cached, so that clips of one skeleton share a
+    figure.
 
     Parameters
     ----------
     base : Figure
         The figure that is scaled.
     lengths : sequence of (str, float)
-        As `Person.lengths` has them.
+        The items of `Person.lengths`.
     behind : bool or None
-        As `Person.behind`.
+        See `Person.behind`.
     """
     ratios = {name: length / base.lengths[name] for name, length in lengths if name in LIMB_NAMES}
     size = float(np.median(list(ratios.values()))) if ratios else 1.0
@@ -180,7 +183,7 @@ def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool |
 def scaled_to(joints: Array) -> Figure:
     """Scale the built-in figure to the median segment lengths of postures (N, 14, 3) or (N, 19, 3), metres.
 
-    Unseen segments keep theirs. Lengths do not distinguish a torso from its mirror image, so the side of the shoulders
-    is taken from the points.
+    Unknown segments keep the built-in lengths. Lengths do not distinguish a torso from its mirror image, so the side of
+    the shoulders is taken from the points.
     """
     return load_figure().scaled(segment_lengths(joints), behind=shoulders_are_behind(joints))

@@ -1,7 +1,7 @@
-r"""A measured body as 11 rigid pieces: torso, hips, head and eight limb segments; each turns about its first joint.
+r"""Motion of a measured body as rigid pieces: torso, hips, head and eight limb segments, each rotated about its start.
 
-The position of a point is the position of its parent plus a vector of its piece: :math:`x_p = x_{parent(p)} +
-R_{piece(p)} b_p`. All lengths stay.
+A point is its parent point plus a vector that rotates with a piece: :math:`x_p = x_{parent(p)} + R_{piece(p)} b_p`.
+Rotations change no length.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ N_PIECES: Final = 3 + 2 * len(LIMB_JOINTS)
 #: Upper and lower piece of each limb.
 LIMB_PIECES: Final = [{3 + 2 * limb, 4 + 2 * limb} for limb in range(len(LIMB_JOINTS))]
 FEET: Final = tuple(range(len(POINTS), len(NAMES)))
-#: Joints without which nothing of a posture can be placed.
+#: Joints that must be known to place any piece.
 TRUNK: Final = list(range(N_TRUNK_JOINTS))
 #: The point from which the vector of each of `NAMES` starts; -1 for the neck.
 PIECE_PARENTS: Final = (
@@ -60,12 +60,12 @@ def _piece_of_points() -> list[int]:
     return pieces
 
 
-#: The piece whose vector ends at each point; that of the neck is not read.
+#: The piece whose vector ends at each point; the neck's entry is not used.
 PIECE_OF_POINT: Final = _piece_of_points()
 
 
 def vectors_of(points: Array) -> Array:
-    """Return the vector (N, P, 3) from each point's parent to the point; for the neck, its position."""
+    """Return the vector that ends at each point (N, P, 3); the neck's vector is its position."""
     vectors = points.copy()
     vectors[:, 1:] -= points[:, list(PIECE_PARENTS[1:])]
     return vectors
@@ -80,9 +80,9 @@ def placed(vectors: Array) -> Array:
 
 
 def turns_between(start: Array, end: Array) -> Array:
-    """Return the rotations (N, 11, 3, 3) of the pieces that bring postures (N, P, 3) nearest to target postures.
+    """Return the rotations (N, 11, 3, 3) of the pieces that best map postures `start` (N, P, 3) to postures `end`.
 
-    A piece with one known vector turns by the shortest rotation; a piece without known vectors does not turn.
+    A piece with one known vector has the shortest rotation. A piece with no known vector has the identity.
     """
     R = np.tile(np.eye(3), (len(start), N_PIECES, 1, 1))
     before, after = vectors_of(start), vectors_of(end)
@@ -97,7 +97,7 @@ def turns_between(start: Array, end: Array) -> Array:
 
 
 def turned(points: Array, turn: Array) -> Array:
-    """Turn the pieces of postures (N, P, 3) by rotation vectors (N, 33), radians; the neck stays."""
+    """Rotate the pieces of postures (N, P, 3) by rotation vectors (N, 33), radians; the neck does not move."""
     R = rotation_from_vector(turn.reshape(-1, N_PIECES, 3))
     vectors = vectors_of(points)
     vectors[:, 1:] = np.einsum("npij,npj->npi", R[:, PIECE_OF_POINT[1:]], vectors[:, 1:])
@@ -112,7 +112,7 @@ def moved(points: Array, step: Array) -> Array:
 
 
 def carried(start: Array, end: Array, share: Array) -> Array:
-    """Move postures (N, P, 3) a share (N,) of the way to target postures, by the turns of their pieces."""
+    """Interpolate postures (N, P, 3): pieces rotate, and the neck moves, by a fraction (N,) of the difference."""
     turn = vector_from_rotation(turns_between(start, end)).reshape(len(start), 3 * N_PIECES)
     shift = end[:, :1] - start[:, :1]
     return turned(start, share[:, None] * turn) + share[:, None, None] * shift

@@ -1,4 +1,4 @@
-"""Uncertainty of a body's lengths: one common size, and each segment's own deviation beside it."""
+"""Uncertainty of a body's lengths: of the size that all lengths share, and of each segment beside it."""
 
 from __future__ import annotations
 
@@ -15,29 +15,31 @@ from posekit.geometry import Array, Record
 from posekit.settings import MAX_LENGTH_DEVIATION
 from posekit.skeleton import SEGMENT_NAMES
 
-#: Segments that a bending spine and moving clavicles change in one person.
+#: Segments whose length varies within one person, because the spine bends and the clavicles move.
 NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 
-#: Relative deviations of one person's trunk lengths due to a bending spine and moving clavicles.
+#: Relative standard deviations of trunk lengths within one person, because the spine bends and the clavicles move.
 #:
-#: Measured on DeepMimic's motion, whose spine bends, against each clip's medians (20 clips). The spine of CMU's motion
-#: (16 clips) hardly bends: 0.2 % from neck to pelvis, 0.9 % from shoulders to pelvis.
+#: Measured against each clip's medians on 20 DeepMimic clips, whose skeleton has a bending spine. In 16 CMU clips the
+#: deviations are smaller: 0.2 % from neck to pelvis, 0.9 % from shoulders to pelvis.
 TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "left_shoulder-pelvis": 0.027}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class LengthUncertainty(Record):
-    r"""Standard deviations of the logarithms of a body's 17 lengths. Small ones are relative deviations of the lengths.
+    r"""Standard deviations of the logarithms of a body's 17 lengths; small values are relative standard deviations.
 
-    With the size s that all lengths share, and each segment's own part :math:`t_i`, a length is :math:`l_i = e^{s +
-    t_i} \bar l_i`, and the covariance of the logarithms :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
+    With a size s that all lengths share and an independent term :math:`t_i` of each segment, a length is
+    :math:`l_i = e^{s + t_i} \bar l_i`. The covariance of the logarithms is
+    :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
 
     Parameters
     ----------
     common : float
-        Deviation of the one size that all lengths share.
+        Standard deviation of the size that all lengths share.
     own : mapping of str to float
-        Deviation of each segment beside the size, by `posekit.skeleton.SEGMENT_NAMES`; 0 if a segment is not named.
+        Standard deviation of each segment's own term, by name of `posekit.skeleton.SEGMENT_NAMES`; 0 if a segment is
+        not named.
 
     Raises
     ------
@@ -64,7 +66,7 @@ class LengthUncertainty(Record):
         self._set("own", MappingProxyType(own))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the numbers, because a read-only mapping cannot be pickled."""
+        """Pickle the numbers: a read-only mapping cannot be pickled."""
         return _uncertainty, (self.common, dict(self.own))
 
     def __hash__(self) -> int:
@@ -73,10 +75,9 @@ class LengthUncertainty(Record):
 
     @staticmethod
     def uniform(deviation: float) -> LengthUncertainty:
-        """Return an uncertainty in which the size and each single length have the same relative deviation.
+        """Return an uncertainty whose size and segments all have one relative deviation.
 
-        Lengths of the trunk also change with posture, by `TRUNK_BENDS`, but at most by three times the deviation: a
-        body with exact lengths is rigid.
+        Trunk lengths also vary by `TRUNK_BENDS`, limited to three times the deviation so that exact lengths stay exact.
         """
         own = dict.fromkeys(SEGMENT_NAMES, deviation)
         for name, bend in TRUNK_BENDS.items():
@@ -84,7 +85,7 @@ class LengthUncertainty(Record):
         return LengthUncertainty(common=deviation, own=own)
 
     def widened(self, times: float) -> LengthUncertainty:
-        """Multiply all deviations, up to `MAX_LENGTH_DEVIATION`."""
+        """Return the uncertainty with all deviations multiplied, up to `MAX_LENGTH_DEVIATION`."""
         own = {name: min(times * one, MAX_LENGTH_DEVIATION) for name, one in self.own.items()}
         return LengthUncertainty(common=min(times * self.common, MAX_LENGTH_DEVIATION), own=own)
 
@@ -95,7 +96,7 @@ class LengthUncertainty(Record):
 
     @property
     def deviations(self) -> Array:
-        """The segments' own deviations (17,), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
+        """Standard deviations of the segments' own terms (17,), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
         return np.array([self.own[name] for name in SEGMENT_NAMES])
 
     @property
@@ -113,29 +114,31 @@ def _uncertainty(common: float, own: Mapping[str, float]) -> LengthUncertainty:
 
 
 def _varying(deviation: float, non_rigid: float) -> dict[str, float]:
-    """Return each segment's deviation; segments whose length changes with posture have one of their own."""
+    """Return one deviation for `NON_RIGID_SEGMENTS` and another for all other segments."""
     return {name: non_rigid if name in NON_RIGID_SEGMENTS else deviation for name in SEGMENT_NAMES}
 
 
-#: For lengths measured by a calibration or over a clip: 2 % from shoulders to pelvis, 1 % elsewhere.
+#: Uncertainty of lengths measured by a calibration or over a clip: 2 % from shoulders to pelvis, 1 % elsewhere.
 #:
-#: Motion capture (CMU, 16 clips) has 1.0 % from shoulders to pelvis against each clip's medians, 2.1 % in the worst
-#: clip, up to 0.4 % from neck to pelvis, and nothing elsewhere, since its bones are rigid: 1 % is left for the error of
+#: In motion capture (16 CMU clips), lengths deviate from each clip's medians by 1.0 % from shoulders to pelvis (2.1 %
+#: in the worst clip) and by up to 0.4 % from neck to pelvis. Other segments are rigid there; their 1 % is the error of
 #: a tape.
 MEASURED_LENGTHS: Final = LengthUncertainty(own=_varying(0.01, 0.02))
 
-#: For given lengths of a person whose accuracy is unknown.
+#: Uncertainty of given lengths of a person if their accuracy is unknown.
 #:
-#: They come from a tape, another detector or another day: 2 % is the error that all lengths share, and 3 % the
-#: difference between a tape and joint centres. Lengths estimated from a stature have `KNOWN_STATURE`.
+#: The lengths may be from a tape, another detector or another day: 2 % is the error that all lengths share, and 3 % the
+#: difference between taped lengths and distances of joint centres. Lengths estimated from a stature have
+#: `KNOWN_STATURE`.
 STATED_LENGTHS: Final = LengthUncertainty(common=0.02, own=_varying(0.03, 0.04))
 
-#: For an adult of unknown lengths, with the figure's own.
+#: Uncertainty of the figure's lengths for an adult of unknown size.
 #:
-#: Statures of 4082 men are 1756 (68.6) mm, of 1986 women 1629 (64.2) mm (Gordon et al. 2014, "2012 Anthropometric
-#: Survey of U.S. Army Personnel", NATICK/TR-15/007): both together deviate by 5.5 %, and soldiers less than people. A
-#: limb varies beside stature by 3.5 % (upper arm) to 5.7 % (thigh) in the same survey.
+#: Mean (standard deviation) of stature is 1756 (68.6) mm for 4082 men and 1629 (64.2) mm for 1986 women (Gordon et al.
+#: 2014, "2012 Anthropometric Survey of U.S. Army Personnel", NATICK/TR-15/007). The standard deviation of both together
+#: is 5.5 %, and other people vary more than soldiers. In the same survey, the ratio of a limb's length to stature
+#: varies by 3.5 % (upper arm) to 5.7 % (thigh).
 UNKNOWN_ADULT: Final = LengthUncertainty(common=0.07, own=_varying(0.05, 0.05))
 
-#: For a person of known stature: trunk and limbs share it differently, and it includes shoes and hair.
+#: Uncertainty of lengths estimated from a known stature: proportions vary, and the stature may include shoes and hair.
 KNOWN_STATURE: Final = LengthUncertainty(common=0.02, own=_varying(0.05, 0.05))

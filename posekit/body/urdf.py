@@ -1,4 +1,4 @@
-"""The figure's URDF text with other lengths or limits."""
+"""Changes of the figure's URDF text to other lengths or limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from posekit.geometry import Array
 from posekit.robots.urdf import parse_xml
 from posekit.skeleton import HEAD_POINTS, SIDES
 
-#: Link, the joint at its end, and the two joints of the skeleton between which it lies.
+#: For each limb link: name of the link, URDF joint at its end, and the two skeleton joints between which it lies.
 LIMB_LINKS = (
     ("upper_arm", "elbow_flexion", "shoulder", "elbow"),
     ("forearm", "wrist_fixed", "elbow", "wrist"),
@@ -30,20 +30,20 @@ LIMB_LINKS = (
 def rewrite(
     text: str, capsules: Sequence[Capsule], lengths: Mapping[str, float], head: Array, *, behind: bool = False
 ) -> str:
-    """Write the figure's URDF with other capsules, lengths and head.
+    """Return the figure's URDF text with other capsules, lengths and head points.
 
     Masses and moments of inertia are computed for a person of these lengths.
 
     Parameters
     ----------
     text : str
-        The URDF to start from.
+        The original URDF.
     capsules : sequence of Capsule
         The new capsules.
     lengths : mapping
         All 17 lengths, metres.
     head : array (5, 3)
-        The head's points in the head link's frame (x forward, y left, z up, origin the neck), metres.
+        The head points in the head link's frame (origin neck, x forward, y left, z up), metres.
     behind : bool
         Whether the shoulders lie behind the line from neck to pelvis.
     """
@@ -83,7 +83,7 @@ def rewrite(
 
 
 def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
-    """Write the figure's URDF with other limits (radians) on some joints, by URDF name."""
+    """Return the figure's URDF text with other limits (radians) of some joints, by URDF joint name."""
     robot = deepcopy(_parsed(text))
     for name, (lower, upper) in limits.items():
         limit = _find(robot, f"joint[@name='{name}']/limit")
