@@ -202,7 +202,7 @@ class ClosedForm:
         return min(ends), max(ends)
 
     def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
-        """Give the pelvis the smallest flexion for which both hips are inside their limits (angles (N, 22)), if possible."""
+        """Give each pelvis the smallest flexion that brings both hips into their limits (angles (N, 22))."""
         low, high = self._pelvis_turn
         least, most = np.full(len(angles), low), np.full(len(angles), high)
         for k in HIP_FLEXIONS:
