@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posekit.errors import refusal, shown
+from posekit.errors import names_checked, refusal, shown
 from posekit.inputs import kind_of
 from posekit.settings import RecoverSettings, number, picture_size
 
@@ -37,6 +37,7 @@ def opened(source: Source, layout: str = "", **facts: Any) -> Any:
     return source
 
 
+@names_checked
 def recover(
     source: Source,
     settings: RecoverSettings | None = None,
@@ -238,6 +239,7 @@ def frame_range(frame: Any) -> int | tuple[int, int] | None:
     return int(ends[0]) if len(ends) == 1 else (int(ends[0]), int(ends[1]))
 
 
+@names_checked
 def convert(
     source: Source,
     target: str | PathLike[str],
@@ -278,6 +280,7 @@ def convert(
     save(source, target, **({"which": which} if which else {}))
 
 
+@names_checked
 def render(
     source: Source,
     target: str | PathLike[str],
@@ -299,9 +302,9 @@ def render(
 
     Parameters
     ----------
-    source : path, Motion, Recovery, View, Report, Robot or array
-        A robot is drawn at its neutral configuration. An array is joints (T, 14, 3), or (T, J, 3) in the order of the
-        `layout`.
+    source : path, Motion, Recovery, View, Detections, Report, Robot or array
+        A robot is drawn at its neutral configuration. Of key points, and of a view without truth, the recovered
+        postures are drawn. An array is joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
     target : path
     layout, urdf, rate, unit, up
         As in `posekit.open`.
@@ -329,6 +332,7 @@ def render(
     >>> posekit.render(posekit.recover(posekit.builtin_view("seq1")), "walk.html")
     """
     from posekit.cameras import View
+    from posekit.following.detections import Detections
     from posekit.motion import Motion
     from posekit.recovery import Recovery
     from posekit.robots import Robot
@@ -337,11 +341,13 @@ def render(
 
     name = source if isinstance(source, str | PathLike) else "render"
     source = opened(source, layout, rate=rate, urdf=urdf, unit=unit, up=up)
+    if isinstance(source, Detections):
+        source = view_of(source)
     if isinstance(view, str | PathLike):
         view = opened(view)
     if not isinstance(source, Motion | Recovery | View | Report | Robot):
-        expected = "postures, motion, a result, a view or a report"
-        raise refusal(name, "", kind_of(source), expected, "recover key points first")
+        expected = "postures, motion, key points, a view, a result or a report"
+        raise refusal(name, "", kind_of(source), expected, "give one of these")
     if isinstance(source, View) and not np.isfinite(source.truth).any():
         view, source = source, recover(source)
     draw(

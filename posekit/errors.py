@@ -3,17 +3,40 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import wraps
 from os import PathLike
-from typing import Final
+from typing import Final, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 #: Characters of a value or a name that a message shows before it is cut.
 MAX_SHOWN_CHARACTERS: Final = 60
 
 #: Characters of a message before its middle is cut.
 MAX_LINE_CHARACTERS: Final = 500
+
+#: Words of other programs, and the names here of options, arguments, fields and commands.
+MEANT: Final = {
+    **dict.fromkeys(("fps", "framerate", "frame_rate", "frequency", "hz"), ("rate",)),
+    **dict.fromkeys(("skeleton", "format", "joint_names", "keypoint_names"), ("layout",)),
+    **dict.fromkeys(("robot", "model"), ("urdf", "figure")),
+    **dict.fromkeys(("intrinsics", "calibration", "k"), ("camera",)),
+    **dict.fromkeys(("noise_px", "sigma", "noise"), ("deviation",)),
+    **dict.fromkeys(("units", "unit_of_length"), ("unit",)),
+    **dict.fromkeys(("out", "path", "filename"), ("output", "target")),
+    **dict.fromkeys(("check", "judge"), ("checks", "validate")),
+    **dict.fromkeys(("draw", "plot"), ("render",)),
+    "height": ("stature",),
+    "floor": ("ground",),
+    "limits": ("ranges",),
+    "resolution": ("size",),
+    "info": ("inspect",),
+}
 
 
 class PosekitError(Exception):
@@ -127,15 +150,38 @@ def cut(text: str) -> str:
     return text if len(text) <= MAX_SHOWN_CHARACTERS else text[: MAX_SHOWN_CHARACTERS - 1] + "…"
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
-    """Suggest the valid names closest to a misspelt one, or list all if none is close."""
+def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
+    """Suggest the valid names closest to a misspelt one or meant by a word of another program.
+
+    If none is close, return `otherwise` or a list of all.
+    """
     valid = list(names)
-    flipped = "-".join(reversed(name[:MAX_SHOWN_CHARACTERS].split("-")))
-    if "-" in name and flipped in valid:
-        return f"did you mean {flipped}?"
-    parts = name.replace("-", "_").split("_")
-    if near := [one for one in valid if one in parts] or difflib.get_close_matches(
-        name[:MAX_SHOWN_CHARACTERS], valid
-    ):
-        return f"did you mean {' or '.join(near)}?"
-    return f"valid names are {', '.join(valid)}"
+    given = name[:MAX_SHOWN_CHARACTERS]
+    parts = given.lower().replace("-", "_").split("_")
+    words = {word: [one for one in ours if one in valid] for word, ours in MEANT.items()}
+    words = {word: ours for word, ours in words.items() if ours} | {one: [one] for one in valid}
+    near = (
+        words.get("_".join(parts))
+        or [one for one in valid if one == "-".join(reversed(parts))]
+        or [one for one in valid if one in parts]
+        or dict.fromkeys(one for word in difflib.get_close_matches(given, words) for one in words[word])
+    )
+    return (
+        f"did you mean {' or '.join(near)}?" if near else otherwise or f"valid names are {', '.join(valid)}"
+    )
+
+
+def names_checked(function: Callable[P, T]) -> Callable[P, T]:
+    """Decorate a public function: an unknown keyword argument is refused with the name that was probably meant."""
+    known = inspect.signature(function).parameters
+    public = function.__qualname__.removesuffix(".__init__")
+
+    @wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> T:
+        for name in kwargs:
+            if name not in known:
+                remedy = nearest(name, (one for one in known if one != "self"))
+                raise refusal(public, name, "an unknown argument", "one that it has", remedy)
+        return function(*args, **kwargs)
+
+    return called

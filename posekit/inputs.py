@@ -42,7 +42,8 @@ def files_of(given: Any) -> Iterator[Path]:
             )
         if not found:
             what = "a folder without files of motion" if path.is_dir() else "no file"
-            raise refusal(one, "", what, "a file, a folder of files, or a pattern", "check the path")
+            remedy = "write them with posekit samples DIR" if str(one) == "samples" else "check the path"
+            raise refusal(one, "", what, "a file, a folder of files, or a pattern", remedy)
         yield from found
 
 

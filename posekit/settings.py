@@ -7,6 +7,7 @@ text with a unit.
 from __future__ import annotations
 
 import math
+import string
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -14,15 +15,15 @@ from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
 from posekit.errors import nearest, refusal, shown
-from posekit.geometry import PER_METRE, Record
+from posekit.geometry import PER_METRE, UNIT_WORDS, Record
 
 #: Units of numbers given as text, and how many of each make one metre, pixel, degree, second or hertz; 100 % is one.
 UNITS: Final = {
     **PER_METRE,
     "in": 1 / 0.0254,
-    "ft": 1 / 0.3048,
-    **dict.fromkeys(("px", "deg", "s", "Hz", "fps"), 1.0),
-    "%": 100.0,
+    **dict.fromkeys(("ft", "feet", "foot"), 1 / 0.3048),
+    **dict.fromkeys(("", "px", "pixels", "deg", "degrees", "°", "s", "seconds", "hz", "hertz", "fps"), 1.0),
+    **dict.fromkeys(("%", "percent"), 100.0),
 }
 
 #: Largest accepted relative standard deviation of lengths (dimensionless).
@@ -64,11 +65,12 @@ def number(
     >>> number("175cm", "stature"), number(2, "deviation")
     (1.75, 2.0)
     """
-    digits = str(text).strip()
-    unit = next((unit for unit in sorted(UNITS, key=len, reverse=True) if digits.endswith(unit)), "")
+    given = str(text).strip().lower()
+    digits = given.rstrip(string.ascii_lowercase + "%°")
+    unit = given.removeprefix(digits)
     try:
-        value = float(digits.removesuffix(unit)) / UNITS.get(unit, 1.0)
-    except ValueError:
+        value = float(digits) / UNITS[UNIT_WORDS.get(unit, unit)]
+    except (KeyError, ValueError):
         raise refusal("", name, shown(text), expected, remedy) from None
     if not math.isfinite(value):
         raise refusal("", name, shown(text), expected, "give a finite number")
@@ -119,7 +121,7 @@ class Settings(Record):
     Parameters
     ----------
     checks : sequence of str or Check, optional
-        Checks by name, as ``module:Name``, or as objects. The usual ones by default.
+        Checks by name, as ``module:Name``, or as objects; ``usual`` stands for the default ones.
     ranges : str
         Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML table; ``auto``: anatomical, and for
         configurations the limits of their URDF.
@@ -152,7 +154,8 @@ class Settings(Record):
         elif self.checks is not None:
             self._set("checks", tuple(self.checks) if isinstance(self.checks, Iterable) else (self.checks,))
         if isinstance(self.rules, str):
-            self._set("rules", tuple(int(rule) for rule in self.rules.split(",") if rule.strip().isdigit()))
+            rules = map(str.strip, self.rules.split(","))
+            self._set("rules", tuple(int(rule) if rule.isdigit() else rule for rule in rules if rule))
         self._set("rules", tuple(self.rules))
         self._one_of("walkers", get_args(Walkers))
         if not set(self.rules) <= {1, 2, 3, 4, 5}:
@@ -207,7 +210,7 @@ class Settings(Record):
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as JSON values; a check that is an object is given by its name."""
-        return {name: _plain(value) for name, value in asdict_shallow(self).items()}
+        return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
 
     def _one_of(self, name: str, allowed: Sequence[str]) -> None:
         if getattr(self, name) not in allowed:
@@ -367,23 +370,13 @@ def stated(**given: Any) -> dict[str, Any]:
 
 def picture_size(size: Any) -> tuple[int, int] | None:
     """Return a width and a height, given as two numbers or as ``"1280x720"``; None if nothing is given."""
-    if not size:
+    if size is None or size == "":
         return None
-    sides = (
-        size.lower().split("x")
-        if isinstance(size, str)
-        else list(size)
-        if isinstance(size, Sequence)
-        else [size]
-    )
-    if len(sides) != 2 or not all(str(side).isdigit() and int(side) for side in sides):
+    text = size if isinstance(size, str) or not isinstance(size, Iterable) else "x".join(map(str, size))
+    sides = str(text).lower().split("x")
+    if len(sides) != 2 or not all(side.isdigit() and int(side) for side in sides):
         raise refusal("", "size", shown(size), "WIDTHxHEIGHT in pixels", "write it as 1280x720")
     return int(sides[0]), int(sides[1])
-
-
-def asdict_shallow(settings: Settings) -> dict[str, Any]:
-    """Return the fields by name; their values are not copied."""
-    return {one.name: getattr(settings, one.name) for one in fields(settings)}
 
 
 def _plain(value: Any) -> Any:

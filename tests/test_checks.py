@@ -374,11 +374,12 @@ def test_every_check_has_a_message_and_one_spelling() -> None:
         assert posekit.Validator(checks=[name.replace("-", "_")]) is not None
 
 
-def test_joint_angles_alone_have_their_root_at_neutral_and_a_zero_quaternion_is_unknown() -> None:
+def test_joint_angles_alone_have_their_root_at_neutral_and_a_zero_quaternion_is_refused() -> None:
     validator = posekit.Validator("g1", posekit.ValidateSettings(bodies="capsules"))
     q = np.tile(validator.robot.neutral, (3, 1))
     assert validator.check(q[:, 7:]).ok.all()
     q[1, 3:7] = 0.0
-    report = validator.check(q)
-    assert report.ok.tolist() == [True, False, True]
-    assert report.undecided.tolist() == [False, True, False]
+    with pytest.raises(posekit.InputError, match="row 1: root_joint: got a quaternion of length 0"):
+        validator.check(q)
+    q[1, 3:7] = np.nan
+    assert validator.check(q).undecided.tolist() == [False, True, False]

@@ -391,7 +391,7 @@ def test_a_calibration_by_which_the_person_does_not_stand_is_told(
     found = posekit.open(coco_results(tmp_path))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        found.view(camera(R=R, t=[0.0, 0, 3], up=up))
+        found.view(camera(R=R, t=[0.0, 0, 3], up=up), rate=30)
     lines = [str(one.message) for one in told]
     assert (len(lines) == 1 and said in lines[0]) if said else not lines
 
@@ -402,7 +402,14 @@ def test_a_picture_with_y_up_is_told(tmp_path: Path) -> None:
         one["keypoints"][1::3] = [480 - y for y in one["keypoints"][1::3]]
     found = posekit.open(dumped(tmp_path / "yup.json", people))
     with pytest.warns(UserWarning, match="upside down"):
-        found.view()
+        found.view(rate=30)
+
+
+def test_a_film_without_a_rate_has_an_assumed_one_and_says_so(tmp_path: Path) -> None:
+    found = posekit.open(coco_results(tmp_path))
+    with pytest.warns(UserWarning, match="30 pictures a second are assumed"):
+        view = found.view()
+    np.testing.assert_allclose(np.diff(view.time), 1 / 30)
 
 
 def test_a_calibration_of_other_pictures_is_refused(tmp_path: Path) -> None:

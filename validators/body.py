@@ -104,14 +104,10 @@ class Body(Record):
 
     def __post_init__(self) -> None:
         count = len(self.joints)
-        counted = {
-            "head": (count, len(HEAD_POINTS), 3),
-            "feet": (count, len(FEET_POINTS), 3),
-            "time": (count,),
-        }
+        counted = {"head": (len(HEAD_POINTS), 3), "feet": (len(FEET_POINTS), 3), "time": ()}
         for name, shape in counted.items():
-            if getattr(self, name).shape != shape:
-                object.__setattr__(self, name, np.full(shape, np.nan))
+            if getattr(self, name).shape != (count, *shape):
+                object.__setattr__(self, name, np.full((count, *shape), np.nan))
 
     @classmethod
     def of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache, partial
@@ -12,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.body import Figure, load_figure, with_head
-from posekit.errors import InputError, PosekitError, refusal, shown
-from posekit.geometry import Array
+from posekit.errors import InputError, PosekitError, names_checked, refusal, shown
+from posekit.geometry import Array, numbers
 from posekit.motion.motion import Motion
 from posekit.settings import Settings, Tolerance, ValidateSettings
 from posekit.skeleton import JOINTS, POINTS
@@ -27,14 +28,7 @@ from posekit.validators.motion.remarks import hints, rate_doubts
 from posekit.validators.motion.standing import balance
 from posekit.validators.report import NUMBERS, Report, joined
 from posekit.validators.rigid_parts import RigidParts
-from posekit.validators.robot import (
-    mimic_joints,
-    reach,
-    robot_collision,
-    robot_range,
-    robot_travel,
-    sole_points,
-)
+from posekit.validators.robot import CONFIGURATION_CHECKS, order_doubts, sole_points
 from posekit.validators.walking import WalkingRules
 
 if TYPE_CHECKING:
@@ -46,9 +40,7 @@ POSTURE_CHECKS: Final[dict[str, Check]] = {
 }
 
 #: Checks of a robot's configurations by name.
-ROBOT_CHECKS: Final[dict[str, Check]] = {
-    one.name: one for one in (reach, robot_range, robot_travel, mimic_joints, robot_collision, balance)
-}
+ROBOT_CHECKS: Final[dict[str, Check]] = {one.name: one for one in (*CONFIGURATION_CHECKS, balance)}
 
 USUAL_POSTURE_CHECKS: Final = ("rigid-parts", "joint-range", "collision")
 USUAL_ROBOT_CHECKS: Final = ("reach", "joint-range", "joint-travel", "mimic", "collision")
@@ -83,16 +75,18 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
     """
     own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
     profile = load_profile(settings.profile) if isinstance(settings, ValidateSettings) else ()
+    names = USUAL_ROBOT_CHECKS if of_robot else USUAL_POSTURE_CHECKS
+    usual = [*(own[name] for name in names), *(profile if in_time else ())]
     if settings.checks is None:
-        usual = USUAL_ROBOT_CHECKS if of_robot else USUAL_POSTURE_CHECKS
-        return [*(own[name] for name in usual), *(profile if in_time else ())]
+        return usual
     if not settings.checks:
         raise refusal("--checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
     over_time = {**MOTION_CHECKS, **{one.name: one for one in profile}}
-    found = [find_check(given, {**KNOWN, **over_time, **own}) for given in settings.checks]
+    asked = [one for given in settings.checks for one in (usual if given == "usual" else [given])]
+    found = {one.name: one for one in (find_check(one, {**KNOWN, **over_time, **own}) for one in asked)}
     # Users' checks come after checks of postures and before checks over time.
     rank = {name: place for place, name in enumerate((*own, "", *over_time))}
-    return sorted(found, key=lambda one: rank.get(one.name, rank[""]))
+    return sorted(found.values(), key=lambda one: rank.get(one.name, rank[""]))
 
 
 def early_checks(settings: Settings) -> list[Check]:
@@ -270,14 +264,16 @@ def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[R
     if known.any():
         q[known], _ = used.configurations(joints[known])
         residual[known] = np.linalg.norm(used.points(q[known]) - joints[known], axis=-1)
-    return used, replace(motion, q=q, q_names=used.configuration_names, robot=robot.name), residual
+    note = f"{robot.name} is fitted to these positions; judge people without --urdf"
+    fitted = replace(motion, q=q, q_names=used.configuration_names, robot=robot.name)
+    return used, replace(fitted, notes=(*motion.notes, note)), residual
 
 
 def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
     """Return the report of checks about one recording."""
     by_name, not_asked = _asked(checks, body)
     found = list(by_name.values())
-    quiet = OF_SOME_ROBOTS if body.settings.checks is None else ()
+    quiet = OF_SOME_ROBOTS if "usual" in (body.settings.checks or ("usual",)) else ()
     count = len(body)
     places = tuple(dict.fromkeys(place for _, one in found for place in one.places))
     place_at = {place: k for k, place in enumerate(places)}
@@ -320,7 +316,7 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
             *motion.notes,
             *hints(body, {check: one for check, (_, one) in by_name.items()}, np.asarray(motion.frame)),
         ),
-        warnings=(*motion.warnings, *rate_doubts(body)),
+        warnings=(*motion.warnings, *rate_doubts(body), *order_doubts(body)),
     )
 
 
@@ -352,6 +348,7 @@ class Validator:
     array([ True])
     """
 
+    @names_checked
     def __init__(
         self,
         urdf: Any = "figure",
@@ -397,7 +394,8 @@ class Validator:
         given : array or Motion
             Joints (14, 3) or (N, 14, 3), with head points (N, 19, 3), metres, NaN where unknown; or configurations
             (nq,) or (N, nq), or (N, nq - 7) without a free root, which is then at neutral. One posture is a batch of
-            one. All postures are of one person.
+            one. All postures are of one person. The root's quaternion is x, y, z, w; the report of a batch that stands
+            only by w, x, y, z has a warning, but one quaternion of another order is just another orientation.
         head : array (N, 5, 3), optional
             Nose, eyes and ears.
         tolerance : Tolerance, optional
@@ -432,12 +430,8 @@ class Validator:
         """
         count = len(self.configuration_names)
         expected = f"joints (N, {len(JOINTS)}, 3), or configurations (N, {count})"
-        try:
-            values = np.asarray(given).astype(np.float64, casting="same_kind")
-        except (TypeError, ValueError):
-            values = np.empty(())
-        if not values.ndim:
-            raise refusal("postures", "", shown(type(given).__name__), expected, "give real numbers")
+        remedy = "give one posture a row; files, and points of another layout, to posekit.validate"
+        values = numbers(given, "postures", "", expected, remedy)
         if values.ndim == 1 or values.shape in ((len(JOINTS), 3), (len(POINTS), 3)):
             values = values[None]
         still: dict[str, Any] = {"frame": np.zeros(len(values), dtype=np.intp)} if len(values) > 1 else {}
@@ -452,13 +446,11 @@ class Validator:
             values = np.concatenate([root, values], axis=1)
         if values.shape[1:] == (count,):
             values = values.copy()
-            if body.free_flyer:  # a quaternion of zeros is no rotation: such a row is unknown
-                values[np.abs(values[:, 3:7]).max(axis=1) == 0.0] = np.nan
             known = np.isfinite(values).all(axis=1)
             values[known] = body.checked(values[known])
             name = "figure" if self.figure is not None else body.name
             return Motion(q=values, q_names=self.configuration_names, robot=name, **still)
-        raise refusal("postures", "", f"shape {values.shape}", expected, "give one posture a row")
+        raise refusal("postures", "", f"shape {values.shape}", expected, remedy)
 
 
 #: Largest plausible coordinate, metres: no unit of length gives larger ones.
@@ -492,6 +484,7 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
     return found
 
 
+@names_checked
 def assert_valid(
     given: Any,
     urdf: Any = "figure",
@@ -514,6 +507,11 @@ def assert_valid(
     InvalidError
         An `AssertionError` with the first reasons.
 
+    Warns
+    -----
+    UserWarning
+        The report's warnings, such as a doubt about the order of quaternions.
+
     Examples
     --------
     >>> import posekit
@@ -525,6 +523,8 @@ def assert_valid(
         report = posekit.validate(given, settings, urdf=urdf, checks=checks, ranges=ranges)
     else:
         report = Validator(urdf, settings, checks=checks, ranges=ranges).check(given)
+    for line in report.warnings:
+        warnings.warn(line, UserWarning, stacklevel=3)
     bad = int((~report.ok).sum())
     if bad or report.refused:
         reasons = "; ".join(str(span) for span in report.spans[:3]) or "joints are missing"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
-from posekit.geometry import Array, cross, unit
+from posekit.geometry import Array, cross, median_lean, unit
 from posekit.settings import EXACT, MEASURED
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, SIDES
 from posekit.validators.body import MADE_UP_METRES, Body
@@ -29,6 +29,25 @@ NEAR_METRES: Final = 0.02
 
 #: Largest distance of a foot's joint from the ankle, as a share of the leg; and range of heights of a sole, metres.
 FOOT_SHARE, SOLE_METRES = 0.1, 0.02
+
+
+#: Least decrease of the median lean, degrees, by which another order of the root's quaternion is a doubt.
+LESS_LEAN_DEGREES: Final = 30.0
+
+
+def order_doubts(body: Body) -> list[str]:
+    """Return a warning if a robot stands when its quaternions are read as w, x, y, z, and not as they are.
+
+    One posture shows nothing: any quaternion is the orientation of some body.
+    """
+    if body.q is None or body.robot is None or len(body) < 2 or not body.robot.free_flyer:
+        return []
+    known, up = body.q[np.isfinite(body.q).all(axis=1), 3:7], np.eye(3)[2] if body.up is None else body.up
+    lean, other = (median_lean(q, up) if len(q) else 0.0 for q in (known, known[:, [1, 2, 3, 0]]))
+    said = (
+        f"The robot leans by {lean:.0f} degrees, and by {other:.0f} if its quaternions are w, x, y, z: check"
+    )
+    return [f"{said} their order; posekit reads x, y, z, w."] * (lean - other > LESS_LEAN_DEGREES)
 
 
 @check("joint-range", unit="deg", reads=("q", "robot"))
@@ -119,6 +138,10 @@ def reach(body: Body) -> Judgement:
     given = body.settings.rigid_tolerance
     upper = MEASURED.rigid if given is None else given
     return Judgement(JOINTS, body.residual, upper=upper, tolerance=body.noise)
+
+
+#: Checks of configurations, in the order of reports.
+CONFIGURATION_CHECKS: Final = (reach, robot_range, robot_travel, mimic_joints, robot_collision)
 
 
 @lru_cache(maxsize=4)

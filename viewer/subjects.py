@@ -263,8 +263,7 @@ def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None)
         np.bincount(recovery.survivors.frame, minlength=len(recovery)),
         recovery.source or "result",
     )
-    if not counts.any():
-        raise refusal(source, "", "no posture", "at least one", "see recover --explain")
+    recovery.refuse_empty()
     number = int(np.flatnonzero(counts)[0])
     if frame is not None:
         number = int(frame_rows(len(recovery), frame, recovery.source)[0])

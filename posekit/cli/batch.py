@@ -8,15 +8,7 @@ from typing import Any
 
 import click
 
-from posekit.cli.command import (
-    command,
-    option,
-    output,
-    say,
-    seeing,
-    settings_from,
-    settings_options,
-)
+from posekit.cli.command import command, option, output, say, seeing, settings_from, settings_options
 from posekit.settings import RecoverSettings
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,26 +11,11 @@ from typing import Any, Final
 
 import click
 
-from posekit.errors import InputError, one_line, refusal, shown
+from posekit.errors import InputError, nearest, one_line, refusal, shown
 from posekit.settings import Settings, stated
 
 #: Parameters that name what a command writes.
 OUTPUTS: Final = frozenset({"output", "keep", "repair"})
-
-#: Words of other programs, and of earlier versions, for options.
-ALIASES: Final = {
-    "--fps": "--rate",
-    "--skeleton": "--layout",
-    "--format": "--layout",
-    "--unit-of-length": "--unit",
-    "--robot": "--urdf",
-    "--model": "--urdf",
-    "--height": "--stature",
-    "--out": "--output",
-    "--noise-px": "--deviation",
-    "--check": "--checks",
-}
-
 
 #: Names of the option for a layout.
 LAYOUT: Final = ("--layout", "--skeleton", "--format")
@@ -54,10 +38,9 @@ class Command(click.Command):
         try:
             rest = super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            known = [name for option in self.params for name in option.opts if name.startswith("--")]
-            near = next(iter(difflib.get_close_matches(error.option_name, [*known, *ALIASES], n=1)), "")
-            near = ALIASES.get(near, near)
-            hint = f"did you mean {near}?" if near else f"see posekit {self.name} --help"
+            known = [name[2:] for option in self.params for name in option.opts if name.startswith("--")]
+            hint = nearest(error.option_name.lstrip("-"), known, f"see posekit {self.name} --help")
+            hint = hint.replace("mean ", "mean --").replace(" or ", " or --")
             raise refusal(
                 "", error.option_name, "an unknown option", f"an option of {self.name}", hint
             ) from None
@@ -281,11 +264,27 @@ def _refuse_overwriting(given: Mapping[str, Any]) -> None:
         targets = [path.resolve() for path in written]
     except (OSError, ValueError) as error:
         raise InputError(f"{error}; expected the name of a file; correct it") from None
+    output = given.get("output")
+    if output and output.suffix and not output.parent.is_dir():
+        remedy = f"make it first: mkdir -p {output.parent}"
+        raise refusal(output, "", "a folder that does not exist", "a place to write", remedy)
     for path, target in zip(written, targets, strict=True):
         if target in inputs or folders & {target, *target.parents} or targets.count(target) > 1:
             raise refusal(
                 path, "", "an output that is also read or written", "a new name", "choose another name"
             )
+
+
+def numbers(flag: str, text: str, count: int | None = None) -> list[float]:
+    """Read numbers between commas."""
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or count not in (None, len(found)):
+        expected = f"{count or 'some'} numbers"
+        raise refusal("", flag, shown(text), expected, "write them with commas between, as 0,2")
+    return found
 
 
 def progress_bar(items: Iterable[Any], label: str) -> Iterable[Any]:

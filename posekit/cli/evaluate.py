@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from posekit.cli.command import command, option, reading, say, settings_from, settings_options
+from posekit.cli.command import command, numbers, option, reading, say, settings_from, settings_options
 from posekit.settings import RecoverSettings
 
 
@@ -32,7 +32,7 @@ def evaluate(
     source: Path, output: Path | None, truth: str | None, noise: str, views: int, seed: int, **given: Any
 ) -> None:
     """Compare a result with the truth; or see a motion through virtual cameras, recover it, and compare."""
-    from posekit.errors import refusal, shown
+    from posekit.errors import refusal
     from posekit.evaluation import evaluate as compare
     from posekit.evaluation import evaluate_method
     from posekit.formats import open as open_file
@@ -45,13 +45,9 @@ def evaluate(
         if truth is None:
             expected = "the true joints of a result: a view with truth, or motion"
             raise refusal(source, "--truth", "none", expected, "give --truth FILE")
-        found = compare(held, open_file(truth))
+        found = compare(held, open_file(truth, layout, **given))
     else:
-        try:
-            levels = [float(level) for level in noise.split(",")]
-        except ValueError:
-            raise refusal("", "--noise", shown(noise), "numbers of pixels", "write it as 0,2") from None
-        found = evaluate_method(held, settings, noise=levels, views=views, seed=seed)
+        found = evaluate_method(held, settings, noise=numbers("--noise", noise), views=views, seed=seed)
     if output is not None:
         found.save(output)
     say(found.table())

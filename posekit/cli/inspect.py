@@ -57,7 +57,7 @@ def _of_detections(found: Any) -> list[tuple[str, str]]:
         ("people", f"{len(found)} in {len(np.unique(numbers))} pictures"),
         ("numbers", f"{listed} pictures" if several else ""),
         ("size", f"{found.size[0]} x {found.size[1]} px" if found.size else "not known"),
-        ("rate", f"{found.rate:g} a second" if found.rate else ""),
+        ("rate", f"{found.rate:g} a second" if found.rate else "not known (--rate)"),
         ("points", f"{len(found.names)}: {_listed(found.names)}"),
     ]
 

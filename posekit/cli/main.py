@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import signal
 import sys
@@ -14,7 +13,7 @@ import click
 
 from posekit import __version__
 from posekit.cli.command import progress_bar, say
-from posekit.errors import PosekitError, refusal
+from posekit.errors import PosekitError, nearest, refusal
 from posekit.progress import show_with
 
 BAD_INPUT: Final = 2
@@ -39,15 +38,6 @@ COMMANDS: Final = {
     "demo": "Run all of it on the built-in views.",
 }
 
-#: Words of other programs for commands.
-SYNONYMS: Final = {
-    "check": "validate",
-    "judge": "validate",
-    "draw": "render",
-    "plot": "render",
-    "info": "inspect",
-}
-
 
 class Commands(click.Group):
     """The commands, each loaded when it is called."""
@@ -59,9 +49,7 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
         """Load a command."""
         if name not in COMMANDS:
-            near = next(iter(difflib.get_close_matches(name, [*COMMANDS, *SYNONYMS], n=1)), "")
-            near = SYNONYMS.get(near, near)
-            remedy = f"did you mean {near}?" if near else "see posekit --help"
+            remedy = nearest(name, COMMANDS, "see posekit --help")
             raise refusal("posekit", name, "an unknown command", ", ".join(COMMANDS), remedy)
         module = import_module(f"posekit.cli.{name}")
         found: click.Command = getattr(module, name)

@@ -8,15 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from posekit.cli.command import (
-    command,
-    option,
-    output,
-    say,
-    seeing,
-    settings_from,
-    settings_options,
-)
+from posekit.cli.command import command, option, output, say, seeing, settings_from, settings_options
+from posekit.errors import refusal, shown
 from posekit.geometry import known_median
 from posekit.settings import RecoverSettings
 
@@ -49,14 +42,16 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 @settings_options(RecoverSettings, SHOWN)
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
     """Recover every posture behind a view: each passes the checks and reprojects onto the image."""
-    from posekit import save
     from posekit.doors import view_of
+    from posekit.formats.save import refuse_ending, save
     from posekit.recovery.conductor import recover as recover_view
 
     settings = settings_from(RecoverSettings, given)
     if linkage:
         say("\n".join(recover_linkage(source, linkage, settings, output)))
         return
+    if output.suffix != ".html":
+        refuse_ending("Recovery", output)
     view = view_of(source, **given)
     recovery = recover_view(view, settings)
     if output.suffix == ".html":
@@ -80,6 +75,8 @@ def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: 
     from posekit.recovery.objects import load_linkage, recover_object
     from posekit.robots import load_robot
 
+    if output.suffix != ".json":
+        raise refusal(output, "", shown(output.suffix), ".json for an object's postures", "rename it")
     linkage = load_linkage(name)
     view = read_object(parsed(source)[1], source, linkage.points)
     robot = load_robot(linkage.urdf, bodies="none") if linkage.urdf else None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from posekit.cli.command import Command, apply, option, output, reading, say
-from posekit.errors import refusal, shown
+from posekit.cli.command import Command, apply, numbers, option, output, reading, say
+from posekit.errors import refusal
 
 if TYPE_CHECKING:
     from posekit.cameras import View
@@ -179,14 +179,3 @@ def write(view: View, output: Path, noise: float, seed: int, uncalibrated: bool 
     seen = with_noise(view, noise, np.random.default_rng([seed, 1])) if noise else view
     save(forget_camera(seen) if uncalibrated else seen, output)
     say(str(output))
-
-
-def numbers(flag: str, text: str, count: int) -> list[float]:
-    """Read numbers between commas."""
-    try:
-        found = [float(part) for part in text.split(",")]
-    except ValueError:
-        found = []
-    if len(found) != count:
-        raise refusal("", flag, shown(text), f"{count} numbers", "write them with commas between")
-    return found

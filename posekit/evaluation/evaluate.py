@@ -135,16 +135,21 @@ class Evaluation(Record):
         }
 
     def table(self) -> str:
-        """Return a short table in Markdown: a line for each level of noise and each clip."""
-        head = "|frames|empty|within 10 mm|within 35 mm|N|PA best|PA first|PA answer".split("|")
-        head += ["MPJPE answer", "sure, ECE", "in 95 % regions"]
+        """Return a short table in Markdown: a line for each level of noise and each clip, medians of errors in mm."""
+        head = (
+            "|frames|empty|within 10 mm|within 35 mm|postures|PA best, mm|PA first, mm|PA answer, mm".split(
+                "|"
+            )
+        )
+        head += ["MPJPE answer, mm", "sure, ECE", "in 95 % regions"]
         rows = []
         keys = [key for key in ("noise", "clip") if key in self.columns]
         for key in keys or [""]:
             for named, chosen in self.conditions([key] if key else []):
                 label = ", ".join(f"{v:g} px" if name == "noise" else str(v) for name, v in named.items())
                 rows.append([label or "all", *_cells(self.summary(chosen))])
-        return "\n".join([_line(head), _line(["---"] * len(head)), *map(_line, rows)])
+        note = ["", self.settings["truth"]] if "truth" in self.settings else []
+        return "\n".join([_line(head), _line(["---"] * len(head)), *map(_line, rows), *note])
 
     def document(self) -> dict[str, Any]:
         """Return the JSON document: settings, the summary of all frames and of each condition, and every frame."""

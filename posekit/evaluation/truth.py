@@ -134,7 +134,12 @@ def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
     by_number[: min(count, len(joints))] = joints[:count]
     found = [("by number", by_number)]
     since = np.asarray(motion.time) - np.asarray(motion.time)[0]
-    if np.isfinite(since).all() and np.isfinite(time).all() and len(since) > 1:
+    timed = np.isfinite(since).all() and np.isfinite(time).all()
+    if not timed and len(joints) != count:
+        got = f"{len(joints)} frames for {count} pictures, and not the times of both"
+        remedy = "state the rate of the pictures: posekit recover --rate"
+        raise refusal(motion.source or "truth", "truth", got, "times, or a frame a picture", remedy)
+    if timed and len(since) > 1:
         for how, seconds in (("by time", time), ("by time from the first picture", time - time[0])):
             nearest = np.abs(since[None] - seconds[:, None]).argmin(axis=1)
             near = np.abs(since[nearest] - seconds) <= 0.51 * np.median(np.diff(since))

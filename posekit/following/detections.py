@@ -265,7 +265,9 @@ class Detections(Record):
             got = f"no shoulders in any of {count} pictures"
             remedy = "choose another --person or --min-confidence"
             raise refusal(self.source, "person", got, "both shoulders", remedy)
-        for line in (*self.warnings, *contradictions(camera, points)):
+        assumed = self.film and count > 1 and self.time is None and not (rate or self.rate)
+        doubts = [f"{ASSUMED_RATE:g} pictures a second are assumed; state the rate (--rate)"] * assumed
+        for line in (*self.warnings, *contradictions(camera, points), *doubts):
             warnings.warn(f"{self.source}: {line}", UserWarning, stacklevel=2)
         kept = seen.any(axis=1) | self.film
         even = np.arange(count) / (rate or self.rate or ASSUMED_RATE)

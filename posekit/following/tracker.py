@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from posekit.cameras import Camera, PinholeCamera, View
 from posekit.cameras.pinhole import camera_from_fov
-from posekit.errors import PosekitError, refusal, shown
+from posekit.errors import PosekitError, names_checked, refusal, shown
 from posekit.following.detections import Detections
 from posekit.following.paths import Candidates, Trellis, candidates, expected_posture
-from posekit.geometry import Array, Record
+from posekit.geometry import Array, Record, numbers
 from posekit.recovery.conductor import recover
 from posekit.recovery.recovery import Recovery
 from posekit.settings import RecoverSettings, number, picture_size
@@ -124,6 +124,7 @@ class Tracker:
     0
     """
 
+    @names_checked
     def __init__(
         self,
         settings: RecoverSettings | None = None,
@@ -177,10 +178,7 @@ class Tracker:
         time = number(time, "time", "seconds")
         if time <= self._last + 1e-6:
             raise refusal("Tracker", "time", f"{time:g}", f"seconds after {self._last:g}")
-        try:
-            table = np.array(points, dtype=np.float64)
-        except (TypeError, ValueError):
-            table = np.empty(())
+        table = numbers(points, "Tracker", "points")
         counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
         if table.ndim != 2 or len(table) not in counts or table.shape[1] not in (2, 3):
             expected = f"({' or '.join(map(str, counts))}, 2) or 3 columns"

@@ -12,23 +12,9 @@ from posekit.formats import joint_arrays, robot_tables
 from posekit.formats.detection_rows import Rows, detections_of
 from posekit.formats.layout import load_layout
 from posekit.formats.options import Options
-from posekit.geometry import Array
+from posekit.geometry import numbers
 from posekit.motion.motion import Motion
 from posekit.skeleton import JOINTS, POINTS
-
-
-def numbers(values: Any) -> Array:
-    """Return values as an array.
-
-    Raises
-    ------
-    InputError
-        If they are not numbers.
-    """
-    try:
-        return np.asarray(values).astype(np.float64, casting="same_kind", copy=False)
-    except (TypeError, ValueError):
-        raise refusal("", "array", f"a {type(values).__name__}", "a path, an object or numbers") from None
 
 
 def has_layout(given: Any, layout: str | None) -> bool:
@@ -41,14 +27,14 @@ def has_layout(given: Any, layout: str | None) -> bool:
     """
     if not isinstance(given, list | tuple | np.ndarray):
         return False
-    shape = numbers(given).shape
+    shape = numbers(given, "array").shape
     known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
     return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
 
 
 def motion_of(values: Any, options: Options) -> Motion:
     """Read joints in space (T, J, 3), or configurations of a robot (T, nq), in the order of a layout."""
-    values = numbers(values)
+    values = numbers(values, "array")
     layout = load_layout(options.layout) if options.layout else None
     if values.ndim == 2 and values.shape[1] == 3 and layout is not None and layout.points:
         values = values[None]  # one posture
@@ -71,7 +57,7 @@ def key_points_of(values: Any, options: Options) -> Detections:
     InputError
         If the array has another shape, or it is not clear which points the points are.
     """
-    points = numbers(values)
+    points = numbers(values, "array")
     several = points[:, None] if points.ndim == 3 else points
     if several.ndim != 4 or several.shape[-1] not in (2, 3):
         expected = "key points (T, P, 2), or (T, P, 3) with confidences"

@@ -16,14 +16,6 @@ from posekit.skeleton import JOINT, JOINTS, LIMB_SHARES, SIDES
 
 #: Metres in each unit of length that a user or a file can state.
 METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-#: Words for units in files, in lower case.
-UNIT_WORDS: Final = {
-    **{name: name for name in METRES},
-    **{"meters": "m", "metres": "m", "meter": "m", "centimeters": "cm", "centimetres": "cm"},
-    **{"millimeters": "mm", "millimetres": "mm", "inches": "in", "inch": "in"},
-}
-#: Words for axes that point up, in lower case.
-UP_WORDS: Final = {**{axis: axis for axis in UP_AXES}, **{axis: f"+{axis}" for axis in "xyz"}}
 
 #: Statures of most recorded people: a body 67 units tall is in inches, not a toddler of 67 cm.
 USUAL_METRES: Final = (1.2, 2.2)

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal, shown
 from posekit.files import write_bytes
-from posekit.formats.body_checks import UNIT_WORDS, UP_WORDS, points_motion
+from posekit.formats.body_checks import points_motion
 from posekit.formats.options import Options
 from posekit.formats.trc import even_step, one_recording
-from posekit.geometry import Array
+from posekit.geometry import UNIT_WORDS, UP_WORDS, Array
 
 if TYPE_CHECKING:
     from posekit.motion import Motion

@@ -286,8 +286,6 @@ def _times(stated: Array, film: bool, options: Options) -> Array | None:
     """Return the times of all pictures (F,), interpolated for absent pictures; None if the file has no times."""
     known = np.isfinite(stated)
     if not known.any() or not film:
-        if film and options.rate is None and len(stated) > 1:
-            options.note("the frame rate is not known; give it with --rate")
         return None
     time = stated.copy()
     time[known] = seconds("timestamp", stated[known])

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from posekit.errors import refusal, shown
 from posekit.files import write_bytes
-from posekit.formats.body_checks import UNIT_WORDS, UP_WORDS, points_motion
+from posekit.formats.body_checks import points_motion
 from posekit.formats.layout import by_order, load_layout
 from posekit.formats.npz_file import packed
 from posekit.formats.options import Options
 from posekit.formats.robot_tables import time_and_rate
 from posekit.formats.tables import TIMES, Table, by_row, columns_of_points, csv_text, seconds
-from posekit.geometry import FARTHEST_COORDINATE, Array, Ints
+from posekit.geometry import FARTHEST_COORDINATE, UNIT_WORDS, UP_WORDS, Array, Ints
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 if TYPE_CHECKING:
@@ -113,14 +113,15 @@ def _shaped(values: Any, path: str, key: str) -> Array:
         points = np.where(points[..., 3:] > 0, points[..., :3], np.nan)
     if points.ndim != 3 or points.shape[2] != 3 or not len(points):
         near = ", ".join(layout.name for count in points.shape[1:] for layout in by_order(count))
-        expected = "(frames, points, 3)" + (f"; {near} have this number of points" if near else "")
-        flat = points.shape[-1:] == (2,)
-        remedy = "these are points in pictures: recover them" if flat else "name them with --layout"
-        raise refusal(path, key or "array", f"shape {points.shape}", expected, remedy)
+        expected = "(frames, points, 3) with a frame or more"
+        remedy = f"name the points with --layout{f', as {near}' if near else ''}"
+        if points.shape[-1:] == (2,):
+            remedy = "these are points in pictures: recover them"
+        elif points.shape[1:-1] == (3,):
+            remedy = "exchange the last two axes, as array.transpose(0, 2, 1) does"
+        raise refusal(path, key, f"shape {points.shape}", expected, remedy)
     if (np.abs(points) > FARTHEST_COORDINATE).any():
-        raise refusal(
-            path, key or "array", "a number too large", f"coordinates below {FARTHEST_COORDINATE:g}"
-        )
+        raise refusal(path, key, "a number too large", f"coordinates below {FARTHEST_COORDINATE:g}")
     return points
 
 

@@ -8,11 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-from posekit.errors import refusal, shown
+from posekit.errors import names_checked, refusal, shown
 from posekit.files import read_bytes
 from posekit.formats.node import undamaged
 from posekit.formats.options import Options
-from posekit.geometry import Array
+from posekit.geometry import Array, numbers
 
 CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     # container: "module:parse" of (data: bytes, source: str) -> plain document, and the endings of its files
@@ -98,6 +98,7 @@ def named(function: str) -> Callable[..., Any]:
     return found
 
 
+@names_checked
 def open(  # the door's name, as in `gzip.open`
     path: str | PathLike[str] | Array,
     layout: str = "",
@@ -145,9 +146,9 @@ def open(  # the door's name, as in `gzip.open`
     """
     options = Options(layout=layout, unit=unit or "", up=up or "", rate=rate, urdf=urdf, person=person)
     if not isinstance(path, str | PathLike):
-        from posekit.formats.arrays import key_points_of, motion_of, numbers
+        from posekit.formats.arrays import key_points_of, motion_of
 
-        points = numbers(path)
+        points = numbers(path, "", "array", "a path, an object or numbers")
         flat = points.ndim > 2 and points.shape[-1] == 2
         return key_points_of(points, options) if flat else motion_of(points, options)
     if suffix_of(Path(path)) == ".urdf":

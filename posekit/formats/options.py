@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 from posekit.errors import refusal, shown
-from posekit.geometry import UP_AXES
+from posekit.geometry import UNIT_WORDS, UP_AXES, UP_WORDS
 from posekit.settings import number
-
-#: Units of length of files.
-UNITS: Final = ("m", "cm", "mm", "in")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """Facts about a file that its user states; posekit finds the facts of empty fields in the file.
 
-    The unit and the axis may be in upper case, an axis without its sign is the positive one, and the rate may be text
-    such as ``"30 Hz"``.
+    Words such as ``"meters"``, ``"Y"`` and ``"y-up"`` are understood, and the rate may be text such as ``"30 Hz"``.
 
     Attributes
     ----------
@@ -53,14 +49,12 @@ class Options:
     warnings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        unit, up = str(self.unit).lower(), str(self.up).lower()
-        up = f"+{up}" if len(up) == 1 else up
-        if unit not in ("", *UNITS):
-            raise refusal("", "unit", shown(self.unit), "m, cm, mm or in", "state one of them")
-        if up not in ("", *UP_AXES):
-            raise refusal("", "up", shown(self.up), f"one of {', '.join(UP_AXES)}", "state one of them")
-        object.__setattr__(self, "unit", unit)
-        object.__setattr__(self, "up", up)
+        axes = f"one of {', '.join(UP_AXES)}"
+        for name, words, expected in (("unit", UNIT_WORDS, "m, cm, mm or in"), ("up", UP_WORDS, axes)):
+            given = getattr(self, name)
+            if given and str(given).lower() not in words:
+                raise refusal("", name, shown(given), expected, "state one of them")
+            object.__setattr__(self, name, words.get(str(given).lower(), ""))
         if self.rate is not None:
             rate = number(self.rate, "rate", "frames a second, above 0", "state another")
             if rate <= 0:

@@ -17,10 +17,17 @@ from posekit.formats.body_checks import METRES, times
 from posekit.formats.layout import Layout, by_order, load_layout
 from posekit.formats.options import Options
 from posekit.formats.tables import TIMES, Table, seconds
-from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, quaternion_rotate
+from posekit.geometry import (
+    Array,
+    coordinate_rotation,
+    median_lean,
+    quaternion_from_rotation,
+    quaternion_rotate,
+)
 from posekit.geometry.units import FARTHEST_COORDINATE
 from posekit.motion import Motion
 
+X, Y, Z = np.eye(3)
 ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
 COUNTS: Final = ("frame", "index", "frame#", "")
@@ -367,15 +374,9 @@ def root_quaternion(
     return both[order], _standing(both[order][known], up, options)
 
 
-def _lean(q: Array, axis: int = 2) -> float:
-    """Return the median angle between the robot's z axis and an axis of the world, degrees."""
-    z = quaternion_rotate(q, np.tile([0.0, 0.0, 1.0], (len(q), 1)))
-    return float(np.degrees(np.arccos(np.clip(np.median(z[:, axis]), -1, 1))))
-
-
 def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
     """Return the order of quaternions in which the robot stands or, if it stands in both, heads along its path."""
-    lean = {name: min(_lean(q), _lean(q, 1)) for name, q in both.items()}
+    lean = {name: min(median_lean(q, Z), median_lean(q, Y)) for name, q in both.items()}
     first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
     off = {name: _off_heading(q, place) for name, q in both.items()}
     ahead, other = sorted(off, key=lambda name: off[name])
@@ -407,11 +408,11 @@ def _off_heading(q: Array, place: Array) -> float:
 
 def _standing(q: Array, stated: str, options: Options) -> str:
     """Return the stated up axis, or the axis along which the robot stands in most frames; +z if it does not stand."""
-    for axis, name in ((2, "+z"), (1, "+y"), (0, "+x")):
-        if _lean(q, axis) < STANDING_DEGREES:
+    for axis, name in ((Z, "+z"), (Y, "+y"), (X, "+x")):
+        if median_lean(q, axis) < STANDING_DEGREES:
             if name != (stated or "+z"):
                 options.warn(f"the robot stands along {name}: this axis is up, or the robot lies (--up)")
             return stated or name
-    how = "upside down" if _lean(q) > 180 - STANDING_DEGREES else "lying"
+    how = "upside down" if median_lean(q, Z) > 180 - STANDING_DEGREES else "lying"
     options.warn(f"the robot is {how} in most frames: check the quaternion's order and the up axis")
     return stated or "+z"

@@ -32,6 +32,8 @@ WRITERS: Final[dict[str, dict[str, str]]] = {
     "Report": {f".{kind}": f"report_file:write_{kind}" for kind in ("json", "csv", "npz", "parquet", "md")},
     "dict": {f".{kind}": f"cameras_file:write_{kind}" for kind in ("toml", "json")},
 }
+#: Endings of pictures and pages, which `posekit.render` draws.
+DRAWN: Final = (".png", ".gif", ".mp4", ".html", ".svg", ".pdf")
 #: Formats of points or of the figure; a robot's configurations become points first.
 POINT_FORMATS: Final = (".trc", ".c3d", ".bvh", ".glb")
 
@@ -62,6 +64,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
     path = Path(path)
     suffix = suffix_of(path)
     kind = type(thing).__name__
+    refuse_ending(kind, path)
     if kind == "Recovery" and (which or suffix not in WRITERS[kind]):
         followed = thing.path
         thing = thing.motion(which or ("path" if followed is not None and len(followed) else "answer"))
@@ -72,14 +75,23 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
         )
     elif kind == "dict" and not all(isinstance(camera, PinholeCamera) for camera in thing.values()):
         raise refusal(path, "", "a dict", "cameras by name", "save a motion, view, result or report")
-    known = WRITERS.get(kind, {})
-    if suffix not in known:
-        expected = ", ".join(known) or "a motion, view, result or report"
-        got = f"the ending {shown(suffix)} for a {kind}"
-        raise refusal(path, "", got, f"one that is written: {expected}", "choose one of these")
     if kind == "Motion" and suffix in POINT_FORMATS and thing.joints is None and thing.document is None:
         thing = with_points(thing)
-    named(known[suffix])(path, thing, **options)
+    named(WRITERS[kind][suffix])(path, thing, **options)
+
+
+def refuse_ending(kind: str, path: Path) -> None:
+    """Refuse a name in whose format objects of a class are not written; a recovery can be written as motion."""
+    known = {**WRITERS.get(kind, {}), **(WRITERS["Motion"] if kind == "Recovery" else {})}
+    if suffix_of(path) not in known:
+        expected = ", ".join(known) or "a motion, view, result or report"
+        got = f"the ending {shown(suffix_of(path))} for a {kind}"
+        remedy = (
+            "write one of these, and draw it with posekit render"
+            if suffix_of(path) in DRAWN
+            else "choose one of these"
+        )
+        raise refusal(path, "", got, f"one that is written: {expected}", remedy)
 
 
 def with_points(motion: Motion) -> Motion:

@@ -18,10 +18,10 @@ import numpy as np
 
 from posekit.errors import refusal, shown
 from posekit.files import write_bytes
-from posekit.formats.body_checks import UNIT_WORDS, points_motion, times
+from posekit.formats.body_checks import points_motion, times
 from posekit.formats.options import Options
 from posekit.formats.tables import Table, checked, numbers
-from posekit.geometry import Array
+from posekit.geometry import UNIT_WORDS, Array
 
 if TYPE_CHECKING:
     from posekit.motion import Motion

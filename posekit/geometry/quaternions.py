@@ -14,6 +14,12 @@ def quaternion_rotate(q: Array, vectors: Array) -> Array:
     return np.asarray(vectors + w * twice + cross(axis, twice))
 
 
+def median_lean(q: Array, up: Array) -> float:
+    """Return the median angle between z, turned by unit quaternions (N, 4), and a unit vector up (3,), degrees."""
+    z = quaternion_rotate(q, np.tile([0.0, 0.0, 1.0], (len(q), 1)))
+    return float(np.degrees(np.arccos(np.clip(np.median(z @ up), -1, 1))))
+
+
 def quaternion_log(q: Array) -> Array:
     """Convert unit quaternions (..., 4) to rotation vectors (..., 3) with lengths of at most pi."""
     turned = shorter_quaternion(q)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from posekit.geometry.vectors import Array
+
+S = TypeVar("S", bound=np.generic)
 
 MAX_REPR_CHARACTERS: Final = 240
 MAX_TEXT_CHARACTERS: Final = 40
@@ -34,20 +36,22 @@ class Record:
 
     def _set(self, name: str, value: Any) -> None:
         """Set a field of the frozen instance during its construction; an array is made read-only."""
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False
-        object.__setattr__(self, name, value)
+        object.__setattr__(self, name, locked(value) if isinstance(value, np.ndarray) else value)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields to pickle; fields that are computed on first access are computed now."""
         return {name: getattr(self, name) for name in vars(self)}
 
 
+def locked(values: NDArray[S]) -> NDArray[S]:
+    """Make an array read-only and return it."""
+    values.flags.writeable = False
+    return values
+
+
 def read_only(values: ArrayLike) -> Array:
     """Return a read-only copy in double precision."""
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array
+    return locked(np.array(values, dtype=np.float64))
 
 
 def short(value: Any) -> str:

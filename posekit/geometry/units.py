@@ -15,8 +15,23 @@ PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 #: Largest accepted coordinate, metres or pixels.
 FARTHEST_COORDINATE: Final = 1e9
 
+#: Words for units of length, in lower case.
+UNIT_WORDS: Final = {
+    **{name: name for name in ("m", "cm", "mm", "in")},
+    **dict.fromkeys(("meters", "metres", "meter", "metre"), "m"),
+    **dict.fromkeys(("centimeters", "centimetres", "centimeter", "centimetre"), "cm"),
+    **dict.fromkeys(("millimeters", "millimetres", "millimeter", "millimetre"), "mm"),
+    **dict.fromkeys(("inches", "inch"), "in"),
+}
+
 #: Names of the axes that can point up; an unknown axis is the empty string.
 UP_AXES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+#: Words for axes that point up, in lower case.
+UP_WORDS: Final = {
+    **{axis: axis for axis in UP_AXES},
+    **{f"{axis}{up}": f"+{axis}" for axis in "xyz" for up in ("", "up", "-up", "_up", " up")},
+}
 
 
 def to_metres(values: ArrayLike, unit: str) -> Array:

@@ -1,14 +1,37 @@
-"""Products of vectors (..., K), and runs in boolean arrays."""
+"""Numbers of users, products of vectors (..., K), and runs in boolean arrays."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Array of double-precision numbers.
+from posekit.errors import refusal
+
+#: Numbers in double precision.
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Flags = NDArray[np.bool_]
+
+
+def numbers(
+    values: Any, source: str, field: str = "", expected: str = "numbers", remedy: str = "give an array"
+) -> Array:
+    """Return values in double precision; None is an unknown number, NaN.
+
+    Raises
+    ------
+    InputError
+        If they are not real numbers, or rows differ in length. The other arguments are those of `refusal`.
+    """
+    try:
+        found = np.asarray(values)
+        if found.dtype == object and found.ndim:
+            return np.asarray(values, dtype=np.float64)
+        return found.astype(np.float64, casting="same_kind", copy=False)
+    except (TypeError, ValueError):
+        raise refusal(source, field, f"a {type(values).__name__}", expected, remedy) from None
 
 
 def dot(a: Array, b: Array) -> Array:

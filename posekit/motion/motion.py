@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import InputError, refusal
-from posekit.geometry import UP_AXES, Array, Record, rotation_between, up_vector
+from posekit.errors import InputError, refusal, shown
+from posekit.geometry import UP_AXES, Array, Record, numbers, rotation_between, up_vector
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, NAMES
 
 PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
@@ -123,10 +123,7 @@ class Motion(Record):
         """Store a read-only copy of an array after checking its shape; None stays None."""
         if given is None:
             return
-        try:
-            values = np.array(given, dtype=dtype)
-        except (TypeError, ValueError) as error:
-            raise self._refused(name, str(error), "numbers", "give one row a frame") from None
+        values = numbers(given, self.source or "motion", name, remedy="give one row a frame")
         fits = values.ndim == len(shape) and all(
             want in (None, have) for want, have in zip(shape, values.shape, strict=False)
         )
@@ -134,10 +131,12 @@ class Motion(Record):
             wanted = " x ".join("any" if extent is None else str(extent) for extent in shape)
             got = " x ".join(map(str, values.shape))
             raise self._refused(name, f"shape {got}", f"shape {wanted}", "give one row a frame")
-        if np.isinf(values).any():
-            where = tuple(int(index) for index in np.argwhere(np.isinf(values))[0])
-            raise self._refused(f"{name}{list(where)}", "an infinite number", "a finite number or NaN")
-        self._set(name, values)
+        if (wrong := np.isinf(values) if dtype is np.float64 else ~np.isfinite(values)).any():
+            where = [int(index) for index in np.argwhere(wrong)[0]]
+            raise self._refused(
+                f"{name}{where}", shown(float(values[*where])), "a finite number", "correct it"
+            )
+        self._set(name, values.astype(dtype))
 
     def _counted(self) -> NDArray[np.intp]:
         """Count the rows of each recording from 0."""

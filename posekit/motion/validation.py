@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import LengthUncertainty, load_figure
-from posekit.errors import InputError, refusal
+from posekit.errors import InputError, names_checked, refusal
 from posekit.formats.options import facts_of
 from posekit.inputs import are_paths, files_of, kind_of, names_below, new_folder
 from posekit.motion.motion import Motion
@@ -34,6 +34,7 @@ MOST_NAMED: Final = 3
 ROUNDING_SECONDS: Final = 1e-6
 
 
+@names_checked
 def validate(
     given: Any,
     settings: ValidateSettings | None = None,
@@ -154,10 +155,12 @@ class Judge:
         changes |= {"frame": frame, "time": frame / rate} if rate else {}
         return replace(motion, **changes) if changes else motion
 
-    def report(self, given: Motion | Recovery) -> Report:
+    def report(self, given: Any) -> Report:
         """Judge a motion, or the survivors of a result."""
-        if not isinstance(given, Motion):
+        if hasattr(given, "survivors"):
             return self._of_recovery(given)
+        if not isinstance(given, Motion):
+            raise refusal("", "array", kind_of(given), "postures or motion", "recover postures first")
         validator = self.validator(given.robot)
         if given.joints is None or (validator.figure is None and given.q is not None):
             given = in_order(given, validator)
@@ -184,8 +187,6 @@ class Judge:
                 part = replace(motion.take(rows), q=None, q_names=(), robot="")
                 tolerance = Tolerance(**allowed) if allowed else EXACT
                 reports.append(validate_motion(part, asked, figure=body, tolerance=tolerance))
-        if not reports:
-            raise refusal(recovery.source or "result", "", "no posture", "at least one", "recover again")
         return reports[0] if len(reports) == 1 else joined(reports)
 
 

@@ -368,8 +368,9 @@ class Recovery(Record):
         Raises
         ------
         InputError
-            If ``path`` is asked for and nothing was followed, or `which` is none of these.
+            If ``path`` is asked for and nothing was followed, `which` is none of these, or no frame has a posture.
         """
+        self.refuse_empty()
         table, starts, time = self.survivors, self._starts, self.frames.time
         chosen = {
             "answer": self.answer.survivor,
@@ -379,8 +380,7 @@ class Recovery(Record):
         shared: dict[str, Any] = {"up": "-y", "source": self.source, "unit": self.unit}
         if which == "path":
             if self.path is None or not len(self.path):
-                got = "no followed path"
-                raise refusal(self.source, "path", got, "a result of a film", "recover with follow")
+                raise refusal(self.source, "", "no followed path", "one", "recover with follow")
             return Motion(joints=self.path.joints[0], time=time, **shared)
         if which not in chosen:
             expected = "answer, path, all or first"
@@ -401,6 +401,12 @@ class Recovery(Record):
             frame=frame,
             **shared,
         )
+
+    def refuse_empty(self) -> None:
+        """Raise an `InputError` with the first frame's reason if no frame has a posture."""
+        if not len(self.survivors):
+            why = next(filter(None, self.frames.reason), "none passes the checks")
+            raise refusal(self.source or "result", "", f"no posture: {why}", "one", "see recover --explain")
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the result: ``.json``, ``.json.gz``, ``.npz`` or ``.parquet``."""

@@ -20,13 +20,7 @@ from posekit.skeleton import JOINT, JOINTS, LIMB_SEGMENTS, segment_name
 from posekit.validators.body import LIMB_ROWS, Body, once
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.jumps import LEAST_JUMP, jumps_of
-from posekit.validators.motion.sides import (
-    LEFT_JOINTS,
-    RIGHT_JOINTS,
-    SIDE_PAIRS,
-    exchanged_pairs,
-    put_right,
-)
+from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS, SIDE_PAIRS, exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, median_of_five, timeline_of
 from posekit.validators.motion.trembling import trembling_frames, trembling_of, usual_trembling
 

@@ -229,7 +229,7 @@ def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
     """Stand bodies on z = 0 with the first known point over x = y = 0; return them and the displacement (3,)."""
     low = [float(np.nanmin(one[:1, :, 2])) for one in bodies if np.isfinite(one[:1, :, 2]).any()]
     if not low:
-        raise refusal("render", "", "no posture in any frame", "at least one", "see recover --explain")
+        raise refusal("render", "", "no known joint in any frame", "at least one", "give a known posture")
     first = next(one for one in bodies if np.isfinite(one).any())
     shift = np.array([*-np.nanmean(first[0], axis=0)[:2], SOLE - float(np.quantile(low, LOW_SHARE))])
     return [one + shift for one in bodies], shift

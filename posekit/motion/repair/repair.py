@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.errors import InputError, refusal
+from posekit.errors import InputError, names_checked, refusal
 from posekit.files import write_bytes
 from posekit.formats.bvh import Bvh
 from posekit.formats.options import Options, facts_of
@@ -99,6 +99,7 @@ def _same_format(motion: Motion, path: Path) -> bool:
     return source.is_file() and source.suffix.lower() == path.suffix.lower()
 
 
+@names_checked
 def repair(
     source: Any,
     target: str | PathLike[str] | None = None,
