@@ -196,6 +196,13 @@ class BentElbow:
         return np.maximum(40.0 - self.angle(joints), 0.0) / 0.5
 
 
+class Impossible(BentElbow):
+    """No elbow is as this check requires."""
+
+    def judge(self, body: Any) -> posekit.Judgement:
+        return posekit.Judgement(("right_elbow",), self.angle(body.joints), lower=200.0)
+
+
 def test_an_own_check_with_residuals_pulls_noisy_postures(folder: Path) -> None:
     from posekit.synthesis import mocap_view, with_noise
 
@@ -332,3 +339,134 @@ def test_files_without_a_suffix_are_no_clips(folder: Path, tmp_path: Path) -> No
     (tmp_path / "walk.npz").write_bytes((folder / "walk.npz").read_bytes())
     (tmp_path / "README").touch()
     assert posekit.validate(tmp_path).decision == "keep 1 of 1 clip"
+
+
+@pytest.mark.parametrize(
+    ("call", "wrong", "meant"),
+    [
+        (posekit.validate, "fps", "rate"),
+        (posekit.repair, "check", "checks"),
+        (posekit.recover, "fov_deg", "fov"),
+        (posekit.recover, "height", "stature"),
+        (posekit.render, "resolution", "size"),
+        (posekit.convert, "units", "unit"),
+        (posekit.open, "skeleton", "layout"),
+        (posekit.Validator, "robot", "urdf"),
+        (posekit.assert_valid, "limits", "ranges"),
+        (posekit.Tracker, "intrinsics", "camera"),
+    ],
+)
+def test_an_unknown_argument_is_refused_with_the_one_that_is_meant(call: Any, wrong: str, meant: str) -> None:
+    with pytest.raises(posekit.InputError, match=rf"{wrong}: .*did you mean {meant}\?"):
+        call(STANDING, **{wrong: 1})
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "exact"),
+    [
+        ("unit", ("meters", "Metres", "metre"), "m"),
+        ("unit", ("inches", "inch"), "in"),
+        ("unit", ("centimetres", "CM"), "cm"),
+        ("up", ("y-up", "Y_UP", "yup", "y"), "+y"),
+    ],
+)
+def test_words_for_units_and_axes_are_understood(name: str, words: tuple[str, ...], exact: str) -> None:
+    factor = {"in": 1 / 0.0254, "cm": 100.0}.get(exact, 1.0)
+    found = posekit.open(STANDING * factor, "posekit_14", **{name: exact})
+    for word in words:
+        same = posekit.open(STANDING * factor, "posekit_14", **{name: word})
+        assert (same.unit, same.up, same.notes) == (found.unit, found.up, found.notes)
+        np.testing.assert_array_equal(same.joints, found.joints)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1.75 metres", 1.75), ("70 Inches", 1.778), ("6 feet", 1.8288), ("30 hertz", 30.0), ("2 PIXELS", 2.0)],
+)
+def test_quantities_may_have_words_for_their_unit(text: str, value: float) -> None:
+    assert number(text, "quantity") == pytest.approx(value, abs=1e-12)
+
+
+def test_an_array_in_another_order_of_axes_is_refused_with_the_order() -> None:
+    for wrong in (np.zeros((50, 3, 22)), np.zeros((50, 3, 14))):
+        with pytest.raises(posekit.InputError, match=r"\(frames, points, 3\).*transpose\(0, 2, 1\)"):
+            posekit.validate(wrong)
+    for empty in (np.zeros((0, 22, 3)), np.zeros((0, 14, 3))):
+        with pytest.raises(posekit.InputError, match=r"a frame or more|no frame"):
+            posekit.validate(empty, rate=30)
+    with pytest.raises(posekit.InputError, match="key points; expected postures or motion"):
+        posekit.validate(np.zeros((50, 17, 2)), layout="coco_17")
+
+
+def test_none_is_an_unknown_number_through_every_door() -> None:
+    gap = STANDING.tolist()
+    gap[3][6] = [None, None, None]
+    same = STANDING.copy()
+    same[3, 6] = np.nan
+    assert np.array_equal(posekit.validate(gap, rate=30).verdicts, posekit.validate(same, rate=30).verdicts)
+    assert np.isnan(posekit.Motion(joints=gap).joints[3, 6]).all()
+    assert posekit.Tracker(size="1280x720").update([[None, None]] * 14, 0.0).survivors == 0
+
+
+def test_the_usual_checks_and_one_more() -> None:
+    usual = posekit.validate(STANDING, rate=30, up="+z")
+    more = posekit.validate(STANDING, rate=30, up="+z", checks=["usual", BentElbow()])
+    assert [name for name in more.checks if name != "bent-elbow"] == list(usual.checks)
+    assert "bent-elbow" in more.checks
+    assert posekit.Validator(checks="usual, collision").check(STANDING[0]).checks == (
+        *("rigid-parts", "joint-range", "collision"),
+    )
+
+
+def test_quaternions_of_another_order_are_a_doubt_about_a_batch() -> None:
+    validator, angle = posekit.Validator("g1"), np.linspace(-0.4, 0.4, 20)
+    q = np.tile(validator.robot.neutral, (20, 1))
+    q[:, 5], q[:, 6] = np.sin(angle), np.cos(angle)
+    other = q[:, [0, 1, 2, 6, 3, 4, 5, *range(7, q.shape[1])]]
+    assert not validator.check(q).warnings
+    assert "w, x, y, z" in validator.check(other).warnings[0]
+    assert not validator.check(other[:1]).warnings  # one posture is just another orientation
+    posekit.assert_valid(q, "g1")
+    with pytest.warns(UserWarning, match="w, x, y, z"):
+        posekit.assert_valid(other, "g1")
+    # The model `human` stands along y.
+    assert not posekit.validate(STANDING, up="+z", urdf="human").warnings
+
+
+def test_a_robot_that_is_fitted_to_people_is_named(folder: Path) -> None:
+    report = posekit.validate([folder / "jump.bvh", folder / "robot.npz"], urdf="g1")
+    assert [note for note in report.notes if "is fitted to these positions" in note] == [
+        "jump.bvh: g1 is fitted to these positions; judge people without --urdf"
+    ]
+
+
+def test_random_points_are_not_repairable() -> None:
+    points = np.random.default_rng(0).normal(size=(60, 14, 3))
+    clip = posekit.validate(points, rate=30, up="+z").clips[0]
+    assert clip.decision == "drop" and clip.invalid == 60
+
+
+def test_a_report_is_read_only_and_has_a_table_of_clips(folder: Path) -> None:
+    report = posekit.validate([folder / "jump.bvh", folder / "walk.npz"])
+    for values in (report.ok, report.worst, report.margins, report.frame, report.findings["value"]):
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 0
+    clips = report.to_pandas(clips=True)
+    assert clips["decision"].tolist() == ["repair?", "keep"]
+    assert clips["reason"].tolist() == ["teleport", ""]
+    assert clips["frames"].tolist() == [90, 90]
+
+
+def test_key_points_are_drawn_as_the_postures_behind_them(folder: Path, tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="30 pictures a second are assumed"):
+        posekit.render(folder / "keypoints", tmp_path / "page.html")
+    assert (tmp_path / "page.html").stat().st_size > 10_000
+
+
+def test_an_empty_result_is_not_drawn_or_converted_but_says_why(tmp_path: Path) -> None:
+    none = posekit.recover(posekit.builtin_view("seq1"), checks=[Impossible()])
+    for target in ("x.html", "x.png", "x.trc", "x.bvh"):
+        door = posekit.render if target.endswith(("html", "png")) else posekit.convert
+        with pytest.raises(posekit.InputError, match=r"no posture: \w+"):
+            door(none, tmp_path / target)
+    assert not list(tmp_path.iterdir())

@@ -36,14 +36,16 @@ LESS_LEAN_DEGREES: Final = 30.0
 
 
 def order_doubts(body: Body) -> list[str]:
-    """Return a warning if a robot stands when its quaternions are read as w, x, y, z, and not as they are.
+    """Return a warning if a humanoid stands when its quaternions are read as w, x, y, z, and not as they are.
 
     One posture shows nothing: any quaternion is the orientation of some body.
     """
-    if body.q is None or body.robot is None or len(body) < 2 or not body.robot.free_flyer:
+    robot, up = body.robot, np.eye(3)[2] if body.up is None else body.up
+    known = np.empty((0, 4)) if body.q is None else body.q[np.isfinite(body.q).all(axis=1), 3:7]
+    if robot is None or len(known) < 2 or not robot.free_flyer or not robot.joint_map:
         return []
-    known, up = body.q[np.isfinite(body.q).all(axis=1), 3:7], np.eye(3)[2] if body.up is None else body.up
-    lean, other = (median_lean(q, up) if len(q) else 0.0 for q in (known, known[:, [1, 2, 3, 0]]))
+    neck, pelvis = robot.points(robot.neutral[None])[0, [JOINT["neck"], JOINT["pelvis"]]]
+    lean, other = (median_lean(q, up, unit(neck - pelvis)) for q in (known, known[:, [1, 2, 3, 0]]))
     said = (
         f"The robot leans by {lean:.0f} degrees, and by {other:.0f} if its quaternions are w, x, y, z: check"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from posekit.geometry.vectors import Array, cross
 
@@ -14,10 +15,10 @@ def quaternion_rotate(q: Array, vectors: Array) -> Array:
     return np.asarray(vectors + w * twice + cross(axis, twice))
 
 
-def median_lean(q: Array, up: Array) -> float:
-    """Return the median angle between z, turned by unit quaternions (N, 4), and a unit vector up (3,), degrees."""
-    z = quaternion_rotate(q, np.tile([0.0, 0.0, 1.0], (len(q), 1)))
-    return float(np.degrees(np.arccos(np.clip(np.median(z @ up), -1, 1))))
+def median_lean(q: Array, up: Array, axis: ArrayLike = (0.0, 0.0, 1.0)) -> float:
+    """Return the median angle between an axis (3,) turned by unit quaternions (N, 4) and a unit vector up, degrees."""
+    turned = quaternion_rotate(q, np.tile(axis, (len(q), 1)))
+    return float(np.degrees(np.arccos(np.clip(np.median(turned @ up), -1, 1))))
 
 
 def quaternion_log(q: Array) -> Array:
