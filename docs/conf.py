@@ -1,19 +1,15 @@
 import sys
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed_version
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extension and the tables of this folder
 
 import tables
 
+from posekit import __version__ as release
+
 project = "posekit"
 author = "posekit developers"
 copyright = "2026, posekit developers"
-try:
-    release = installed_version("posekit")
-except PackageNotFoundError:
-    release = ""
 
 # No intersphinx and no MathJax: the documentation is built and read without a network.
 extensions = [
@@ -41,7 +37,7 @@ python_maximum_signature_line_length = 90
 suppress_warnings = ["ref.python"]
 
 html_theme = "furo"
-html_title = f"posekit {release}".strip()
+html_title = f"posekit {release}"
 
 
 def setup(app):
