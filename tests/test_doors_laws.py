@@ -58,3 +58,14 @@ def test_what_users_hold_is_printed_in_one_line() -> None:
     for one in (found, found[0], found.survivors, posekit.load_figure(), posekit.Validator()):
         assert "\n" not in repr(one) and len(repr(one)) < 300
     assert f"joints=({len(found.survivors)}, 14, 3)" in repr(found.survivors)
+
+
+def test_findings_name_the_row_of_a_batch_of_postures() -> None:
+    joints = np.repeat(posekit.load_figure().neutral_points[None, :14], 5, axis=0).copy()
+    joints[3, 8, 2] += 0.3
+    g1 = posekit.Validator("g1")
+    q = np.tile(g1.robot.neutral, (5, 1))
+    q[3, -1] = 9.0
+    for report in (posekit.validate(joints), posekit.Validator().check(joints), g1.check(q)):
+        assert set(report.table()["frame"]) == {3} == set(np.flatnonzero(~report.ok))
+        assert "frame 3" in report.summary()

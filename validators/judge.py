@@ -296,9 +296,10 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
         for name, column in zip((*WHOLE, *NUMBERS), cells, strict=True)
     }
     known = body.joints if body.q is None else body.q
+    batch = not motion.in_time and np.isnan(np.asarray(motion.time)).all()  # its frames are its rows
     return Report(
         clip=np.zeros(count, dtype=np.intp),
-        frame=np.asarray(motion.frame),
+        frame=np.arange(count) if batch else np.asarray(motion.frame),
         time=np.asarray(motion.time),
         files=(motion.source,),
         names=(name,),
