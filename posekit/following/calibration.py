@@ -24,7 +24,7 @@ SEEN_LONG: Final = 2.5
 
 
 def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] | None) -> None:
-    """Refuse a calibration of pictures of another size, or in another unit than pixels.
+    """Refuse a calibration that was made for pictures of another size, or whose unit is not pixels.
 
     Parameters
     ----------
@@ -50,16 +50,16 @@ def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] |
 
 
 def contradictions(camera: CameraModel, points: Array) -> list[str]:
-    """Describe contradictions: a person who is not upright by the calibration, or upside down in the picture.
+    """Describe contradictions: by the calibration the person is not upright, or in the picture upside down.
 
-    The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. A
-    calibration that is camera-to-world, has y up in the camera, or another up axis turns that direction.
+    The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. The two
+    directions differ if the calibration maps camera to world, has y up in the camera, or states another up axis.
 
     Parameters
     ----------
     camera : CameraModel
     points : array (F, 19, 2)
-        One person's, pixels, y down.
+        Points of one person, pixels, y down.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""`Detections`: key points of people over the pictures of one camera, and the view of one of them."""
+"""`Detections`: key points of people in the pictures of one camera; `Detections.view` is the view of one person."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Detections(Record):
     notes, warnings : tuple of str
         Assumptions made while reading, and contradictions that a user must see.
     derived : tuple of str
-        Joints that the detector does not have: they were placed between others.
+        Joints that the detector does not report: they were placed between joints that it reports.
 
     Raises
     ------
@@ -131,9 +131,9 @@ class Detections(Record):
         return len(self.frame)
 
     def people(self) -> Ints:
-        """Return the number of each row's person (N,): the file's own, or that of `posekit.following.tracking.track`.
+        """Return the number of the person in each row (N,): the file's, or that of `posekit.following.tracking`.
 
-        In unrelated photographs every row is another person.
+        In unrelated photographs each row counts as a different person.
         """
         person = np.array(self.person)
         unknown = np.flatnonzero(person < 0)
@@ -154,7 +154,7 @@ class Detections(Record):
             pictures, summed over them; ``surest``: with the largest sum of confidences; ``first``: the first in the
             first picture. In unrelated photographs a rule chooses in each picture.
         camera : str
-            Name of the camera, whose number chooses among the cameras of one file.
+            Name of the camera; the number in it selects the camera in a file of several cameras.
 
         Raises
         ------
@@ -204,8 +204,8 @@ class Detections(Record):
     ) -> View:
         """Make the view of one person.
 
-        A contradiction between the person and the calibration is a warning. Points that a tracker put outside the
-        picture with little confidence are not seen.
+        A contradiction between the person and the calibration is a warning. Points outside the picture with little
+        confidence count as not seen.
 
         Parameters
         ----------

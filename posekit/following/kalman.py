@@ -1,8 +1,8 @@
-"""Filter of joints that move with a random acceleration (Kalman 1960), and its smoother.
+"""Kalman filter of joints with random acceleration (Kalman 1960), and the smoother of the filter.
 
 A joint's state is its position and velocity. Its acceleration is white noise of spectral density q, and its position is
-measured with a covariance (R. E. Kalman 1960, J. Basic Eng. 82:35-45, eqs. 21 to 25). Smoothing goes back over the
-filtered frames (Rauch, Tung & Striebel 1965, AIAA J. 3:1445): frames that are passed over are interpolated.
+measured with a covariance (R. E. Kalman 1960, J. Basic Eng. 82:35-45, eqs. 21 to 25). The smoother passes backward over
+the filtered frames (Rauch, Tung & Striebel 1965, AIAA J. 3:1445). Skipped frames are interpolated.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Moving(NamedTuple):
 
 
 def steps(seconds: float) -> tuple[Array, Array]:
-    """Return the transition matrix over a time, and the covariance that an acceleration of density one adds."""
+    """Return the transition matrix over a time in seconds, and the covariance that a unit density adds."""
     one, t = np.eye(3), seconds
     noise = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
     return np.kron(np.array([[1.0, t], [0.0, 1.0]]), one), np.kron(noise, one)

@@ -18,7 +18,7 @@ DECIMALS: Final = 6
 
 
 def answers(stream: IO[bytes], tracker: Tracker, *, keep_going: bool = False) -> Iterator[str]:
-    """Answer the pictures of a stream, each before the next is read.
+    """Yield one answer for each picture of a stream, before the next picture is read.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def answers(stream: IO[bytes], tracker: Tracker, *, keep_going: bool = False) ->
         with points by name.
     tracker : Tracker
     keep_going : bool
-        Answer a line that cannot be read with ``{"error": …}`` and go on.
+        Whether a line that cannot be read is answered by ``{"error": …}``; otherwise it ends the stream.
 
     Raises
     ------

@@ -1,10 +1,11 @@
-"""Most probable paths of one person through the frames of a sequence; a path takes one survivor of each frame.
+"""Most probable paths of one person through the frames of a sequence. A path contains one survivor of each frame.
 
-The state at the last frame of every path is the body's position and velocity. It continues to every survivor of the
-next frame, or skips the frame. While there are few paths, all are kept, and the cheapest is exact. If several paths end
-in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973, Proc. IEEE 61:268-278) with a
-filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364). Sums over all paths give the
-probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18 to 27).
+Each path has a state: position and velocity of the body in the last frame. A path is extended by every survivor of the
+next frame, and once by skipping that frame. While there are few paths, all are kept, and the cheapest path is the exact
+minimum. If several paths end in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973,
+Proc. IEEE 61:268-278) with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364).
+Sums over all paths give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18
+to 27).
 """
 
 from __future__ import annotations
@@ -86,14 +87,14 @@ class Candidates(NamedTuple):
     cost: Array
 
     def at(self, survivor: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return joints and covariances of survivors (S,); -1 passes the frame over and has unknown joints."""
+        """Return joints and covariances of survivors (S,); the index -1 skips the frame and has unknown joints."""
         joints = np.concatenate([self.joints, np.full((1, *self.joints.shape[1:]), np.nan)])
         covariance = np.concatenate([self.covariance, np.zeros((1, *self.covariance.shape[1:]))])
         return joints[survivor], covariance[survivor]
 
 
 class Stage(NamedTuple):
-    """The S ends of paths after a frame, from the P before it.
+    """The S ends of paths after a frame; the paths come from P ends after the frame before.
 
     Attributes
     ----------
@@ -161,7 +162,7 @@ class Trellis:
         at : int
             A frame.
         among : bool array (S,), optional
-            Ends of that frame that paths may pass through; all by default.
+            Ends of that frame through which paths may pass; all by default.
         """
         forward = [stage.forward for stage in self.stages]
         if among is not None:
@@ -194,7 +195,7 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
     Parameters
     ----------
     ends, led : Moving
-        State at the last frame, and predicted for this one.
+        State at the last frame, and the state predicted for this frame.
     joints, covariance : array (N, 14, 3), (N, 14, 3, 3)
     """
     known = np.isfinite(joints).all(axis=2)
@@ -223,7 +224,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
 
     The first path is the expected posture of each frame given all frames, smoothed and laid onto the person's lengths.
     Each further path is the most probable one that passes, in one frame, through a survivor with a joint at least 25 cm
-    from all earlier paths. In an uncalibrated view postures move about their neck.
+    from all earlier paths. In an uncalibrated view, positions are relative to the neck.
 
     Parameters
     ----------
@@ -296,8 +297,9 @@ def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> t
     """Return the survivor nearest to the expected posture, that posture, and its covariance.
 
     The expected posture is the mean of all survivors, weighted by their probabilities given all frames; it has the
-    least expected squared error. Its covariance has the survivors' own and their spread. Of exact survivors the one
-    nearest to the mean is returned. If the path more probably skips the frame, the survivor is -1 and the posture NaN.
+    least expected squared error. Its covariance is the mean covariance of the survivors plus their scatter. For exact
+    survivors, the survivor nearest to the mean is returned as the posture. If the path more probably skips the frame,
+    the survivor is -1 and the posture NaN.
     """
     rows = np.flatnonzero(at >= 0)
     weight, at = share[rows], at[rows]
@@ -320,7 +322,7 @@ def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> t
 
 
 def _likeliest(own: Array) -> NDArray[np.intp]:
-    """Choose the survivors of least cost (N,) that hold `COVERAGE`, with ties; at most `MAX_SURVIVORS`."""
+    """Choose the cheapest survivors with a total probability of `COVERAGE`, including ties; at most `MAX_SURVIVORS`."""
     order = np.argsort(own, kind="stable")
     order = order[np.isfinite(own[order])]
     if not len(order):
@@ -332,7 +334,7 @@ def _likeliest(own: Array) -> NDArray[np.intp]:
 
 
 def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Choose the steps (S, N + 1) that become new ends: their starts, their targets, and the number of the new end."""
+    """Choose the steps (S, N + 1) to keep: return the start and target of each, and the number of its new end."""
     near = total <= total.min() + SLACK
     most = max(1, WIDTH // total.shape[1]) if near.sum() > WIDTH else len(total)
     masked = np.where(near, total, np.inf)
@@ -346,7 +348,7 @@ def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.
 
 
 def _usual_step(covariance: Array, known: NDArray[np.bool_]) -> float:
-    """Return the average cost of a step between two survivors with the noise of one (14, 3, 3)."""
+    """Return the average cost of a step between two survivors that have the covariance (14, 3, 3)."""
     scale = DENSITY * USUAL_INTERVAL**3 / 3
     # The variance of a predicted place is about twice the acceleration's own where points are exact.
     wide = np.log(np.linalg.det(2.0 * (np.eye(3) + covariance / scale[:, None, None])))
@@ -377,7 +379,7 @@ def _elsewhere(
     marginals: Sequence[Array],
     found: Sequence[Array],
 ) -> tuple[int, NDArray[np.bool_], float] | None:
-    """Find the most probable place off the paths found so far: frame, ends there, odds against the first path."""
+    """Find the frame and the ends in it that are most probable among those far from all paths found so far."""
     best, at = LEAST_SHARE, -1
     places: list[Array] = []
     away: list[NDArray[np.bool_]] = []
@@ -397,5 +399,5 @@ def _elsewhere(
 
 
 def _apart(joints: Array, other: Array) -> Array:
-    """Return the distance (N,) of the farthest joint of postures from another's."""
+    """Return the largest distance (N,) of a joint between each posture and another posture."""
     return np.asarray(np.fmax.reduce(np.linalg.norm(joints - other, axis=-1), axis=1, initial=0.0))

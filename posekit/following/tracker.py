@@ -1,4 +1,4 @@
-"""`Tracker`: takes the key points of one picture; returns its posture, and the path up to some pictures before."""
+"""`Tracker`: takes the key points of one picture at a time, and returns its posture and an earlier one on the path."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DEFAULT_LAG: Final = 5
 
 
 class PathPosture(NamedTuple):
-    """One picture on the likeliest path, as known `lag` pictures later.
+    """The posture of one picture on the likeliest path, computed when `lag` further pictures are known.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class PathPosture(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TrackedPosture(Record):
-    """The answer about a picture, given the pictures so far.
+    """The answer about one picture, computed from the pictures so far.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ class Tracker:
         time : float
             Seconds, more than at the last call.
         root : array (3,), optional
-            The neck, camera frame, metres, if it is known otherwise.
+            Position of the neck, camera frame, metres, if it is known from another source.
 
         Raises
         ------

@@ -1,13 +1,13 @@
-r"""Tracking: which detections of successive pictures are one person.
+r"""Tracking: find the detections in successive pictures that show the same person.
 
-Detections are compared by COCO's object keypoint similarity, widened for motion:
+Detections are compared by COCO's object keypoint similarity with a larger deviation for motion:
 
 .. math:: s(a, b) = \frac1n \sum_i \exp\left(-\frac{d_i^2}{2 A (k_i^2 + m^2 g^2)}\right)
 
-over the n points that both have, with d_i their distance in the picture, A the person's area, k_i twice COCO's
-standard deviation of the point (cocodataset.org, "Keypoint Evaluation", 1.2; numbers as in pycocotools,
-``cocoeval.Params.setKpParams``), and m the allowed motion a picture, g pictures apart. Matching poses of successive
-pictures by it is Xiao, Wu & Wei 2018 (Simple baselines for human pose estimation and tracking, §3).
+over the n points that both have, with d_i their distance in the picture, A the person's area, k_i twice COCO's standard
+deviation of the point (cocodataset.org, "Keypoint Evaluation", 1.2; numbers as in pycocotools,
+``cocoeval.Params.setKpParams``), and m the allowed motion a picture, g pictures apart. Xiao, Wu & Wei 2018 (Simple
+baselines for human pose estimation and tracking, §3) match the poses of successive pictures by this similarity.
 """
 
 from __future__ import annotations
@@ -66,11 +66,11 @@ VIDEO_RATE: Final = 30.0
 
 
 def track(points: Array, frame: Ints, source: str = "", times: Array | None = None) -> Ints:
-    """Assign numbers to people along the pictures of a film.
+    """Number the people in the pictures of a film, so that a person has the same number in all pictures.
 
-    Each detection is compared with the predicted places of the people of earlier pictures (the last place, moved on at
-    the last velocity), and the assignment with the largest sum of similarities is taken. One detection a picture is one
-    person if people move farther between pictures than in a video.
+    Each detection is compared with the predicted positions of the people of earlier pictures (the last position, moved
+    by the last velocity). The assignment with the largest sum of similarities is used. If every picture has one
+    detection and it moves farther than people do in a video, all detections are one person.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Configurations of a robot, within its limits, that place its points as in a posture."""
+"""Configurations of a robot, within its limits, whose points lie where a posture has them."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def configurations_of(
 
 
 def laid(points: Array, target: Array) -> tuple[Array, Array]:
-    """Fit points (..., P, 3) to a target (P, 3); return the remaining offsets (..., P, 3) and the rotations."""
+    """Fit points (..., P, 3) rigidly to a target (P, 3); return the remaining offsets (..., P, 3) and the rotations."""
     centred = points - points.mean(axis=-2, keepdims=True)
     goal = target - target.mean(axis=0)
     R, _ = best_rotation(np.einsum("pi,...pj->...ij", goal, centred))

@@ -120,7 +120,8 @@ class LinkageFamily(Record):
 
         Notes
         -----
-        The depths around a loop that does not close are averaged; its segments then differ a little from their lengths.
+        If the depths around a loop are inconsistent, they are averaged; the segments of the loop then differ a little
+        from their lengths.
         """
         signed = np.where(self.seen, np.asarray(flips, dtype=np.float64) * self.foreshortening(s), 0.0)
         return self.placed(s, np.where(self.incidence.placed, signed @ self.incidence.depth.T, np.nan))
@@ -164,7 +165,7 @@ class Incidence(Record):
     depth : array (N, S)
         Rows of B: the depth of each node relative to the first node of its piece; loops that do not close are averaged.
     tree : array (N, S)
-        T, the same from the segments of the basis alone.
+        Rows of T: the depth of each node, computed from the segments of the basis alone.
     basis : int array (K,)
         Segments that span the object; each of the other segments closes a loop.
     loops : array (L, S)
@@ -236,7 +237,8 @@ def with_depth(place: Array, depth: Array) -> Array:
 def off_flat(points: Array, rank: int) -> Array:
     """Return the distances (..., N, 3 - rank) of points (..., N, 3) from their best plane (rank 2) or line (rank 1).
 
-    The plane is fitted to the real parts of complex points: at the best plane, its own derivative does not matter.
+    The plane is fitted to the real parts of complex points, because at the best plane the derivative of the plane has
+    no effect.
     """
     centred = points - points.mean(axis=-2, keepdims=True)
     _, axes = np.linalg.eigh(np.swapaxes(centred.real, -1, -2) @ centred.real)

@@ -64,7 +64,7 @@ def grow_best(
     given: Tolerance | None,
     about: dict[str, Any],
 ) -> tuple[Array, Array, Array]:
-    """Grow one frame with the exact tolerance; if no posture is left or nothing shows exactness, with the measured one.
+    """Grow the tree of one frame with the exact tolerance, and if the points are not exact, with the measured one.
 
     Returns
     -------
@@ -168,7 +168,7 @@ def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: To
 
 
 def _gap(extent: float, length: float, beside: float, off: float, depths: Array) -> Array:
-    """Return by how much (N,) a closing segment is too long or too short, whatever the errors of its ends."""
+    """Return the least error (N,) of a closing segment's length that errors of its end points do not explain."""
     depth = np.abs(depths[:, 0])
     far = np.hypot(extent + beside, depth + off)
     near = np.hypot(max(extent - beside, 0.0), np.maximum(depth - off, 0.0))

@@ -59,7 +59,8 @@ class Linkage(Record):
     Raises
     ------
     InputError
-        If a length is not positive, a name is unknown or repeated, the object falls into parts, or a loop cannot close.
+        If a length is not positive, a name is unknown or repeated, the segments do not connect the object, or a loop
+        cannot close.
     """
 
     name: str
@@ -116,7 +117,7 @@ class Linkage(Record):
                 raise self._wrong(field, f"{value:g}", "a finite positive number", "leave it out")
 
     def _check_shape(self) -> None:
-        """Refuse an object that falls into parts, or a loop that cannot close."""
+        """Refuse an object that its segments do not connect, or a loop that cannot close."""
         from scipy.sparse.csgraph import shortest_path
 
         edges = [(*pair, float(size)) for pair, size in zip(self.segments, self.lengths, strict=True)]

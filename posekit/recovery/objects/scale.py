@@ -2,9 +2,10 @@ r"""The scales that satisfy constraints: a search over the scale and all relevan
 
 The scale is parametrised by an angle, :math:`s = s_{min} / \cos\psi`. As a function of s, dZ has a vertical tangent at
 the bound; as a function of :math:`\psi` it is smooth, :math:`dZ = l \sin\psi` for the segment that sets the bound.
-Residuals are dimensionless: lengths are in units of the mean segment. A minimum is a root of the exact derivative,
-which gives all digits of the angle; the residual itself, a sum of squares, gives half of them. The derivative is the
-imaginary part of the residual after an imaginary step of the angle (Squire & Trapp 1998).
+Residuals are dimensionless: lengths are in units of the mean segment. A minimum is found as a root of the exact
+derivative, which determines the angle to full precision. The residual is a sum of squares and would determine it to
+half the digits. The derivative is the imaginary part of the residual after an imaginary step of the angle (Squire &
+Trapp 1998).
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ class Minima(Record):
     flips : int array (M, S)
         1 if the first end of a segment is nearer, -1 if its second is, 0 if the residual does not depend on it.
     curve_s, curve_residual : array (G,)
-        Scales from the bound on, and the least residual there over all flips (Taylor 2000, Figs. 7b and 8b).
+        Scales from the bound upward, and the least residual over all flips at each scale (Taylor 2000, Figs. 7b and
+        8b).
     """
 
     s: Array
@@ -275,7 +277,7 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
 
 
 def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
-    """Return the segments of residuals in blocks: residuals of different blocks share no segment."""
+    """Return blocks of segments such that residuals of different blocks share no segment."""
     from scipy.sparse.csgraph import connected_components
 
     graph = np.zeros((count, count))
