@@ -66,7 +66,7 @@ VIDEO_RATE: Final = 30.0
 
 
 def track(points: Array, frame: Ints, source: str = "", times: Array | None = None) -> Ints:
-    """Number the people in the pictures of a film, so that a person has the same number in all pictures.
+    """Give each person in the pictures of a film one number for all pictures.
 
     Each detection is compared with the predicted positions of the people of earlier pictures (the last position, moved
     by the last velocity). The assignment with the largest sum of similarities is used. If every picture has one
