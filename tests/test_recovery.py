@@ -10,8 +10,9 @@ from posekit.body import lay, load_figure
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.evaluation import evaluate
 from posekit.geometry import pa_mpjpe
+from posekit.ranking import representatives
 from posekit.recovery import Answer, Frames, Recovery, Survivors
-from posekit.recovery.answer import answers_of, joint_radius, representatives
+from posekit.recovery.answer import answers_of, joint_radius
 from posekit.recovery.scales import likely_scale
 from posekit.samples import samples
 from posekit.settings import EXACT
@@ -384,7 +385,7 @@ def test_representatives_cover_what_they_must(spread, count):
     shape = spread * rng.normal(size=(count, 14, 3))
     weight = np.sort(rng.exponential(size=count))[::-1]
     weight = weight / weight.sum()
-    rows, held = representatives(shape, weight, 0.9)
+    rows, held = representatives(shape, np.zeros(count, dtype=int), weight, np.array([0.9]))
     assert held.sum() >= 0.9 - 1e-9 and (np.diff(held) <= 0).all() and len(set(rows.tolist())) == len(rows)
     apart = np.linalg.norm(shape[rows][:, None] - shape, axis=3).max(axis=2)
     assert weight[apart.min(axis=0) <= 0.05].sum() == pytest.approx(held.sum())

@@ -26,7 +26,7 @@ from posekit.settings import Tolerance
 from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENT_NAMES, SIDES
 from posekit.synthesis import Walker, builtin_view, random_postures, walker_view
 from posekit.synthesis.views import PAPER_STEP, SEQUENCES
-from posekit.tree import Trees, grow
+from posekit.tree import Trees, ancestors, grow
 from posekit.validators.check import Check, Judgement
 from posekit.validators.collision import Collision
 from posekit.validators.joint_range import JointRange
@@ -156,8 +156,8 @@ def _counted(
         view = walker_view(walker, camera=SEQUENCES[name][0], frames=phases, dt=cycle / phases, phase0=start)
         trees, head = grown(view, tangent)
         kept = allowed(trees, head, (1, 2))
-        levels[:, 0, k] = _levels(trees.frame, trees.code, phases)
-        levels[:, 1, k] = _levels(trees.frame[kept], trees.code[kept], phases)
+        levels[:, 0, k] = trees.levels
+        levels[:, 1, k] = ancestors(trees.frame[kept], trees.code[kept], phases)
         if frame == 1:
             left = kept & allowed(trees, head, (3, 4, 5))
             away = np.linalg.norm(trees.joints - view.truth[trees.frame], axis=-1).max(axis=1)
@@ -208,13 +208,6 @@ def allowed(trees: Trees, head: Array, rules: Sequence[int]) -> NDArray[np.bool_
     return np.asarray(~_judged(WalkingRules(rules=tuple(rules)), points).violated.any(axis=1))
 
 
-def _levels(frame: NDArray[np.intp], code: NDArray[np.intp], count: int) -> NDArray[np.int64]:
-    """Return the number of distinct prefixes (F, 14) of the codes of each frame, up to each level."""
-    depth = len(JOINTS) - 1
-    columns = [np.unique(frame << depth | code >> (depth - level)) >> depth for level in range(depth + 1)]
-    return np.stack([np.bincount(each, minlength=count) for each in columns], axis=1)
-
-
 def representatives(joints: Array) -> list[int]:
     """Return representatives of postures (N, 14, 3): each posture is near one of them in every joint (§3.4)."""
     left, found = np.arange(len(joints)), []
@@ -256,7 +249,7 @@ def _tree_rows(setting: Array) -> Iterator[Row]:
     broken = [_judged(check, every).violated.any(axis=1) for check in physical_checks()]
     kept = ~np.any(broken, axis=0)
     ours, brute = (
-        " ".join(map(str, _levels(frame, code, 1)[0]))
+        " ".join(map(str, ancestors(frame, code, 1)[0]))
         for frame, code in ((pruned.frame, pruned.code), (whole.frame[kept], whole.code[kept]))
     )
     yield row("pruning", f"{ours} nodes a level", ours == brute, n=len(kept), found=brute)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -160,30 +159,3 @@ def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
     least = np.where(np.isfinite(highest), highest, 0.0)[frame]
     weight = np.exp(np.where(np.isfinite(highest)[frame], score - least, 0.0))
     return np.asarray(weight / np.bincount(frame, weight, len(highest))[frame])
-
-
-def rank(
-    joints: Array, frame: NDArray[np.intp], terms: Mapping[str, Array] | None = None, **evidence: object
-) -> Array:
-    r"""Return the probability of every posture within its frame.
-
-    .. math:: p_i = e^{\sum_t w_t f_t(i)} / \sum_j e^{\sum_t w_t f_t(j)}
-
-    Parameters
-    ----------
-    joints : array (N, 14, 3)
-        Camera frame, metres.
-    frame : int array (N,)
-        Frame of each posture.
-    terms : mapping of str to array (N,), optional
-        More log terms.
-    **evidence
-        Parameters of `log_terms`.
-
-    Returns
-    -------
-    array (N,)
-        Probabilities; they sum to one over each frame.
-    """
-    found = {**log_terms(joints, **evidence), **(terms or {})}  # type: ignore[arg-type]
-    return softmax(np.sum(list(found.values()), axis=0), frame)

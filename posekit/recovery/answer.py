@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
 from posekit.body import lay
-from posekit.geometry import Array, Flags, Ints, dot, norm
+from posekit.geometry import Array, Flags, Ints, norm
+from posekit.ranking import WITHIN_METRES, representatives
 from posekit.skeleton import PARENTS, TREE_SEGMENTS
-
-#: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
-WITHIN_METRES: Final = 0.05
 
 #: Total probability of the postures for which representatives stand.
 REPRESENTED: Final = 0.95
@@ -19,14 +18,8 @@ REPRESENTED: Final = 0.95
 #: Samples of each mode. The standard error of `sure` is 0.06 if one mode has all the probability, less otherwise.
 N_SAMPLES: Final = 64
 
-#: Largest number of postures of a frame that are compared with each other, the likeliest first.
-MAX_COMPARED: Final = 600
-
 #: Modes that are sampled at once: they stay in the processor's cache.
 SAMPLED_AT_ONCE: Final = 64
-
-#: Probabilities that differ by less are equal.
-ROUNDED_PROBABILITY: Final = 1e-9
 
 #: Degrees of freedom of the t distribution within a mode: its tails stand for lengths that are far off and bent spines.
 TAIL_DEGREES_OF_FREEDOM: Final = 4
@@ -98,13 +91,13 @@ def answers_of(
     base = np.where(relative[frame, None, None], joints[:, :1], 0.0)
     shape, listed = joints - base, 1.0 - unlisted
     hold = np.minimum(REPRESENTED / np.maximum(listed, REPRESENTED), 1.0)
-    parts = zip(
-        np.split(np.nan_to_num(shape), starts[1:]), np.split(weight, starts[1:]), hold.tolist(), strict=True
-    )
-    rows, held = zip(*(representatives(*part) for part in parts), strict=True)
+    rows, held = representatives(np.nan_to_num(shape), frame, weight, hold)
+    row, held = rows - starts[frame[rows]], held * listed[frame[rows]]
+    ends = np.searchsorted(frame[rows], np.arange(len(starts) + 1))
+    parts = [slice(*pair) for pair in pairwise(ends.tolist())]
     if covariance is None:
         # A mean of exact postures is no posture: the answer is the first representative.
-        survivor = np.array([one[0] for one in rows])
+        survivor = rows[ends[:-1]] - starts
         laid = shape[starts + survivor]
     else:
         a, b = np.array(TREE_SEGMENTS).T
@@ -131,56 +124,11 @@ def answers_of(
         "sure": np.add.reduceat(weight * inside, starts) * listed,
         "sure_of": np.where(relative, "relative to the neck", "position").tolist(),
         "survivor": survivor,
-        "representatives": list(rows),
-        "represented": [one * share for one, share in zip(held, listed, strict=True)],
+        "representatives": [row[own] for own in parts],
+        "represented": [held[own] for own in parts],
         "nearer": np.where(known, np.array([0, 1, -1])[each.argmax(axis=0)], 0),
         "nearer_sure": np.where(known, each.max(axis=0) * listed[:, None], np.nan),
     }
-
-
-def representatives(shape: Array, weight: Array, hold: float) -> tuple[Ints, Array]:
-    """Choose a few postures of a frame such that the postures within 5 cm of them have a given total probability.
-
-    Parameters
-    ----------
-    shape : array (N, 14, 3)
-        Postures, the likeliest first, metres.
-    weight : array (N,)
-        Their probabilities; they sum to one.
-    hold : float
-        Total probability to reach.
-
-    Returns
-    -------
-    rows : int array (R,)
-        Representatives; the one with the largest `held` comes first.
-    held : array (R,)
-        Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
-        earlier representative.
-    """
-    near, rest = _near(shape[:MAX_COMPARED]).astype(np.float64), weight[:MAX_COMPARED]
-    found: list[tuple[float, int]] = []
-    while hold > ROUNDED_PROBABILITY:
-        gain = near @ rest
-        most = gain.max()
-        if most <= 0:
-            break
-        best = int((gain > most - ROUNDED_PROBABILITY).argmax())  # of equal ones the likeliest
-        found.append((float(most), best))
-        rest, hold = rest * (1.0 - near[best]), hold - most
-    held, rows = zip(*sorted(found, key=lambda one: -one[0]), strict=True)
-    return np.array(rows), np.array(held)
-
-
-def _near(places: Array) -> Flags:
-    r"""Return whether each two of the postures (N, 14, 3) are within 5 cm of each other in every joint (N, N).
-
-    :math:`a \cdot b - a^2 / 2 - b^2 / 2 = -|a - b|^2 / 2`, relative to the likeliest.
-    """
-    place = (places - places[:1]).transpose(1, 0, 2)
-    half, one = dot(place, place)[..., None] / 2, np.ones((*place.shape[:2], 1))
-    left, right = np.concatenate([place, -half, one], axis=2), np.concatenate([place, one, -half], axis=2)
-    return np.asarray((left @ right.swapaxes(1, 2) >= -(WITHIN_METRES**2) / 2).all(axis=0))
 
 
 def joint_radius(covariance: Array) -> Array:

@@ -36,7 +36,7 @@ VERSIONED: Final = {"posekit": posekit, "pin": pinocchio, "numpy": np}
 
 #: Frames whose trees are grown together, and frames that are solved together: enough to spread NumPy's overhead, few
 #: enough to keep memory small. The result does not depend on them.
-GROWN_AT_ONCE, SOLVED_AT_ONCE = 256, 64
+GROWN_AT_ONCE, SOLVED_AT_ONCE = 512, 64
 
 #: Largest number of modes of a frame that are certified and ranked, those of least chi2; few frames have more.
 MANY: Final = 3000
@@ -153,10 +153,10 @@ class _Conductor:
             head=sight.head,
             tolerance=tolerance.tangent,
         )
-        lost: dict[int, Counter[str]] = {}
+        lost: dict[int, dict[str, int]] = {}
         levels: dict[int, Ints] = {}
         for k, rejected, own in zip(sight.frame.tolist(), trees.rejected, trees.levels, strict=True):
-            lost[k] = lost[k] + rejected if k in lost else rejected
+            lost[k] = dict(Counter(lost[k]) + Counter(rejected)) if k in lost else rejected
             levels[k] = levels.get(k, 0) + own
         frame = sight.frame[trees.frame]
         if self.judged == "exact":
@@ -218,7 +218,7 @@ class _Conductor:
         reason, _ = certified(self.noisy, self.checks, with_head(joints))
         volume = modes.log_evidence + 0.5 * modes.chi2
         terms = log_terms(joints, chi2=modes.chi2, log_volume=volume, up=self.up)
-        lost = {k: Counter[str]() for k in set(frame.tolist())}
+        lost: dict[int, dict[str, int]] = {k: {} for k in set(frame.tolist())}
         self.found.add("noisy", lost, columns, terms, reason, partial(self._covariance, modes), leave=sharp)
         if not sharp:
             self._diagnose(sight, problem, [k for k in part.tolist() if k not in lost])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
@@ -69,7 +68,7 @@ class Gathering:
     def add(
         self,
         judged: str,
-        lost: dict[int, Counter[str]],
+        lost: dict[int, dict[str, int]],
         columns: dict[str, Any],
         terms: Mapping[str, Array],
         reason: NDArray[np.str_],
@@ -83,7 +82,7 @@ class Gathering:
         ----------
         judged : str
             The way the frames were judged, as in `Frames.judged`.
-        lost : dict of int to Counter
+        lost : dict of int to dict
             For each frame, the number of branches rejected earlier, by reason.
         columns : dict of str to array
             Columns of `Survivors`, by frame.
@@ -103,7 +102,8 @@ class Gathering:
             ahead = (joints[:, end, 2] - joints[:, start, 2]) * self.nearer[every]
             reason = np.where((ahead < -LEVEL_METRES).any(axis=1) & (reason == ""), "nearer/given", reason)
         for row in np.flatnonzero(reason != "").tolist():
-            lost[int(every[row])][str(reason[row])] += 1
+            own, name = lost[int(every[row])], str(reason[row])
+            own[name] = own.get(name, 0) + 1
         rows = np.flatnonzero(reason == "")
         probability = softmax(np.sum(list(terms.values()), axis=0)[rows], every[rows])
         order = np.lexsort((-probability, every[rows]))
@@ -118,10 +118,11 @@ class Gathering:
         passed = set(frame.tolist())
         found = np.array(sorted(passed), dtype=np.intp)
         for k in passed if leave else lost:
-            worst = max(lost[k], key=lost[k].__getitem__, default="").replace("/", " at ")
-            why = "" if k in passed else f"no posture passes: most fail {worst}"
-            about = {"unlisted": int(unlisted[k]), "unlisted_probability": improbable[k]}
-            self.close(k, rejected=dict(lost[k]), judged=judged, reason=why, **about)
+            why, about = "", {"unlisted": int(unlisted[k]), "unlisted_probability": improbable[k]}
+            if k not in passed:
+                worst = max(lost[k], key=lost[k].__getitem__, default="").replace("/", " at ")
+                why = f"no posture passes: most fail {worst}"
+            self.close(k, rejected=lost[k], judged=judged, reason=why, **about)
         if len(found):
             rows, probability = rows[held], probability[held]
             table = {name: values[rows] for name, values in columns.items()} | {"probability": probability}

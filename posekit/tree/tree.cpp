@@ -22,10 +22,11 @@ struct Step {
   double level, reason, kind, limb, tolerance, points[8], numbers[14];
 };
 struct Verdict {
-  int place;  // of the first violation; PASSED, or UNKNOWN before the step has judged
+  int place;  // of the first violation, or PASSED
   double value, lower, upper;
+  std::int64_t frame = -1;  // that was judged
 };
-constexpr int PASSED = -1, UNKNOWN = -2;
+constexpr int PASSED = -1;
 
 // Column of a joint's position at a node; the lowest bit of the candidate is the joint's own branch.
 int column_of(int joint, int level, std::int64_t code) {
@@ -160,7 +161,6 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
         numbers.insert(numbers.end(), {value, lower, upper});
       };
       next.clear();
-      for (Verdict& one : ask.known) one.place = UNKNOWN;
       for (std::int64_t node : nodes) {
         if ((int)s.kind == BRANCH) {
           for (std::int64_t child = node << 1, last = child + 1; child <= last; ++child) {
@@ -173,10 +173,10 @@ py::tuple grow(Doubles table, Bytes state, Doubles excess, py::object ranges, Do
         int key = 0;
         for (int joint : ask.support) key = key << 1 | (node >> (level - joint) & 1);
         Verdict& found = ask.known[key];
-        if (found.place == UNKNOWN) {
+        if (found.frame != f) {
           for (double& one : x[END[(int)s.limb]]) one = NAN;  // a step may read the upper segment alone
           for (int joint : ask.reads) std::memcpy(x[joint], positions[column_of(joint, level, node)], sizeof x[joint]);
-          found = judged(s, L, x);
+          found = judged(s, L, x), found.frame = f;
         }
         if (found.place == PASSED) next.push_back(node);
         else lose(node, found.place, found.value, found.lower, found.upper);

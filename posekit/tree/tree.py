@@ -7,11 +7,10 @@ combination. The four limbs, for example, are judged independently of each other
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,9 +31,6 @@ from posekit.tree.candidates import (
     support_of,
 )
 from posekit.tree.steps import BRANCH, Step, step
-
-#: Number of frames grown together: enough to spread the overhead of NumPy, few enough to keep memory small.
-FRAMES_AT_ONCE: Final = 512
 
 #: Ratio of possible keys to nodes. Above it distinct keys are found by sorting, below it with a table of all keys.
 SPARSE_FROM: Final = 64
@@ -88,8 +84,6 @@ class Trees:
         Pruned branches of each frame, in the order of pruning.
     reasons : tuple of (str, str)
         ``check/place`` and the unit of its values.
-    candidates : tuple of Candidates
-        Positions of all branches, one entry for each `FRAMES_AT_ONCE` frames.
     count : int
         F.
     """
@@ -100,7 +94,6 @@ class Trees:
     length_residual: Array
     losses: Pruned
     reasons: tuple[tuple[str, str], ...]
-    candidates: tuple[Candidates, ...]
     count: int
 
     def __len__(self) -> int:
@@ -114,23 +107,21 @@ class Trees:
         return digits.astype(np.uint32).view(f"U{DEPTH}")[:, 0]
 
     @cached_property
-    def rejected(self) -> list[Counter[str]]:
+    def rejected(self) -> list[dict[str, int]]:
         """Number of rejected leaves of each frame by reason; with the survivors they sum to 8192."""
         width = max(len(self.reasons), 1)
         weight = 1 << (DEPTH - self.losses.level)
         number = np.bincount(self.losses.frame * width + self.losses.reason, weight, self.count * width)
-        totals = [Counter[str]() for _ in range(self.count)]
-        for k in np.flatnonzero(number).tolist():
-            totals[k // width][self.reasons[k % width][0]] = int(number[k])
-        return totals
+        some = np.flatnonzero(number)
+        names = [self.reasons[k][0] for k in (some % width).tolist()]
+        counts = number[some].astype(int).tolist()
+        ends = np.searchsorted(some, width * np.arange(self.count + 1)).tolist()
+        return [dict(zip(names[a:b], counts[a:b], strict=True)) for a, b in pairwise(ends)]
 
     @cached_property
     def levels(self) -> NDArray[np.int64]:
         """Number of nodes at each level (F, 14) from which a survivor descends (Lee & Chen 1985, section 4.1.B)."""
-        shift = DEPTH - np.arange(DEPTH + 1)
-        key = (self.frame[:, None] << DEPTH | self.code[:, None]) >> shift  # ascending, as the survivors are
-        new = np.diff(key, axis=0, prepend=-1) > 0
-        return np.stack([np.bincount(self.frame[one], minlength=self.count) for one in new.T], axis=1)
+        return ancestors(self.frame, self.code, self.count)
 
     def pruned(self, frame: int) -> list[tuple[str, str, str, float, float, float, str]]:
         """List every pruned branch of a frame: its code, joint, reason, value, bounds and unit."""
@@ -141,6 +132,13 @@ class Trees:
                 *(one[own].tolist() for one in self.losses), strict=True
             )
         ]
+
+
+def ancestors(frame: Ints, code: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return the number of nodes at each level (`count`, 14) above leaves (N,), which are by frame, then by code."""
+    key = (frame[:, None] << DEPTH | code[:, None]) >> (DEPTH - np.arange(DEPTH + 1))
+    new = np.diff(key, axis=0, prepend=-1) > 0
+    return np.stack([np.bincount(frame[one], minlength=count) for one in new.T], axis=1)
 
 
 def grow(
@@ -182,41 +180,33 @@ def grow(
     -------
     Trees
     """
-    one: Any = camera
     ask = judge or (lambda check, points: check.judge(points))
     frames = len(image)
     lengths = np.broadcast_to(np.asarray(lengths, dtype=np.float64), (frames, len(SEGMENTS)))
     head = np.full((frames, 5, 3), np.nan) if head is None else head
     reasons: dict[tuple[str, str], int] = {}
     plan = _planned(checks, getattr(ask, "steps", None), head)
-    parts, losses, candidates = [], [], []
-    for at in range(0, max(frames, 1), FRAMES_AT_ONCE):
-        own = slice(at, at + FRAMES_AT_ONCE)
-        found = Candidates.lifted(one.take(own), image[own], root[own], lengths[own], head[own], tolerance)
-        frame, code = np.arange(len(image[own])), np.zeros(len(image[own]), dtype=np.int64)
-        for fast, run in groupby(plan, key=lambda planned: planned.steps is not None):
-            if fast:
-                frame, code, lost = _compiled(found, list(run), frame, code, reasons)
-                losses.append(lost._replace(frame=lost.frame + at))
-                continue
-            for planned in run:
-                frame, code, lost = _taken(found, planned, frame, code, reasons, ask)
-                losses.append(lost._replace(frame=lost.frame + at))
-        joints = found.places(DEPTH, range(len(JOINTS)), frame, code)[:, : len(JOINTS)]
-        short = np.zeros(len(code))
-        for joint in range(1, len(JOINTS)):
-            short = np.fmax(short, found.excess[frame, found.column(DEPTH, joint, code)])
-        parts.append((frame + at, code, joints, short))
-        candidates.append(found)
-    frame, code, joints, short = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    found = Candidates.lifted(camera, image, root, lengths, head, tolerance)
+    frame, code = np.arange(frames), np.zeros(frames, dtype=np.int64)
+    losses = []
+    for fast, run in groupby(plan, key=lambda planned: planned.steps is not None):
+        if fast:
+            frame, code, lost = _compiled(found, list(run), frame, code, reasons)
+            losses.append(lost)
+            continue
+        for planned in run:
+            frame, code, lost = _taken(found, planned, frame, code, reasons, ask)
+            losses.append(lost)
+    short = np.zeros(len(code))
+    for joint in range(1, len(JOINTS)):
+        short = np.fmax(short, found.excess[frame, found.column(DEPTH, joint, code)])
     return Trees(
         frame=frame,
         code=code,
-        joints=joints,
+        joints=found.places(DEPTH, range(len(JOINTS)), frame, code)[:, : len(JOINTS)],
         length_residual=short,
         losses=Pruned.joined(losses),
         reasons=tuple(reasons),
-        candidates=tuple(candidates),
         count=frames,
     )
 
