@@ -260,7 +260,7 @@ class RecoverSettings(Settings):
     refine : bool, optional
         Treat image points as noisy. By default only if the points cannot be exact.
     coverage : float
-        Least share of the probability that the listed postures hold, 0 to 1.
+        Minimum share of the probability that the listed postures hold, 0 to 1.
     group : float, optional
         Distance within which survivors form a group, metres.
     follow : int

@@ -1,4 +1,4 @@
-"""What bodies can do: the protocol of checks, the checks, and reports of what they found."""
+"""Validation of postures and motion: the protocol of checks, the built-in checks, and reports of their findings."""
 
 from posekit.validators.body import Body as Body
 from posekit.validators.check import Check as Check

@@ -1,4 +1,4 @@
-"""`Body`: the data of one body in one recording, as checks read it; values that several checks need are cached."""
+"""`Body`: the data of one recording that checks read. Values that several checks need are cached."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found")
 
-#: Tolerance for measuring noise, in standard deviations: one normal number in 370 exceeds it.
+#: Tolerance for measurement noise, in standard deviations; 0.27 % of a normal distribution exceed it.
 ALLOWED_DEVIATIONS: Final = 3.0
 
-#: Allowed overlap between capsules that are scaled to a person, metres: their radii are the built-in figure's, not
-#: measured ones, and flesh is soft.
+#: Allowed overlap between capsules that are scaled to a person, metres. Flesh is soft, and the radii are scaled from
+#: the built-in figure instead of measured.
 MADE_UP_METRES: Final = 0.01
 
 #: Largest side bending of the spine, degrees (mean at 20 to 29 years: Fitzgerald et al. 1983, Phys Ther 63:1776).
 SIDE_BENDING_DEGREES: Final = 38.2
 
-#: Length of a clavicle, as a share of the distance from the neck's middle line to the shoulder.
+#: Length of a clavicle, as a share of the distance from the body's midline to the shoulder.
 CLAVICLE_SHARE: Final = 0.8
 
 #: Largest rotation of a clavicle about its inner end, forward or upward with the shoulder, degrees (Inman, Saunders &
@@ -52,28 +52,28 @@ CLAVICLE_DEGREES: Final = 30.0
 #: Indices of the limb segments in `posekit.skeleton.SEGMENTS`.
 LIMB_ROWS: Final = [SEGMENTS.index(one) for one in LIMB_SEGMENTS]
 
-#: Distance from neck to nose, metres: errors of the nose turn the head over this lever.
+#: Distance from neck to nose, metres: a lever arm by which errors of the nose change the head's angle.
 NECK_TO_HEAD_METRES = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Body(Record):
-    """T frames of one body.
+    """Data of one body in T frames.
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, in tree order; NaN where unknown.
+        Joint positions, metres, in tree order; NaN where unknown.
     head : array (T, 5, 3)
-        Nose, eyes and ears.
+        Positions of nose, eyes and ears, metres; NaN where unknown.
     feet : array (T, 4, 3)
-        Right toe, left toe, right heel, left heel.
+        Positions of right toe, left toe, right heel and left heel, metres; NaN where unknown.
     time : array (T,)
-        Seconds, in the order of the file; NaN where not known.
+        Times of the frames, seconds, in the order of the file; NaN where unknown.
     q : array (T, nq), optional
-        Configurations that are judged, in the robot's order.
+        Configurations to judge, in the robot's order.
     robot : Robot, optional
-        The robot of `q`; None if positions are judged.
+        The robot whose configurations are `q`; None if positions are judged.
     base : Figure, optional
         The figure that positions are compared with.
     up : array (3,), optional
@@ -81,10 +81,10 @@ class Body(Record):
     settings : ValidateSettings
         Checks, ranges and tolerances.
     tolerance : Tolerance, optional
-        Allowed differences from `base`, for postures of that figure. None for measured people: `figure` then has their
-        segment lengths, and tolerances include their measuring noise.
+        Allowed differences from `base` for postures of that figure. None for measured people: `figure` then has the
+        measured segment lengths, and tolerances include the measurement noise.
     motion : bool
-        Whether the frames follow each other in time.
+        Whether the frames are successive in time.
     residual : array (T, 14), optional
         Distance between the given joints and the joints of `q`, metres, if `q` was fitted to positions.
     """
@@ -123,7 +123,8 @@ class Body(Record):
     ) -> Body:
         """Return the `Body` of one recording: the data that its checks read.
 
-        If the motion has configurations only, its joints are the points of `robot`; unknown if `placed` is False.
+        If the motion has configurations only, its joints are computed by forward kinematics of `robot`. With `placed`
+        False they remain unknown.
         """
         joints = motion.figure_joints
         if robot is not None and motion.joints is None and motion.q is not None:
@@ -139,7 +140,7 @@ class Body(Record):
             q=motion.q if robot is not None else None,
             robot=robot,
             base=base,
-            # If every frame has its own origin, there is no common ground and no travel.
+            # If every frame has its own origin, the frames have no common ground and no common direction up.
             up=motion.up_vector if motion.in_world else None,
             settings=settings,
             tolerance=tolerance,
@@ -152,7 +153,7 @@ class Body(Record):
         return len(self.joints)
 
     def knows(self, name: str) -> bool:
-        """Return whether one of the data in `posekit.validators.check.READABLE` is known, by its name."""
+        """Return whether the data of a name in `posekit.validators.check.READABLE` are known."""
         if name == "time":
             return self.motion and self.dt > 0
         if name == "ground":
@@ -162,26 +163,26 @@ class Body(Record):
 
     @cached_property
     def rate(self) -> float:
-        """Frames per second, from the median step of time; NaN where not known."""
+        """Frames per second, from the median time step; NaN if times are unknown."""
         step = np.diff(self.time)
         step = step[step > 0]
         return float(np.round(1.0 / np.median(step), 6)) if len(step) else math.nan
 
     @property
     def dt(self) -> float:
-        """Seconds from a frame to the next; NaN where not known."""
+        """Seconds from one frame to the next; NaN if times are unknown."""
         return 1.0 / self.rate
 
     @cached_property
     def height(self) -> Array:
-        """Height of each joint along `up` (T, 14), metres; NaN where up is not known."""
+        """Height of each joint along `up` (T, 14), metres; NaN if `up` is None."""
         return (
             np.full(self.joints.shape[:2], np.nan) if self.up is None else np.asarray(self.joints @ self.up)
         )
 
     @cached_property
     def ground(self) -> float:
-        """Height of the ground along `up`, metres: as stated, else estimated from the frames; NaN where unknown."""
+        """Height of the ground along `up`, metres, as stated or else estimated from the frames; NaN if unknown."""
         if self.settings.ground is not None:
             return self.settings.ground
         if not self.motion or self.up is None or not np.isfinite(self.joints).any():
@@ -192,7 +193,7 @@ class Body(Record):
 
     @cached_property
     def person(self) -> Person:
-        """Lengths, side and measuring noise of the person in the frames."""
+        """Segment lengths and measurement noise of the person in the frames."""
         return person_of(self.joints, self.segment_lengths)
 
     @cached_property
@@ -202,12 +203,12 @@ class Body(Record):
 
     @property
     def measured(self) -> bool:
-        """Whether the frames show measured people, and not postures of the figure."""
+        """Whether the frames show measured people instead of postures of the figure."""
         return self.tolerance is None and not self.settings.strict
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of measured coordinates that checks over time allow for, metres."""
+        """Standard deviation of the noise of coordinates, metres; checks of motion widen their bounds by it."""
         if self.settings.noise is not None or self.settings.strict or self.q is not None:
             return self.settings.noise or 0.0
         return float(np.nan_to_num(self.person.noise))
@@ -219,7 +220,7 @@ class Body(Record):
 
     @cached_property
     def figure(self) -> Figure:
-        """The figure that positions are compared with: the base figure, or one of the measured person's lengths."""
+        """The figure that positions are compared with: the base figure, scaled to measured people."""
         if not self.measured or not self.person.lengths:
             return self.base_figure
         return figure_of(self.base_figure, tuple(self.person.lengths.items()), self.person.behind)
@@ -235,7 +236,7 @@ class Body(Record):
         return np.concatenate([self.joints, self.head], axis=1)
 
     def noise_allowed(self, segment: str = "") -> float:
-        """Return the tolerance for noise of a distance, metres: between the ends of a segment, or any two joints."""
+        """Return the tolerance for noise of a segment's length or, without a name, of any distance, metres."""
         noise = self.settings.noise
         if noise is None:
             noise = self.person.noise_of(segment) if self.measured else 0.0
@@ -243,12 +244,12 @@ class Body(Record):
 
     @property
     def contact_margin(self) -> float:
-        """Distance that capsules of the figure must keep, metres; negative allows overlap."""
+        """Minimum distance between capsules of the figure, metres; a negative distance allows overlap."""
         made_up = MADE_UP_METRES if self.measured else 0.0
         return self.settings.contact_margin - made_up - self.noise_allowed()
 
     def rigid_tolerance(self, segment: tuple[int, int]) -> float:
-        """Return the tolerance of a segment's length against the figure's, metres."""
+        """Return the allowed difference between a segment's length and the figure's, metres."""
         given = self.settings.rigid_tolerance
         if self.tolerance is not None:
             hips = segment == (JOINT["right_hip"], JOINT["left_hip"]) and given is None
@@ -265,7 +266,7 @@ class Body(Record):
         return math.hypot(bone, across) if "shoulder" in name and "elbow" not in name else bone
 
     def angle_tolerance(self, *segments: tuple[int, int]) -> float:
-        """Return the tolerance of the directions of segments, degrees: the largest of them."""
+        """Return the largest tolerance of the directions of the given segments, degrees."""
         given = self.settings.angle_tolerance
         if self.tolerance is not None:
             return self.tolerance.angle
@@ -299,11 +300,11 @@ class Body(Record):
 
 
 def spine_gives(lengths: Mapping[str, float]) -> float:
-    r"""Return the largest decrease of the distance from shoulder to pelvis by bending to the side, metres.
+    r"""Return by how much bending to the side shortens the distance from shoulder to pelvis at most, metres.
 
-    A spine of length h bent evenly by an angle :math:`\varphi` has a chord :math:`c = h \sin(\varphi/2) / (\varphi/2)`
-    that leans by half the angle; a shoulder at w beside the neck is then at
-    :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}` from the pelvis.
+    A spine of length h that is bent to a circular arc of angle :math:`\varphi` has a chord of length
+    :math:`c = h \sin(\varphi/2) / (\varphi/2)`. The chord leans by :math:`\varphi/2`. With the shoulder at distance w
+    from the neck, the distance from shoulder to pelvis is :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}`.
     """
     half = math.radians(SIDE_BENDING_DEGREES) / 2
     h, w = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
@@ -317,10 +318,11 @@ def hips_share(lengths: Mapping[str, float]) -> float:
 
 
 def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
-    r"""Return the largest changes of two distances by the shoulder girdle, metres: between shoulders, to the pelvis.
+    r"""Return how far the clavicles change the distances between shoulders and from shoulder to pelvis, metres.
 
-    A clavicle of length c turns by up to :math:`\varphi` about its inner end, forward or upward. The shoulders then
-    come nearer to each other by :math:`2 c (1 - \cos\varphi)`, and one rises by :math:`c \sin\varphi`.
+    A clavicle of length c rotates by up to :math:`\varphi` about its inner end, forward or upward. Forward rotation of
+    both clavicles shortens the distance between the shoulders by :math:`2 c (1 - \cos\varphi)`. Upward rotation raises
+    a shoulder by :math:`c \sin\varphi`.
     """
     clavicle = CLAVICLE_SHARE * lengths["right_shoulder-left_shoulder"] / 2
     turn = math.radians(CLAVICLE_DEGREES)
@@ -328,7 +330,7 @@ def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
 
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:
-    """Cache the result of a function of a body in that body, so that several checks share it."""
+    """Cache the result of a function in the `Body` of its argument, so that several checks share the result."""
 
     @wraps(find)
     def found(body: Body) -> Found:

@@ -1,6 +1,6 @@
-"""`Check`: one kind of judgement about a body; and `Judgement`: its result.
+"""`Check`, the protocol of checks of postures and motion, and `Judgement`, the result of a check.
 
-A check is any object with the four members of `Check`: postures, configurations and motion over time are judged alike.
+A check is any object with the four members of `Check`. Checks of postures, configurations and motion have one form:
 
     class FeetAboveGround:
         '''A foot is below the ground.'''
@@ -13,10 +13,10 @@ A check is any object with the four members of `Check`: postures, configurations
             height = body.joints[:, [12, 13]] @ body.up - body.ground
             return Judgement(("right_ankle", "left_ankle"), height, lower=0.0, tolerance=0.01)
 
-The docstring is the message of the findings. A check may also have `points`, the names of the few points that it reads:
-the interpretation tree then applies the check as soon as it has placed these points. It may have `residuals(joints)`:
-for postures (N, 14, 3) this method returns the excess over the bounds (N, K) in standard deviations, 0 inside the
-bounds. The solver then draws noisy postures toward the bounds.
+The docstring is the message of the findings. A check may have two more members. `points` is a sequence of the names of
+the points that the check reads: the interpretation tree applies the check as soon as these points have positions.
+`residuals(joints)` is a method that the solver uses for noisy postures (N, 14, 3). It returns residuals (N, K) in
+standard deviations: the excess over each bound, 0 inside the bounds.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 #: Entry-point group in which other packages register their checks.
 ENTRY_POINTS: Final = "posekit.checks"
 
-#: Data of a body that a check may read, and the reason that reports give for bodies without these data.
+#: Data of a body that a check may read, and the reason in the report if a body does not have these data.
 READABLE: Final[Mapping[str, str]] = {
     "joints": "no joint positions are known",
     "head": "no head points are known",
@@ -60,26 +60,26 @@ CHECK_NAME: Final = re.compile(r"[a-z][a-z0-9-]*")
 
 
 class NotAskedError(PosekitError):
-    """A check does not apply to a body. `Check.judge` may raise this error; its message is the reason."""
+    """A check does not apply to a body; `Check.judge` may raise this error, and reports show its message."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judgement(Record):
-    """Result of a check in T frames at K places.
+    """Result of a check: values and bounds of K quantities, such as joint angles, in T frames.
 
     Parameters
     ----------
     places : sequence of K str
         Names of the judged angles, segments or pairs of bodies.
     value : array (T, K)
-        Judged quantity in the check's unit; NaN if it is undecided.
+        Judged values in the check's unit; NaN for an undecided value.
     lower, upper : array broadcastable to (T, K)
-        Bounds.
+        Bounds of the values.
     tolerance : array broadcastable to (T, K)
-        Distance beyond a bound up to which there is no violation.
+        Allowed excess over a bound.
     scale : array broadcastable to (T, K), optional
-        Margin that counts as 1 in `share`, in the check's unit. By default half the range or, if the range has one end
-        only, the size of that bound.
+        Divisor of the margins in `share`, in the unit of the check. By default half the distance between the bounds
+        or, if only one bound is finite, its absolute value.
 
     Examples
     --------
@@ -99,8 +99,8 @@ class Judgement(Record):
         value = np.asarray(self.value, dtype=np.float64)
         value = value[:, None] if value.ndim == 1 else value
         if value.ndim != 2 or value.shape[1] != len(self.places):
-            expected = f"a row a frame and {len(self.places)} columns"
-            raise refusal("judge", "value", f"shape {value.shape}", expected, "return one column a place")
+            expected = f"one row per frame and {len(self.places)} columns"
+            raise refusal("judge", "value", f"shape {value.shape}", expected, "return one column per place")
         object.__setattr__(self, "places", tuple(self.places))
         object.__setattr__(self, "value", value)
         for name in ("lower", "upper", "tolerance"):
@@ -118,7 +118,7 @@ class Judgement(Record):
 
     @cached_property
     def margin(self) -> Array:
-        """Distance inside the nearer bound, tolerance included (T, K): negative outside, NaN undecided."""
+        """Distance to the nearer bound, widened by the tolerance (T, K): negative outside, NaN if undecided."""
         low, high = self.lower - self.tolerance, self.upper + self.tolerance
         with np.errstate(invalid="ignore"):  # an infinite value has no distance from an infinite bound
             nearer = np.fmin(self.value - low, high - self.value)
@@ -126,12 +126,12 @@ class Judgement(Record):
 
     @property
     def violated(self) -> NDArray[np.bool_]:
-        """Whether the value is outside its bounds (T, K); False if it is undecided."""
+        """Whether each value is outside its bounds by more than the tolerance (T, K); False if it is undecided."""
         return np.asarray(self.margin < 0)
 
     @property
     def share(self) -> Array:
-        """Margins as shares of the range (T, K), comparable between checks: 1 in the middle, negative outside."""
+        """Margins divided by half the range (T, K), comparable between checks: 1 in the middle, negative outside."""
         if self.scale is not None:
             return np.asarray(self.margin / self.scale)
         lower, upper = np.asarray(self.lower), np.asarray(self.upper)
@@ -144,7 +144,7 @@ class Judgement(Record):
 
     @classmethod
     def stacked(cls, parts: Sequence[Judgement]) -> Judgement:
-        """Put the places of several judgements of the same frames side by side."""
+        """Concatenate judgements of the same frames along their places."""
         names = ["value", "lower", "upper", "tolerance"] + ["scale"] * (parts[0].scale is not None)
         columns = {
             name: np.concatenate(
@@ -157,7 +157,7 @@ class Judgement(Record):
 
 @runtime_checkable
 class Check(Protocol):
-    """One kind of judgement; see the module's example. Its docstring is the message of its findings."""
+    """Protocol of a check; the module has an example. The docstring of a check is the message of its findings."""
 
     @property
     def name(self) -> str:
@@ -165,30 +165,30 @@ class Check(Protocol):
 
     @property
     def unit(self) -> str:
-        """Unit of its values: ``m``, ``deg``, ``m/s``, ``frames``, ``1``."""
+        """Unit of the check's values: ``m``, ``deg``, ``m/s``, ``frames``, ``1``."""
 
     @property
     def reads(self) -> Sequence[str]:
         """Data of a body that the check needs: names from `READABLE`."""
 
     def judge(self, body: Body) -> Judgement:
-        """Judge all frames of one body; raise `NotAskedError` if the check does not apply to it."""
+        """Judge all frames of a body; raise `NotAskedError` if the check does not apply to this body."""
 
 
 @dataclass(frozen=True, eq=False)
 class FunctionCheck:
-    """A check made of a function by the decorator `check`.
+    """A check that applies a function; the decorator `check` makes it.
 
     Parameters
     ----------
     name, unit, reads, points
-        As `Check` has them.
+        As in `Check`.
     function : callable
-        Judges a body; its keyword-only parameters are thresholds with defaults.
+        Function from `Body` to `Judgement`; its keyword-only parameters are thresholds with defaults.
     over_time : bool
-        Whether the check judges motion. Frames without a value are then not undecided.
+        Whether the check judges motion. In checks of motion a frame without a value does not count as undecided.
     thresholds : mapping
-        Thresholds that differ from the defaults.
+        Values of the thresholds that differ from the defaults, by name.
     """
 
     name: str
@@ -204,7 +204,7 @@ class FunctionCheck:
 
     @property
     def defaults(self) -> dict[str, Any]:
-        """The thresholds by name with their defaults."""
+        """Default values of the thresholds, by name."""
         known = inspect.signature(self.function).parameters.values()
         return {one.name: one.default for one in known if one.kind is one.KEYWORD_ONLY}
 
@@ -225,14 +225,14 @@ def check(
     points: Sequence[str] = (),
     over_time: bool = False,
 ) -> Callable[[Callable[..., Judgement]], FunctionCheck]:
-    """Make a check of a function that judges a body.
+    """Return a decorator that makes a check from a function which judges a `Body`.
 
     Parameters
     ----------
     name, unit, reads
-        As `Check` has them.
+        As in `Check`.
     points : sequence of str
-        Names of the few points that the check reads.
+        Names of the points that the check reads, if it reads a few points only.
     over_time : bool
         Whether the check judges motion.
 
@@ -256,14 +256,14 @@ def message_of(one: Check) -> str:
 
 
 def judged(one: Check, body: Body) -> Judgement:
-    """Return the judgement of a check about a body; refuse other answers.
+    """Apply a check to a body and verify its result.
 
     Raises
     ------
     NotAskedError
         If the check does not apply.
     InputError
-        If the check raises another error, or returns no `Judgement` with one row a frame.
+        If the check raises another error, or does not return a `Judgement` with one row for each frame.
     """
     for name in one.reads:
         if not body.knows(name):
@@ -272,20 +272,20 @@ def judged(one: Check, body: Body) -> Judgement:
         found = one.judge(body)
     except PosekitError:
         raise
-    except Exception as error:  # a user's code may raise anything: the line names the check and the place
+    except Exception as error:  # a user's code may raise anything: the message names the check and the line
         place = traceback.extract_tb(error.__traceback__)[-1]
         got = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
         raise refusal(f"check {one.name}", "judge", got, "a Judgement", "correct the check") from error
     if not isinstance(found, Judgement) or len(found.value) != len(body):
         got = f"{len(found.value)} rows" if isinstance(found, Judgement) else type(found).__name__
         raise refusal(
-            f"check {one.name}", "judge", got, f"a Judgement of {len(body)} rows", "return one row a frame"
+            f"check {one.name}", "judge", got, f"a Judgement of {len(body)} rows", "return one row per frame"
         )
     return found
 
 
 def find_check(given: Any, known: Mapping[str, Any]) -> Any:
-    """Return a check by its name, and refuse objects that are no check.
+    """Return the check that a name or an object stands for.
 
     Parameters
     ----------
@@ -293,12 +293,12 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
         A check, a name in `known`, the name of an entry point, or ``module:Name``. The module may be in the current
         folder.
     known : mapping
-        Checks of posekit by name.
+        Built-in checks by name.
 
     Raises
     ------
     InputError
-        If there is no such check, or a member of `Check` is missing or wrong.
+        If there is no such check, or the object lacks a member of `Check` or has a wrong member.
     """
     found = _named(given, known) if isinstance(given, str) else given
     found = found() if isinstance(found, type) else found
@@ -320,7 +320,7 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _named(given: str, known: Mapping[str, Any]) -> Any:
-    """Return the check, or its class, that has a name; modules in the current folder come first."""
+    """Return the check, or the class of checks, that has a name. Modules in the current folder are searched first."""
     name = given if ":" in given else given.replace("_", "-")
     if name in known:
         return known[name]

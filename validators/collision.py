@@ -1,7 +1,7 @@
 """Collision: arms, legs, torso and head do not penetrate each other (Lee & Chen 1985, §3.2.C).
 
-The bodies of the figure are capsules along the segments of the posture. The distance of two capsules is the distance of
-their axes minus both radii, in closed form.
+The collision bodies of the figure are capsules along the segments of the posture. The distance between two capsules is
+the distance between their axes minus both radii; it has a closed form.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from posekit.validators.check import Judgement
 #: Tolerance for rounding, metres.
 CONTACT_METRES: Final = 1e-9
 
-#: Number of postures in one batch: large against the overhead of NumPy, small enough for the processor's cache.
+#: Number of postures in one batch. It makes the overhead of NumPy small and fits into the processor's cache.
 ROWS_AT_ONCE: Final = 512
 
-#: Smaller distances are exact, metres. For larger ones the distance of bounding spheres is returned, a lower bound.
+#: Distance up to which the result is exact, metres. For capsules farther apart, the result is the distance between
+#: their bounding spheres, which is a lower bound.
 NEAR_METRES: Final = 0.1
 
 
@@ -48,14 +49,14 @@ class Collision:
 
     @cached_property
     def points(self) -> tuple[str, ...]:
-        """Names of the points that place the capsules."""
+        """Names of the points that determine the positions of the capsules."""
         links = {link for pair in self.pairs or [tuple(CAPSULE_AXES)] for link in pair}
         read = {point for link in links for ends in CAPSULE_AXES[link] for point in ends}
         return tuple(POINTS[point] for point in sorted(read))
 
     @cached_property
     def parts(self) -> list[Collision]:
-        """Return checks of pairs of links, grouped by the last joint in tree order; pairs of the head are apart."""
+        """Return checks of fewer pairs, grouped by their last joint in tree order; pairs with the head are separate."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
         for pair in _pairs(load_figure()):
             read = [point for link in pair for ends in CAPSULE_AXES[link] for point in ends]
@@ -64,7 +65,7 @@ class Collision:
         return [Collision(pairs=tuple(pairs)) for pairs in groups.values()]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None for the head and for measured bodies."""
+        """Return the check as steps of the compiled tree; None for pairs with the head and for measured bodies."""
         if body.tolerance is None or any("head" in pair for pair in self.pairs):
             return None
         capsules = {capsule.link: capsule for capsule in body.figure.capsules}
@@ -79,13 +80,13 @@ class Collision:
         return found
 
     def judge(self, body: Body) -> Judgement:
-        """Measure the distances of all pairs of collision bodies."""
+        """Measure the distances between the collision bodies of all pairs."""
         capsules = body.figure.capsules
         at = {capsule.link: k for k, capsule in enumerate(capsules)}
         head = np.isfinite(body.head).any()
         links = self.pairs or [pair for pair in _pairs(body.figure) if head or "head" not in pair]
         pairs = [(at[a], at[b]) for a, b in links]
-        # Row 19 is the middle of the head's points.
+        # Row 19 is the mean of the head points.
         points = np.concatenate([body.points, body.head.mean(axis=1, keepdims=True)], axis=1).swapaxes(0, 1)
         tops = [one.start[0] for one in capsules]
         ends = [one.end[0] if len(one.end) == 1 else len(POINTS) for one in capsules]
@@ -121,7 +122,7 @@ def _pairs(figure: Figure) -> tuple[tuple[str, str], ...]:
 
 
 def _slimness(body: Body, link: str) -> float:
-    """Return the factor of a capsule's radius: narrow hips of a person make the capsules of the legs slimmer."""
+    """Return the factor of a capsule's radius; it is below 1 for the legs of a person with narrow hips."""
     if not body.measured or not link.endswith(("thigh", "shank")):
         return 1.0
     return min(hips_share(body.lengths) / hips_share(body.base_figure.lengths), 1.0)

@@ -1,8 +1,8 @@
 """Joint ranges: the angles of neck, pelvis and limbs are within their ranges.
 
-`posekit.solver.Limits` computes the angles and ranges of limbs and pelvis for this check and for the solver. The
-orientation of a limb has several sets of Euler angles; it is legal if all angles of one set are within ranges and
-couplings.
+`posekit.solver.Limits` computes the angles and ranges of limbs and pelvis for this check and for the solver. Several
+sets of Euler angles describe the same orientation of a limb. The orientation is valid if all angles of one set are
+within their ranges and couplings.
 """
 
 from __future__ import annotations
@@ -30,26 +30,27 @@ from posekit.validators.check import Judgement
 from posekit.validators.ranges import limits_of, load_ranges, of_person
 from posekit.validators.table1 import table1_angles
 
-#: An axial rotation with a larger tolerance is not determined, degrees.
+#: Largest tolerance of an axial rotation that is judged, degrees; a rotation with a larger tolerance is undetermined.
 UNSEEN_DEGREES: Final = 45.0
 
-#: Least bend of an elbow or knee that determines the rotation of shoulder or hip of measured bodies, degrees. At a bend
-#: of 15 degrees, 4 degrees of valgus change that rotation by 15.
+#: Minimum bend of an elbow or knee that determines the rotation of shoulder or hip of measured people, degrees. At a
+#: bend of 15 degrees, a valgus of 4 degrees changes that rotation by 15 degrees.
 STRAIGHT_DEGREES: Final = 15.0
 
-#: Tolerance for rounding of exact angles, degrees: 5 µm at a wrist.
+#: Tolerance for rounding of exact angles, degrees; it moves a wrist by 5 µm.
 ROUNDING_DEGREES: Final = 1e-3
 
-#: Least bend of a frame that determines the axis of its hinge, degrees: carrying angles turn that axis by 35 at most.
+#: Minimum bend at which a frame determines the axis of its hinge, degrees; above it carrying angles rotate that axis by
+#: 35 degrees at most.
 BENT_DEGREES: Final = 20.0
 
-#: Least bend at which the axes of neighbouring frames decide the direction of a hinge, degrees.
+#: Minimum bend at which the axes of neighbouring frames decide the direction of a hinge, degrees.
 LEAST_DEGREES: Final = 8.0
 
-#: A hinge bends backward if the cosine between its axis and the axis of neighbouring frames is smaller.
+#: Cosine between a hinge's axis and its axis in neighbouring frames, below which the hinge bends backward.
 OPPOSITE_COSINE: Final = -0.8
 
-#: Longest time to a neighbouring frame, seconds: in less time people seldom turn a straight arm by half a turn.
+#: Longest time to a neighbouring frame, seconds. In less time people seldom rotate a straight arm by half a turn.
 NEAR_SECONDS: Final = 1.0
 
 
@@ -60,8 +61,8 @@ PARTS: Final = ("neck", "pelvis", *LIMBS)
 class JointRange:
     """An angle of a joint is outside its range.
 
-    An almost straight limb hardly determines its rotation. The tolerance of the rotation is the tolerance of directions
-    divided by the sine of the bend; for measured bodies the rotation is undecided at bends below `STRAIGHT_DEGREES`.
+    The axial rotation of an almost straight limb is poorly determined. Its tolerance is the tolerance of directions
+    divided by the sine of the bend. For measured bodies the rotation is undecided at bends below `STRAIGHT_DEGREES`.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class JointRange:
         return [*whole[:2], *early, *whole[2:]]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None for the neck and for measured bodies."""
+        """Return the check as steps of the compiled tree; None for the neck or for measured bodies."""
         if body.tolerance is None or self.part == "neck" or _of_table1(body):
             return None
         limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
@@ -137,7 +138,7 @@ class JointRange:
 
 
 def _of_table1(body: Body) -> Mapping[str, Any] | None:
-    """Return the table of ranges of the settings if it has angles of Lee & Chen; otherwise None."""
+    """Return the settings' table of ranges if it limits the angles of Lee & Chen; otherwise None."""
     table = load_ranges(body.settings.ranges)
     return table if table is not None and table["kind"] in ("rotation", "projected") else None
 
@@ -145,8 +146,8 @@ def _of_table1(body: Body) -> Mapping[str, Any] | None:
 def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     """Judge the angles of one limb.
 
-    If the usual set of Euler angles is outside its ranges, the set that is least outside counts. In motion of measured
-    people, neighbouring frames decide whether a hinge bends forward or backward.
+    If the usual set of Euler angles is outside its ranges, the set with the smallest excess is judged. In motion of
+    measured people, neighbouring frames decide whether a hinge bends forward or backward.
     """
     joints, (places, keep) = body.joints, _places(limits, limb)
     tolerance = body.angle_tolerance((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
@@ -163,7 +164,7 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array, Array]:
         """Return value, lower, upper and tolerance of each set's angles (4, n, W, 4), and two excesses (n, W), degrees.
 
-        An excess is of the worst angle of a set: without rotations that are not determined, and with them.
+        An excess is the largest excess of the angles of a set: first without undetermined rotations, then with them.
         """
         *angles, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
         value, lower, upper = np.degrees(np.stack(angles))
@@ -193,13 +194,13 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
 def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: float) -> NDArray[np.bool_]:
     """Return whether an elbow or a knee bends backward in each frame (T,), by comparison with neighbouring frames.
 
-    In one frame, a limb that bends backward looks like a limb that is turned by half a turn about its upper segment.
-    Motion separates the two: an arm turns about itself by a few degrees in a frame, not by half a turn.
+    In one frame, a limb that bends backward looks like a limb that is rotated by half a turn about its upper segment.
+    Motion separates the two: an arm rotates about its axis by a few degrees in a frame, not by half a turn.
 
     Parameters
     ----------
     upper, lower : array (T, 3)
-        Unit directions of the two segments, frame after frame.
+        Unit directions of the upper and the lower segment in successive frames.
     legal : bool array (T,)
         Whether the limb is within its ranges if the hinge bends forward.
     dt : float
@@ -220,7 +221,7 @@ def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: floa
         inside = (neighbour >= 0) & (neighbour < len(shows))
         other = shows[np.clip(neighbour, 0, len(shows) - 1)]
         near = inside & (np.abs(other - asked) * dt <= NEAR_SECONDS)
-        # Apply the shortest rotation from one upper segment to the other to the axis.
+        # Rotate the axis by the shortest rotation between the upper segments of the two frames.
         a, b = upper[other], upper[asked]
         carried = axis[other] - (dot(axis[other], b) / np.maximum(1.0 + dot(a, b), 0.1))[:, None] * (a + b)
         turned = dot(carried, axis[asked]) < OPPOSITE_COSINE
@@ -260,7 +261,8 @@ def _neck(ik: ClosedForm, body: Body) -> Judgement:
 def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedForm]:
     """Return the limits of pelvis and limbs, and the closed form with the limits of the neck, by a table of ranges.
 
-    In the median frame the hips of a measured person lie `forward` degrees before the line of the trunk.
+    `forward` is the angle, in degrees, by which a measured person's hips lie in front of the trunk's line in the median
+    frame.
     """
     table = load_ranges(name)
     if table is None or table["kind"] != "anatomical":
@@ -276,5 +278,5 @@ def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedFo
 
 
 def _hips_outward(figure: Figure) -> float:
-    """Return the inward lean of straight thighs, degrees, because the hips are wider apart than usual."""
+    """Return the inward lean of straight thighs, degrees, of a figure whose hips are wider apart than usual."""
     return math.degrees(math.atan((hips_share(figure.lengths) - hips_share(load_figure().lengths)) / 2))

@@ -45,7 +45,7 @@ ROBOT_CHECKS: Final[dict[str, Check]] = {one.name: one for one in (*CONFIGURATIO
 USUAL_POSTURE_CHECKS: Final = ("rigid-parts", "joint-range", "collision")
 USUAL_ROBOT_CHECKS: Final = ("reach", "joint-range", "joint-travel", "mimic", "collision")
 
-#: Usual checks that apply to some robots only. Reports do not list them as "not asked" unless the user named them.
+#: Default checks that apply to some robots only. Reports list them as "not asked" only if the user named them.
 OF_SOME_ROBOTS: Final = ("reach", "joint-travel", "mimic", "joint-velocity", "swap")
 
 #: All checks that come with posekit.
@@ -53,25 +53,26 @@ KNOWN: Final[dict[str, Check]] = {**POSTURE_CHECKS, **ROBOT_CHECKS, **MOTION_CHE
 
 
 class InvalidError(PosekitError, AssertionError):
-    """`assert_valid` found postures that are not valid; the message has the first reasons."""
+    """`assert_valid` found invalid postures; the message gives the first reasons."""
 
 
 def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[Check]:
-    """Return the checks of settings in the order of reports.
+    """Return the checks that settings select, in the order of reports.
 
     Parameters
     ----------
     settings : Settings
-        Their ``checks``; if these are None, the usual checks and, for motion, the checks of the profile.
+        Settings with the names of ``checks``. If they are None, the default checks are selected and, for motion, the
+        checks of the profile.
     of_robot : bool
         Whether the checks judge configurations of a robot.
     in_time : bool
-        Whether the frames follow each other in time.
+        Whether the frames are successive in time.
 
     Raises
     ------
     InputError
-        If there is no check of a name.
+        If a name belongs to no check, or ``checks`` is empty.
     """
     own = ROBOT_CHECKS if of_robot else POSTURE_CHECKS
     profile = load_profile(settings.profile) if isinstance(settings, ValidateSettings) else ()
@@ -84,15 +85,15 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
     over_time = {**MOTION_CHECKS, **{one.name: one for one in profile}}
     asked = [one for given in settings.checks for one in (usual if given == "usual" else [given])]
     found = {one.name: one for one in (find_check(one, {**KNOWN, **over_time, **own}) for one in asked)}
-    # Users' checks come after checks of postures and before checks over time.
+    # Users' checks come after checks of postures and before checks of motion.
     rank = {name: place for place, name in enumerate((*own, "", *over_time))}
     return sorted(found.values(), key=lambda one: rank.get(one.name, rank[""]))
 
 
 def early_checks(settings: Settings) -> list[Check]:
-    """Return the posture checks of settings for the interpretation tree; the `parts` of a check, if it has any.
+    """Return the posture checks of settings for the interpretation tree.
 
-    A part reads few points, so that the tree applies it early.
+    A check with `parts` is split into these smaller checks. A part reads few points, so that the tree applies it early.
     """
     asked = chosen_checks(settings, of_robot=False, in_time=False)
     postures = [check for check in asked if not getattr(check, "over_time", False)]
@@ -105,7 +106,7 @@ class PostureJudge:
     Parameters
     ----------
     figure : Figure
-        Body of the postures.
+        Figure of the postures.
     settings : Settings
         Ranges, walking rules and contact margin.
     tolerance : Tolerance or None
@@ -121,7 +122,7 @@ class PostureJudge:
         self.tolerance, self.up = tolerance, up
 
     def __call__(self, check: Check, points: Array) -> Judgement:
-        """Return the judgement of a check; without places if the check does not apply."""
+        """Return the judgement of a check; it has no places if the check does not apply."""
         found = judge_postures(
             points, [check], self.figure, self.settings, tolerance=self.tolerance, up=self.up
         )
@@ -135,7 +136,7 @@ class PostureJudge:
 
     @cached_property
     def _unnamed(self) -> ValidateSettings:
-        """The settings without checks: users' checks may not be hashable, and `_steps` caches by the settings."""
+        """The settings without checks, as a key of the cache of `_steps`: users' checks may not be hashable."""
         return replace(self.settings, checks=None)
 
 
@@ -164,7 +165,7 @@ def judge_postures(
     Returns
     -------
     dict
-        The judgement of each check by its name; without checks that do not apply.
+        The judgement of each check that applies, by the check's name.
     """
     body = Body(
         joints=points[:, : len(JOINTS)],
@@ -179,7 +180,7 @@ def judge_postures(
 
 
 def _asked(checks: Iterable[Check], body: Body) -> tuple[dict[str, tuple[Check, Judgement]], dict[str, str]]:
-    """Return checks with their judgements, and reasons of checks that do not apply, both by name."""
+    """Return the checks that apply with their judgements, and the reasons why other checks do not apply, by name."""
     found, not_asked = {}, {}
     for check in checks:
         try:
@@ -208,7 +209,7 @@ def validate_motion(
     Parameters
     ----------
     motion : Motion
-        Positions, or configurations.
+        Joint positions, or configurations of a robot.
     settings : ValidateSettings, optional
         Checks, ranges and tolerances.
     robot : Robot, optional
@@ -217,7 +218,7 @@ def validate_motion(
     figure : Figure, optional
         The figure that positions are compared with. It is scaled to measured people.
     tolerance : Tolerance, optional
-        Allowed differences from `figure`, for its own postures; without it positions are of measured people.
+        Allowed differences from `figure` for postures of this figure. By default positions are of measured people.
 
     Returns
     -------
@@ -226,18 +227,18 @@ def validate_motion(
     Raises
     ------
     InputError
-        If there is no such check, or the configurations are not of the robot.
+        If there is no such check, or the configurations do not belong to the robot.
     """
     asked = settings or ValidateSettings()
     if not len(motion):
         raise refusal(motion.source or "motion", "", "no frame", "at least one", "give frames")
     checks = chosen_checks(asked, of_robot=robot is not None, in_time=motion.in_time)
     if robot is not None and motion.q is not None and motion.q.shape[1] != robot.model.nq:
-        got = f"{motion.q.shape[1]} entries a row"
+        got = f"{motion.q.shape[1]} entries per row"
         raise refusal(
             motion.source or "motion", "q", got, f"{robot.model.nq} of {robot.name}", "name the robot"
         )
-    # The points of configurations cost as much as all checks except collision.
+    # Forward kinematics of all points costs as much as all checks except collision.
     placed = motion.in_time or any("joints" in check.reads for check in checks)
     reports = []
     for name, recording in motion.recordings():
@@ -255,7 +256,11 @@ def validate_motion(
 
 
 def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[Robot, Motion, Array]:
-    """Return a robot, scaled to the person unless settings are strict, with its fit to positions and the residuals."""
+    """Fit a robot to joint positions by inverse kinematics.
+
+    Returns the robot, scaled to the person unless settings are strict; the motion with configurations; and the
+    distances (T, 14) between the robot's joints and the given joints, metres.
+    """
     joints = motion.figure_joints
     used = robot if settings.strict else robot.scaled(joints)
     known = np.isfinite(joints).any(axis=(1, 2))
@@ -270,7 +275,7 @@ def _fitted(robot: Robot, motion: Motion, settings: ValidateSettings) -> tuple[R
 
 
 def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> Report:
-    """Return the report of checks about one recording."""
+    """Apply checks to one recording and return the report."""
     by_name, not_asked = _asked(checks, body)
     found = list(by_name.values())
     quiet = OF_SOME_ROBOTS if "usual" in (body.settings.checks or ("usual",)) else ()
@@ -321,19 +326,19 @@ def _report(body: Body, checks: Sequence[Check], motion: Motion, name: str) -> R
     )
 
 
-#: Columns of the findings of a report that are whole numbers.
+#: Columns of a report's findings with integer values.
 WHOLE: Final = ("row", "check", "place")
 
 
 class Validator:
-    """Judges postures and motion against a body.
+    """Judges postures and motion of a figure or of a robot.
 
     Parameters
     ----------
     urdf : str, path, Figure or Robot
-        ``figure`` (the default), the path of a figure's URDF, or a figure: positions are judged in closed form.
-        Otherwise a robot: a name of example-robot-data (``human``, ``g1``, …), the path of a URDF, or a
-        `posekit.robots.Robot`.
+        A figure: ``figure`` (the default), the path of a figure's URDF, or a `Figure`. Its joint positions are judged
+        by closed-form inverse kinematics. Or a robot: a name of example-robot-data (``human``, ``g1``, …), the path of
+        a URDF, or a `posekit.robots.Robot`.
     settings : ValidateSettings, optional
         Checks, ranges and tolerances.
     checks, ranges, profile, ground, strict : optional
@@ -372,7 +377,7 @@ class Validator:
 
     @property
     def figure(self) -> Figure | None:
-        """The figure that judges; None if it is another robot."""
+        """The figure of the validator; None if the validator has another robot."""
         return self.robot if isinstance(self.robot, Figure) else None
 
     @property
@@ -393,14 +398,15 @@ class Validator:
         Parameters
         ----------
         given : array or Motion
-            Joints (14, 3) or (N, 14, 3), with head points (N, 19, 3), metres, NaN where unknown; or configurations
-            (nq,) or (N, nq), or (N, nq - 7) without a free root, which is then at neutral. One posture is a batch of
-            one. All postures are of one person. The root's quaternion is x, y, z, w; the report of a batch that stands
-            only by w, x, y, z has a warning, but one quaternion of another order is just another orientation.
+            Joint positions (14, 3) or (N, 14, 3), or with head points (N, 19, 3), metres, NaN where unknown. Or
+            configurations (nq,) or (N, nq). In configurations (N, nq - 7) the free root is omitted; it is then at
+            neutral. All postures are of one person. The order of the root's quaternion is x, y, z, w. The report warns
+            if a batch of robots is upright only in the order w, x, y, z.
         head : array (N, 5, 3), optional
-            Nose, eyes and ears.
+            Positions of nose, eyes and ears, metres.
         tolerance : Tolerance, optional
-            Allowed differences from the figure, for its own postures; without it positions are of measured people.
+            Allowed differences from the figure for postures of this figure. By default positions are of measured
+            people.
 
         Returns
         -------
@@ -422,7 +428,7 @@ class Validator:
         return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
 
     def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
-        """Return an array of postures as a motion whose frames are not in time.
+        """Return an array of postures as a motion whose frames are not successive in time.
 
         Raises
         ------
@@ -442,7 +448,7 @@ class Validator:
             points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
             return Motion(joints=points, joint_names=POINTS, **still)
         body = self.robot
-        if body.free_flyer and values.shape[1:] == (count - 7,):  # angles alone: the root is at neutral
+        if body.free_flyer and values.shape[1:] == (count - 7,):  # angles only: the root is at neutral
             root = np.broadcast_to(body.neutral[:7], (len(values), 7))
             values = np.concatenate([root, values], axis=1)
         if values.shape[1:] == (count,):
@@ -454,12 +460,12 @@ class Validator:
         raise refusal("postures", "", f"shape {values.shape}", expected, remedy)
 
 
-#: Largest plausible coordinate, metres: no unit of length gives larger ones.
+#: Largest plausible coordinate, metres; even coordinates in a wrong unit of length are smaller.
 MOST_METRES: Final = 1e6
 
 
 def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
-    """Return the figure or the robot of a name or a URDF."""
+    """Load the figure or the robot that a name or a URDF stands for."""
     from posekit.robots import Robot, load_robot
 
     if isinstance(urdf, Robot):
@@ -473,7 +479,7 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
     if Path(name).is_file():
         try:
             return load_figure(name)
-        except InputError:  # another robot, or the error that loading it as one words better
+        except InputError:  # not a figure: load it as a robot, whose error message is clearer
             pass
 
     load = partial(load_robot, name, srdf=settings.srdf, package_dirs=settings.package_dirs)
@@ -494,19 +500,19 @@ def assert_valid(
     checks: Any = None,
     ranges: str | None = None,
 ) -> None:
-    """Raise unless every posture is valid.
+    """Raise an error unless every posture is valid.
 
     Parameters
     ----------
     given : array, Motion or path
-        As `Validator.check` takes it, or a file.
+        Postures as in `Validator.check`, or the path of a file.
     urdf, settings, checks, ranges
-        As `Validator` takes them.
+        As in `Validator`.
 
     Raises
     ------
     InvalidError
-        An `AssertionError` with the first reasons.
+        If a posture is invalid or undecided. The error is an `AssertionError`; its message gives the first reasons.
 
     Warns
     -----

@@ -1,8 +1,9 @@
 """Tables of joint ranges, read from TOML of schema ``posekit.ranges/1``.
 
-There are four kinds of table. ``anatomical``: mean and spread over people of both ends of each angle, and couplings
-between angles. ``rotation`` and ``projected``: limits of the angles of Lee & Chen 1985, §3.2.A, as rotations from
-standing and as printed. ``joints``: limits of a robot's joints.
+There are four kinds of table. ``anatomical``: mean and standard deviation over people of the lower and upper limit of
+each angle, and couplings between angles. ``rotation``: limits of the angles of Lee & Chen 1985, §3.2.A, defined as
+rotations from standing. ``projected``: limits of the same angles as printed in the paper. ``joints``: limits of a
+robot's joints.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ from posekit.solver import Limits
 
 RANGES_SCHEMA: Final = "posekit.ranges/1"
 KINDS: Final = ("anatomical", "rotation", "projected", "joints")
-#: Tables by name; ``urdf`` stands for the URDF's own limits.
+#: Names of the built-in tables; ``urdf`` stands for the URDF's own limits.
 NAMED: Final = ("urdf", "anatomical", "table1", "table1-printed", "human_as_stick_figure")
 
-#: Standard deviation between recordings of the median angle between pelvis and trunk, degrees. In 16 recordings of one
-#: skeleton that walks, runs, jumps and crouches it is 8.
+#: Standard deviation over recordings of the median angle between pelvis and trunk, degrees. It is 8 degrees in 16
+#: recordings of one skeleton that walks, runs, jumps and crouches.
 MOSTLY_HELD_DEGREES: Final = 10.0
 
 #: Height of the figure's pelvis joint above the line between its hips, metres.
@@ -47,7 +48,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
     Raises
     ------
     InputError
-        If there is no such table, or it breaks the schema.
+        If there is no such table, or it does not follow the schema.
     """
     if name == "urdf":
         return None
@@ -72,7 +73,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
 
 
 def _angles(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the limits of a table by the names of joint and angle."""
+    """Return the limits of a table, by the names of joint and angle."""
     joints = {joint: angles for joint, angles in table.items() if isinstance(angles, dict)}
     return {f"{joint}.{angle}": ends for joint, angles in joints.items() for angle, ends in angles.items()}
 
@@ -100,7 +101,7 @@ def _is_number(value: Any) -> bool:
 
 
 def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
-    """Return the ranges of pelvis and limbs: from a table of kind ``anatomical``, else from the figure's URDF."""
+    """Return the ranges of pelvis and limbs from a table of kind ``anatomical``, or else from the figure's URDF."""
     pelvis, right, left = (figure.neutral_points[JOINT[joint]] for joint in HIPS)
     return Limits.of(
         table if table and table["kind"] == "anatomical" else None,
@@ -111,20 +112,21 @@ def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
 
 
 def of_person(table: Mapping[str, Any], forward: float, outward: float) -> Mapping[str, Any]:
-    """Return anatomical ranges of a person whose hips lie before the line of the trunk in the median frame.
+    """Widen anatomical ranges for a person whose hips lie in front of the trunk's line in the median frame.
 
-    An unusual angle of the hips has two causes: the place of the pelvis joint in the skeleton, which moves the zeros of
-    pelvis and hips, and the person's usual posture. A recording does not separate the causes. So the ranges only
-    widen: an end moves if a moved zero takes it outward, and the opposite end stays.
+    An unusual median angle of the hips has two possible causes. The skeleton may define its pelvis joint at another
+    position, which shifts the zero angles of pelvis and hips. Or the person usually stands so. A recording does not
+    separate the causes. Therefore each limit moves only outward: the shift applies to the limit that it widens, and the
+    opposite limit stays unchanged.
 
     Parameters
     ----------
     table : mapping
         Ranges of kind ``anatomical``.
     forward : float
-        Angle of the hips before the trunk's line, degrees.
+        Angle by which the hips lie in front of the trunk's line, degrees.
     outward : float
-        Inward lean of straight thighs, degrees, because the hips are wider apart than usual.
+        Inward lean of straight thighs, degrees; positive if the hips are wider apart than usual.
     """
     moved = copy.deepcopy(dict(table))
     ways = [(moved["hip"]["abduction"], -outward)]

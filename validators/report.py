@@ -1,4 +1,4 @@
-"""`Report`: a table of findings; masks, spans, decisions about clips and summaries are computed from the table."""
+"""`Report`: a table of findings, with the masks, spans, decisions about clips and summaries computed from it."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 #: Largest distance between a cause and its effect, frames: the window over which `jitter` measures trembling.
 NEAR_FRAMES: Final = 15
 
-#: Longest gap inside one span, seconds. In frames it is at least the second number, also if the rate is not known.
+#: Longest gap inside one span, seconds. It is at least the number of frames that follows, also if the rate is unknown.
 MERGED_SECONDS, MERGED_FRAMES = 0.1, 3
 
-#: Excess over a bound that has severity 1, by unit: 1 cm of flesh, the spread of joint ranges between people in
-#: degrees, the sway of measured feet in metres a second. For other units it is a tenth of the bound.
+#: Excess over a bound with severity 1, by unit: 1 cm as the softness of flesh, 5 degrees as the standard deviation of
+#: joint ranges between people, 0.05 m/s as the sway of measured feet. For other units it is a tenth of the bound.
 SLIGHT: Final = {"m": 0.01, "deg": 5.0, "m/s": 0.05}
 
-#: Largest share of frames that two or more checks reject in a clip that can be repaired. Faults planted in up to 95 %
-#: of the frames of 10 recordings have up to 0.16 (one of 200: 0.95). Random points have 0.7 or more: repair would
-#: replace all of them.
+#: Largest share of frames that two or more checks reject in a repairable clip. For defects planted in up to 95 % of
+#: the frames of 10 recordings the share is up to 0.16, with one exception in 200 (0.95). For random points, all of
+#: which a repair would replace, it is 0.7 or more.
 MOST_TWICE_WRONG: Final = 0.5
 
-#: Advice for findings of checks without an advice of their own in ``urdf/checks.toml``.
+#: Advice for findings of a check that has no advice in ``urdf/checks.toml``.
 USUAL_REMEDY: Final = "leave such frames out with --keep-spans, or use --repair"
 
 #: Columns of the findings with real numbers.
@@ -51,23 +51,23 @@ class Span:
     Parameters
     ----------
     check, place, unit : str
-        The check, its worst place, and the unit of the numbers.
+        Name of the check, name of the worst joint or pair, and unit of the numbers.
     verdict : str
         ``invalid`` or ``undecided``.
     first, last : int
         First and last frame, both included.
     frames : int
-        Number of rejected frames.
+        Number of rejected or undecided frames.
     worst_frame : int
         Frame with the smallest margin.
     start, end : float
         Times of the first and the last frame, seconds; NaN if unknown.
     value, bound, margin : float
-        Value in the worst frame, the violated bound, and their difference, negative.
+        Value in the worst frame, the violated bound, and their difference, which is negative.
     severity : float
         Excess over the bound in multiples of a slight excess (`SLIGHT`).
     places : sequence of str
-        All rejected places, the worst first.
+        Names of all rejected joints or pairs, the worst first.
     """
 
     check: str
@@ -103,18 +103,18 @@ class ClipDecision:
     Parameters
     ----------
     file, name : str
-        File of the clip, and its name in the file; empty if it has none.
+        File of the clip, and the clip's name in the file; empty strings if unknown.
     decision : str
-        ``keep``; ``repair?`` if `posekit.repair` can remove all findings, and most frames fail one check at most;
+        ``keep``; ``repair?`` if `posekit.repair` can remove all findings and at most one check rejects most frames;
         otherwise ``drop``.
     reason : str
-        Name of the check with the first span; empty for clips to keep.
+        Name of the check that rejects the first span, or ``unknown joints``; empty for clips to keep.
     frames, invalid, undecided : int
         Numbers of all frames, rejected frames and undecided frames.
     severity : float
         Largest severity of the spans; 0 without rejected frames.
     spans : sequence of Span
-        Spans behind the decision: causes before their effects, then by severity.
+        Spans of the clip: rejections before undecided spans, causes before their effects, then by severity.
     good : (int, int) or None
         First and last frame of the longest run of valid frames.
     """
@@ -138,37 +138,37 @@ class ClipDecision:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Report(Record):
-    """Findings of checks in N frames.
+    """Findings of K checks in N frames of one or more clips.
 
     Parameters
     ----------
     clip, frame : int array (N,)
         Index of the clip of each frame, and the frame's number in that clip, from 0.
     time : array (N,)
-        Seconds; NaN if unknown.
+        Time of each frame, seconds; NaN if unknown.
     files, names : sequence of str
         File and name of each clip.
     checks, units : sequence of K str
         Names and units of the applied checks.
     places : sequence of str
-        Names of judged places; findings refer to them by index.
+        Names of the judged joints, angles, segments and pairs; findings refer to them by index.
     findings : mapping of arrays
-        Columns of the violations, sorted by frame: ``row`` (frame, from 0 to N - 1), ``check`` and ``place`` (indices),
-        ``value``, ``lower`` and ``upper`` (bounds with tolerance), ``margin`` (negative).
+        Columns of the violations, sorted by frame: ``row`` (index of the frame, from 0 to N - 1), ``check`` and
+        ``place`` (indices), ``value``, ``lower`` and ``upper`` (bounds with tolerance), ``margin`` (negative).
     margins : array (N, K)
-        Smallest margin of each check in shares of its range, negative outside; NaN if undecided.
+        Smallest margin of each check, as a share of its range; negative for violations, NaN if undecided.
     silent : bool array (N, K)
-        Whether a check of postures is undecided at all places.
+        Whether all values of a check of postures are undecided.
     incomplete : bool array (N,)
         Whether a joint is unknown.
     messages : mapping
-        Meaning of the findings of each check.
+        Meaning of the findings of each check, by the check's name.
     not_asked : mapping
-        Reasons of the checks that do not apply.
+        Reason why a check did not run, by the check's name.
     settings : mapping
-        Settings and tolerances of the verdicts.
+        Settings and tolerances of the checks.
     notes, warnings, refused : sequence of str
-        Remarks about the motion, doubts about it, and error lines of unreadable files.
+        Remarks about the motion, doubts about its correctness, and error messages of unreadable files.
 
     Examples
     --------
@@ -219,7 +219,7 @@ class Report(Record):
 
     @cached_property
     def undecided(self) -> NDArray[np.bool_]:
-        """Whether no check rejects a frame, but a joint is unknown or a check is undecided (N,)."""
+        """Whether no check rejects each frame (N,), but a joint is unknown or a check is undecided."""
         return locked(~self.invalid & (self.incomplete | self.silent.any(axis=1)))
 
     @cached_property
@@ -229,7 +229,7 @@ class Report(Record):
 
     @cached_property
     def worst(self) -> Array:
-        """Smallest margin of each frame (N,) in shares of the range: negative if rejected, NaN if undecided."""
+        """Smallest margin of each frame (N,) as a share of the range: negative if rejected, NaN if undecided."""
         least = np.fmin.reduce(self.margins, axis=1, initial=np.nan)
         return locked(np.where(self.undecided, np.nan, least))
 
@@ -241,7 +241,7 @@ class Report(Record):
 
     @cached_property
     def _cells(self) -> Columns:
-        """The findings, with a row of NaN for each frame and check that is undecided; sorted by frame and check."""
+        """Findings, and a row of NaN for each undecided check of a frame; sorted by frame and check."""
         rows, which = np.nonzero(self.silent & self.undecided[:, None])
         nothing = {"row": rows, "check": which, "place": np.full(len(rows), -1)}
         unknown = np.full(len(rows), np.nan)
@@ -258,8 +258,8 @@ class Report(Record):
         Returns
         -------
         dict
-            ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``: a row for each violation,
-            and a row whose numbers are NaN for each frame and check that is undecided.
+            ``clip, frame, time, check, place, value, lower, upper, unit, margin, verdict``. Each violation has one row.
+            Each undecided check of a frame has one row whose numbers are NaN.
         """
         cells = self._cells
         undecided = np.isnan(cells["margin"]).astype(np.intp)
@@ -286,9 +286,9 @@ class Report(Record):
         return pandas.DataFrame(clip_rows(self) if clips else self.table())
 
     def save(self, path: str | PathLike[str], *, clips: bool = False) -> None:
-        """Write the report: ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md``.
+        """Write the report to a ``.json``, ``.csv``, ``.npz``, ``.parquet`` or ``.md`` file.
 
-        With `clips`, ``.csv`` and ``.parquet`` have one row for each clip, with its decision, instead of the findings.
+        With `clips`, ``.csv`` and ``.parquet`` files contain the decision about each clip instead of the findings.
         """
         import posekit
 
@@ -329,7 +329,7 @@ class Report(Record):
         )
 
     def _spans(self, start: int, stop: int) -> Iterator[Span]:
-        """Group the findings and the undecided frames of a clip into spans of one check."""
+        """Group neighbouring findings, or neighbouring undecided frames, of the same check into spans."""
         step = np.diff(self.time[start:stop])
         step, gap = step[step > 0], MERGED_FRAMES
         if len(step):
@@ -385,7 +385,7 @@ class Report(Record):
         return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
-        """Return for each check the numbers of rejected frames and clips, its usual place, and its worst finding."""
+        """Return numbers of rejected frames and clips, the most frequent place, and the worst finding, by check."""
         counts: dict[str, dict[str, Any]] = {}
         for k, name in enumerate(self.checks):
             found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}
@@ -472,7 +472,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
-    """Return one report of several; checks and places of one name are the same."""
+    """Concatenate reports; checks and places with the same name are merged."""
     units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
     check_at = {name: k for k, name in enumerate(units)}
     places = dict.fromkeys(name for one in reports for name in one.places)
@@ -515,7 +515,7 @@ GROUND_NOTE: Final = "Ground estimated"
 
 
 def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return notes without duplicates, with one note in place of all notes about estimated grounds."""
+    """Return notes without duplicates; one note replaces all notes about estimated grounds."""
     grounds = sum(note.startswith(GROUND_NOTE) for note in notes)
     others = tuple(dict.fromkeys(note for note in notes if not note.startswith(GROUND_NOTE)))
     one = f"{GROUND_NOTE} in {plural(grounds, 'clip')}, from frames in which the body rests; state it with --ground."
@@ -524,17 +524,17 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
-    """Return ``urdf/checks.toml``: by check its rank among causes, whether repair helps, and the advice."""
+    """Read ``urdf/checks.toml``: each check's rank among causes and effects, whether repair helps, and the advice."""
     return tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
 
 
 def rank_of(check: str) -> int:
-    """Return the rank of a check among causes and effects: 0 for causes, above 1 for effects, 1 for other checks."""
+    """Return the causal rank of a check: 0 for causes, above 1 for effects of other defects, 1 for other checks."""
     return int(_known_checks().get(check, {}).get("rank", 1))
 
 
 def _in_order(spans: list[Span]) -> list[Span]:
-    """Sort spans: rejections before undecided spans, causes before effects near them, then by severity."""
+    """Sort spans: rejections before undecided spans, causes before neighbouring effects, then by severity."""
     ranks = [rank_of(span.check) for span in spans]
     rejected = [span.verdict == "invalid" for span in spans]
 
@@ -559,7 +559,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def clip_rows(report: Report) -> list[dict[str, Any]]:
-    """Return the clips as rows of a table: file, clip, decision, reason, counts of frames, severity, spans."""
+    """Return a table of the clips: file, name, decision, reason, counts of frames, severity, worst span."""
     rows = []
     for clip in report.clips:
         row = {name: getattr(clip, name) for name in ("decision", "reason", "frames", "invalid", "undecided")}

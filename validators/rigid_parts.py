@@ -1,4 +1,4 @@
-"""Rigid parts: bones keep their lengths, torso and hips their shape (Lee & Chen 1985, §3.2.B)."""
+"""Rigid parts: the lengths of bones and the shapes of torso and hips are constant (Lee & Chen 1985, §3.2.B)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from posekit.validators.check import Judgement
 
 TORSO_POINTS: Final = [JOINT[name] for name in TORSO]
 
-#: Smallest tolerance by which margins are divided, metres.
+#: Smallest divisor of margins, metres, for tolerances near zero.
 LEAST_SCALE: Final = 1e-3
 
-#: Signs of the torso's coordinates in its mirror image, which exchanges front and back.
+#: Factors of the torso's coordinates that mirror it, so that front and back are exchanged.
 MIRROR: Final = np.array([-1.0, 1.0, 1.0])
 
 
@@ -34,10 +34,10 @@ class RigidParts:
     segments : tuple of (int, int)
         Pairs of joints; the check judges their distances.
     torso : bool
-        Judge the shape of the torso too. For exact postures the check aligns the figure's torso with the posture's, as
-        the closed-form computation of q does, and compares points. For other postures it judges only whether the
-        shoulders lie on the right side of the line from neck to pelvis, front or back: distances do not determine the
-        side.
+        Whether to judge the shape of the torso too. For exact postures the check aligns the figure's torso with the
+        posture's torso, as the closed-form inverse kinematics does, and compares points. For other postures it judges
+        only whether the shoulders lie in front of or behind the line from neck to pelvis, as in the figure, because
+        distances do not determine this.
     """
 
     name = "rigid-parts"
@@ -60,7 +60,7 @@ class RigidParts:
         return [*(replace(torso, segments=(segment,), torso=False) for segment in RIGID_SEGMENTS), torso]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None unless postures are exact."""
+        """Return the check as steps of the compiled tree; None if postures are not exact."""
         if body.tolerance is None or not body.tolerance.exact:
             return None
         found = [
@@ -80,7 +80,7 @@ class RigidParts:
         return found
 
     def judge(self, body: Body) -> Judgement:
-        """Compare distances and the torso with the figure's."""
+        """Compare segment lengths and the torso with those of the figure."""
         names = [segment_name(segment) for segment in self.segments]
         length = np.array([body.lengths[name] for name in names])
         value = body.segment_lengths[[SEGMENTS.index(segment) for segment in self.segments]].T
@@ -95,7 +95,10 @@ class RigidParts:
 
     @staticmethod
     def _side(body: Body) -> tuple[Array, float, float]:
-        """Return how far the shoulders lie on the figure's side (N,), and bounds; NaN if the side is unknown."""
+        """Return the shoulders' offset from the trunk's line, positive on the figure's side (N,), and its bounds.
+
+        The offset is NaN if the side is unknown.
+        """
         figure = body.figure
         offset = figure.shoulder_offset if figure.shoulder_side != "undecided" else np.nan
         tolerance = body.rigid_tolerance(RIGID_SEGMENTS[0])
@@ -107,7 +110,7 @@ class RigidParts:
 
     @staticmethod
     def _placement(body: Body) -> tuple[Array, float, float]:
-        """Return the largest distance (N,) of a torso joint from the aligned torso of the figure, and bounds."""
+        """Return the largest distance (N,) of a torso joint from the figure's aligned torso, and its bounds."""
         figure, points = body.figure, body.joints[:, TORSO_POINTS]
         R = torso_frame(*np.moveaxis(points, 1, 0))
 
@@ -117,6 +120,6 @@ class RigidParts:
 
         torso, tolerance = figure.neutral_points[TORSO_POINTS], body.rigid_tolerance(RIGID_SEGMENTS[0])
         value = apart(torso)
-        if not figure.side_known:  # a torso that fits the mirror image only is undecided
+        if not figure.side_known:  # a torso that fits only the mirror image is undecided
             value = np.where((value > tolerance) & (apart(torso * MIRROR) <= tolerance), np.nan, value)
         return value, -np.inf, tolerance

@@ -1,4 +1,4 @@
-"""Checks of the configurations of a robot: joint limits, mimicking joints, collision, and reach of positions."""
+"""Checks of the configurations of a robot: joint limits, mimic joints, self-collision, and reach of given positions."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from posekit.validators.ranges import load_ranges
 if TYPE_CHECKING:
     from posekit.robots import Robot
 
-#: Tolerance of mimicking joints, degrees: files with few digits have such rounding.
+#: Tolerance of mimic joints, degrees, for angles that a file rounds to few digits.
 MIMIC_DEGREES: Final = 0.5
 
 #: Tolerance for rounding, metres.
 CONTACT_METRES: Final = 1e-9
 
-#: Largest measured distance between bodies, which is also the margin that counts as 1, metres.
+#: Largest measured distance between bodies, metres; it is also the margin with a share of 1.
 NEAR_METRES: Final = 0.02
 
 
-#: Largest distance of a foot's joint from the ankle, as a share of the leg; and range of heights of a sole, metres.
+#: Largest distance of a foot's joint from the ankle, as a share of the leg; and range of heights in one sole, metres.
 FOOT_SHARE, SOLE_METRES = 0.1, 0.02
 
 
@@ -54,13 +54,13 @@ def order_doubts(body: Body) -> list[str]:
 
 @check("joint-range", unit="deg", reads=("q", "robot"))
 def robot_range(body: Body) -> Judgement:
-    """Joints are outside the limits of their URDF, or of the table of ranges in the settings."""
+    """Joints are outside the limits of the URDF, or of the table of ranges in the settings."""
     return _range(body, "rad", float(np.degrees(1.0)))
 
 
 @check("joint-travel", unit="m", reads=("q", "robot"))
 def robot_travel(body: Body) -> Judgement:
-    """Sliding joints are outside the limits of their URDF."""
+    """Prismatic joints are outside the limits of the URDF."""
     return _range(body, "m", 1.0)
 
 
@@ -68,7 +68,7 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
     robot, q = _of(body)
     lower, upper = np.array(robot.lower), np.array(robot.upper)
     names, table = list(robot.configuration_names), load_ranges(body.settings.ranges)
-    # Tables of other kinds hold angles of people.
+    # Tables of other kinds have limits of people's angles.
     limits = table["limits"] if table is not None and table["kind"] == "joints" else {}
     for at, name in enumerate(names):
         if name in limits:
@@ -84,7 +84,7 @@ def _range(body: Body, unit_of_q: str, factor: float) -> Judgement:
 
 
 def _of(body: Body) -> tuple[Robot, Array]:
-    """Return the robot and its configurations; both are known if a check reads them."""
+    """Return the robot and its configurations for a check that reads both."""
     return cast("tuple[Robot, Array]", (body.robot, body.q))
 
 
@@ -92,7 +92,7 @@ def _of(body: Body) -> tuple[Robot, Array]:
 def mimic_joints(body: Body) -> Judgement:
     """Joints do not follow the joints that they mimic.
 
-    The value is the difference of a mimicking joint from its value by its target.
+    The value is the difference between a mimic joint and the position that its target joint prescribes.
     """
     robot, q = _of(body)
     if not robot.mimics:
@@ -105,8 +105,9 @@ def mimic_joints(body: Body) -> Judgement:
 def robot_collision(body: Body) -> Judgement:
     """Two bodies of the robot penetrate each other.
 
-    The value is the distance of two bodies. The place ``bodies`` is the nearest pair. Distances above `NEAR_METRES` are
-    infinite, as are distances of meshes that do not touch: measuring them would double the cost of a verdict.
+    The value is the distance between two bodies. The place ``bodies`` is the nearest pair. Distances above
+    `NEAR_METRES` are reported as infinite. So are distances between meshes that do not touch, because measuring them
+    would double the time of the check.
     """
     robot, q = _of(body)
     if not robot.collision_pairs:
@@ -124,16 +125,16 @@ def robot_collision(body: Body) -> Judgement:
     value[known[found.frame[touching]], column] = found.distance[touching]
     links = dict(zip(robot.body_names, robot.body_links, strict=True))
     places = ["-".join(links[name] for name in robot.collision_pairs[pair]) for pair in pairs.tolist()]
-    # Pairs that touch have places of their own.
+    # Each pair that touches has its own place.
     value[value[:, -1] < margin, -1] = np.inf
     return Judgement([*places, "bodies"], value, margin, tolerance=CONTACT_METRES, scale=NEAR_METRES)
 
 
 @check("reach", unit="m", reads=("q", "robot"))
 def reach(body: Body) -> Judgement:
-    """Given positions of joints are beyond the reach of the robot within its limits.
+    """Joints cannot reach their given positions within the robot's limits.
 
-    The value is the distance of each joint of the fitted configuration from its given position.
+    The value is the distance between a joint in the fitted configuration and its given position.
     """
     if body.residual is None:
         raise NotAskedError("configurations are given, not positions")
@@ -148,9 +149,9 @@ CONFIGURATION_CHECKS: Final = (reach, robot_range, robot_travel, mimic_joints, r
 
 @lru_cache(maxsize=4)
 def _soles(robot: Robot) -> tuple[list[int], Array] | None:
-    """Return joint indices and positions in these joints (4, 3) of toes and heels, or None if the robot has no feet.
+    """Return the joint indices of toes and heels, and their positions in the joints' frames (4, 3); None without feet.
 
-    Toes and heels are front and back corners of the boxes around the bodies of the feet.
+    Toes and heels are the front and back corners of the bounding boxes of the foot bodies.
     """
     import pinocchio as pin
 
@@ -188,7 +189,7 @@ def _box(shape: Any) -> Array:
 
 
 def sole_points(robot: Robot, q: Array) -> Array:
-    """Return the toes and heels (N, 4, 3) of configurations, metres; NaN if the robot has no feet."""
+    """Return the positions of toes and heels (N, 4, 3) in configurations, metres; NaN if the robot has no feet."""
     points = np.full((len(q), len(FEET_POINTS), 3), np.nan)
     soles = _soles(robot)
     if soles is not None:

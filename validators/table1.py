@@ -1,17 +1,19 @@
-r"""Joint ranges by the angles of Lee & Chen 1985, §3.2.A: as rotations from standing, or projected as printed.
+r"""Joint ranges of the angles of Lee & Chen 1985, §3.2.A, defined as rotations from standing or as printed.
 
-The torso's frame has x forward, y down and z left. Angles as rotations (kind ``rotation``) are continuous wherever a
-limb can be:
+The torso's frame has x forward, y down and z left. The angles of kind ``rotation`` are continuous in all postures that
+limbs reach:
 
-An upper arm u at :math:`\rho` from y is the image of y under a shortest rotation. The part of this rotation about z is
-flexion, the part about x is abduction, :math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)` with
-:math:`\rho = \arccos u_y`. A thigh has the printed flexion :math:`\operatorname{atan2}(u_x, u_y)`, and abduction is the
-angle out of the plane of flexion. Elbow and knee bend about z', the axis z carried along by the upper segment. With v
-the lower segment and :math:`\psi` its angle to u, flexion is :math:`\psi\,(v \times u) \cdot z' / \sin\psi`, its
-negative at a knee. Pelvis and neck have the parts about z, y and x of the rotation of their plane.
+For an arm, let u be the direction of the upper arm. The shortest rotation from y to u has the angle
+:math:`\rho = \arccos u_y`. The z component of its rotation vector is flexion, the x component is abduction:
+:math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)`. A thigh has the printed flexion
+:math:`\operatorname{atan2}(u_x, u_y)`; its abduction is the angle between thigh and plane of flexion. Elbow and knee
+bend about z', the image of the axis z under the rotation of the upper segment. Let v be the direction of the lower
+segment and :math:`\psi` the angle between u and v. The flexion of an elbow is
+:math:`\psi\,(v \times u) \cdot z' / \sin\psi`; a knee has the opposite sign. The angles of pelvis and neck are the z, y
+and x components of the rotation vector of their plane.
 
-As printed (kind ``projected``) flexion and abduction are angles of projections onto the planes of the frame. A
-projection that is too short is undecided, and an angle jumps if a limb passes the normal of a plane.
+The printed angles (kind ``projected``) are angles of projections onto the planes of the torso's frame. An angle is
+undecided if the projection is too short. It jumps if a limb passes the normal of the plane.
 """
 
 from __future__ import annotations
@@ -29,20 +31,20 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement
 
 HIP_SIGNS: Final = (1.0, -1.0, 1.0)
-#: Signs of the flexion, rotation and bending of a plane that make them angles of the head.
+#: Signs that turn flexion, rotation and bending of a plane into the angles of the head.
 HEAD_SIGNS: Final = (-1.0, 1.0, -1.0)
 
 PLANE_ANGLES: Final = ("flexion", "rotation", "bending")
 
-#: Smallest divisor among sines and cosines.
+#: Smallest sine or cosine used as a divisor.
 LEAST_SINE: Final = 1e-12
 
-#: Angles this near to -180 degrees count as 180, degrees.
+#: Largest distance from -180 degrees at which an angle counts as 180, degrees.
 ROUNDING_DEGREES: Final = 1e-3
 
 
 def table1_angles(body: Body, table: Mapping[str, Any], parts: Sequence[str]) -> Judgement:
-    """Judge parts of postures by a table of kind ``rotation`` or ``projected``."""
+    """Judge neck, pelvis or limbs by a table of kind ``rotation`` or ``projected``."""
     R = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
     axes = np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
     return Judgement.stacked(
@@ -51,7 +53,7 @@ def table1_angles(body: Body, table: Mapping[str, Any], parts: Sequence[str]) ->
 
 
 def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
-    """Judge the rotation of the plane of the hips or of the head against the torso (§3.2.A iii and iv).
+    """Judge the rotation of the plane of the hips or of the head relative to the torso (§3.2.A iii and iv).
 
     The normal of the head's plane is the direction that the head faces.
     """
@@ -87,7 +89,7 @@ def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judg
 
 
 def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
-    """Judge a limb (§3.2.A i and ii); a hip has its wide range only if the knee is flexed (Table 1, note a)."""
+    """Judge a limb (§3.2.A i and ii); the range of a hip is wide only if the knee is flexed (Table 1, note a)."""
     side, ball = part.split("_")
     hinge, end = ("elbow", "wrist") if ball == "shoulder" else ("knee", "ankle")
     joints = [JOINT[f"{side}_{name}"] for name in (ball, hinge, end)]
@@ -128,11 +130,11 @@ def _ball(
     if joint == "shoulder":
         sine = np.hypot(x, z)
         rho = np.arctan2(sine, y)
-        raised = np.where(sine > 0, [x, z], [[1.0], [0.0]])  # an arm straight up is flexed by 180
+        raised = np.where(sine > 0, [x, z], [[1.0], [0.0]])  # a raised vertical arm is flexed by 180
         gain = np.maximum(rho / np.maximum(sine, LEAST_SINE), 1.0)
         return np.degrees(rho * raised / np.where(sine > 0, sine, 1.0)).T, one * gain[:, None]
     across, middle = np.hypot(x, y), sum(table["hip"]["flexion"]) / 2
-    # Flexion is within half a turn of the middle of its range, so that it jumps where both ends are equally far.
+    # Flexion is at most half a turn from the middle of its range, so that it jumps farthest from both limits.
     flexion = middle + np.mod(np.degrees(np.arctan2(x, y)) - middle + 180.0, 360.0) - 180.0
     gains = np.stack([1 / np.maximum(across, LEAST_SINE), np.ones_like(across)], axis=-1)
     return np.stack([flexion, np.degrees(np.arctan2(z, across))], axis=-1), gains
@@ -145,13 +147,13 @@ def _hinge(u: Array, v: Array, joint: str, table: Mapping[str, Any], tolerance: 
         w = cross(v, u)
         size = np.linalg.norm(w, axis=1)
         bend = np.degrees(np.arctan2(size, dot(u, v)))
-        # The elbow of an arm that points sideways bends about y: z is zero except for rounding, and counts as flexion.
+        # The elbow of an arm that points sideways bends about y. The z component is rounding; it counts as flexion.
         flexion = np.where(forward * w[:, 2] >= -np.radians(tolerance) * size, bend, -bend)
         return flexion, np.ones(len(flexion))
     u, v = unit(u), unit(v)
     x, y, z = u.T
     if joint == "elbow":
-        # 1 + y without cancellation near straight up, where it is quadratic in the angle from there.
+        # 1 + y without cancellation for a nearly vertical raised arm, where it is quadratic in the angle from vertical.
         top = np.where(y < 0, (x * x + z * z) / (1 - np.minimum(y, 0.0)), 1 + y)
         safe = np.maximum(top, LEAST_SINE**2)
         axis = np.stack([-x * z / safe, -z, 1 - z * z / safe], axis=-1)

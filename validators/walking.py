@@ -1,9 +1,10 @@
-"""The walking model of Lee & Chen 1985, §3.3: Rules 1-5 of one instant.
+"""The walking model of Lee & Chen 1985, §3.3: Rules 1 to 5, which judge single postures.
 
-The body plane contains the line from neck to pelvis and is normal to the moving direction. The moving direction is the
-direction that the trunk faces, midway between shoulders and hips; in a sequence it is the direction of the neck's
-motion (`WalkingRules.heading`). The paper uses the direction that the head faces (walkers ``paper-printed``). A person
-who stands and turns the head by 15 degrees then breaks Rule 2, because arm and leg of one side seem to swing together.
+The body plane contains the line from neck to pelvis and is normal to the moving direction. In a single posture the
+moving direction is the mean of the directions that shoulders and hips face. In a sequence it is the direction of the
+neck's motion (`WalkingRules.heading`). The paper uses the direction that the head faces (walkers ``paper-printed``).
+But then a person who stands and turns the head by 15 degrees violates Rule 2, because arm and leg of one side seem to
+swing together.
 
 The *swing* of a joint is its displacement out of the body plane, minus its displacement in the neutral posture of the
 figure. Rules about a swing near zero are undecided.
@@ -26,20 +27,20 @@ from posekit.validators.check import Judgement
 LIMB_PARTS: Final = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
 
 
-#: Thresholds of the rules by walkers; the paper gives no numbers. ``elbow``, ``knee``, ``girdle``: least swing of
-#: elbows, of knees, and of shoulders and hips, metres. ``out`` (rule 4): largest angle between a limb's segment and the
-#: plane of moving direction and body axis, degrees. ``flexed``, ``lean`` (rule 5): least flexion of a flexed knee,
-#: largest lean of the other leg from the body axis, degrees. The thresholds of people fit real walkers (16 clips of CMU
-#: motion capture): compared with the figure, their shoulders lie behind and their hips in front, their arms turn
-#: outward out of the plane, and both knees are bent while one leg passes the other.
+#: Thresholds of the rules, by the setting ``walkers``; the paper gives no numbers. ``elbow``, ``knee``, ``girdle``:
+#: minimum swing of elbows, of knees, and of shoulders and hips, metres. ``out`` (rule 4): largest angle between a
+#: limb's segment and the plane of moving direction and body axis, degrees. ``flexed``, ``lean`` (rule 5): minimum
+#: flexion of a flexed knee, and largest lean of the other leg from the body axis, degrees. The thresholds ``people``
+#: were fitted to real walkers (16 clips of CMU motion capture). Unlike the figure, their shoulders lie behind and their
+#: hips in front of the body plane, their arms swing outward, and both knees are bent while one leg passes the other.
 THRESHOLDS: Final[Mapping[str, Mapping[str, float]]] = {
     "paper": {"elbow": 0.02, "knee": 0.02, "girdle": 0.01, "out": 10.0, "flexed": 15.0, "lean": 30.0},
     "people": {"elbow": 0.10, "knee": 0.25, "girdle": 0.06, "out": 35.0, "flexed": 40.0, "lean": 35.0},
 }
 
-#: Rules 1 to 3: two joints that swing to the same side (1) or to opposite sides (-1) of the body plane. Rule 1: the two
-#: arms, and the two legs, swing oppositely. Rule 2: so do arm and leg of one side. Rule 3: shoulder and elbow, and hip
-#: and knee, swing together.
+#: Pairs of joints of Rules 1 to 3 that swing to the same side (1) or to opposite sides (-1) of the body plane. Rule 1:
+#: the two arms swing to opposite sides, and so do the two legs. Rule 2: arm and leg of one side swing to opposite
+#: sides. Rule 3: shoulder and elbow swing to the same side, and so do hip and knee.
 SWINGS: Final[Mapping[str, tuple[str, str, int]]] = {
     **{f"rule1.{limb}": (f"right_{mid}", f"left_{mid}", -1) for limb, _, mid, _ in LIMB_PARTS},
     **{f"rule2.{side}": (f"{side}_elbow", f"{side}_knee", -1) for side in SIDES},
@@ -53,12 +54,12 @@ SWINGS: Final[Mapping[str, tuple[str, str, int]]] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WalkingRules:
-    """The limbs are not where a walker's limbs are.
+    """The limbs do not swing as a walker's limbs do.
 
     Parameters
     ----------
     rules : tuple of int, optional
-        Rules, 1 to 5; by default the rules of the settings.
+        Numbers of the rules to judge, 1 to 5; by default the rules of the settings.
     heading : array (N, 3), optional
         Moving direction of each posture, unit vectors; NaN if unknown.
     """
@@ -72,7 +73,7 @@ class WalkingRules:
     heading: Array | None = None
 
     def judge(self, body: Body) -> Judgement:
-        """Judge the rules; values are in multiples of the thresholds, positive if a rule holds."""
+        """Judge the rules; values are multiples of the thresholds, positive if a rule holds."""
         limits = THRESHOLDS["people" if body.settings.walkers == "people" else "paper"]
         axes = self._axes(body)
         swing = _swings(body, axes[0], limits)
@@ -84,7 +85,7 @@ class WalkingRules:
         return Judgement(places, value, lower=0.0, scale=1.0)
 
     def _axes(self, body: Body) -> tuple[Array, Array, Array]:
-        """Return the moving direction, the direction to the left, and the direction down the body (N, 3)."""
+        """Return the moving direction, the direction to the left, and the direction from neck to pelvis (N, 3)."""
         joints = body.joints
         R_torso = torso_frame(*(joints[:, JOINT[name]] for name in TORSO))
         down, facing = -R_torso[:, :, 2], R_torso[:, :, 0]
@@ -101,7 +102,7 @@ class WalkingRules:
 
 
 def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
-    """Return the swing of each joint (N, 14) in multiples of the least swing; NaN for smaller swings."""
+    """Return the swing of each joint (N, 14) in multiples of the minimum swing; NaN for smaller swings."""
     out = np.einsum("nji,ni->nj", body.joints - body.joints[:, :1], forward)
     swing = out - body.figure.neutral_points[: len(JOINTS), 0]
     least = [limits.get(name.split("_")[-1], limits["girdle"]) for name in JOINTS]
@@ -109,7 +110,7 @@ def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
 
 
 def _together(swing: Array, one: str, other: str) -> Array:
-    """Return the smaller of the swings of two joints (N,), positive if both are to the same side."""
+    """Return the smaller swing of two joints (N,), positive if both swing to the same side."""
     a, b = swing[:, JOINT[one]], swing[:, JOINT[other]]
     return np.sign(a * b) * np.minimum(np.abs(a), np.abs(b))
 
@@ -127,7 +128,7 @@ def _planes(body: Body, left: Array, most: float) -> dict[str, Array]:
 
 
 def _legs(body: Body, down: Array, limits: Mapping[str, float]) -> dict[str, Array]:
-    """Judge rule 5: at most one knee is flexed; then the other leg stands nearly vertically."""
+    """Judge rule 5: at most one knee is flexed, and the other leg is then nearly parallel to the body axis."""
     flexion, lean = [], []
     for side in SIDES:
         hip, knee, ankle = (body.joints[:, JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))

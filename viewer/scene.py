@@ -56,7 +56,7 @@ BATCH: Final = 40
 #: Distance of the drawn image plane from the camera, metres.
 IMAGE_DEPTH: Final = 0.6
 
-#: Least share of pixels that differ from the background: WebGL can fail with an empty picture.
+#: Minimum share of pixels that differ from the background: WebGL can fail with an empty picture.
 LEAST_DRAWN: Final = 2e-4
 
 

@@ -34,7 +34,7 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
     "--fov", type=click.FloatRange(1, 179), metavar="DEGREES", hidden=True, help="Horizontal field of view."
 )
 @option("--size", default=None, metavar="WxH", hidden=True, help="Width and height of the pictures, pixels.")
-@option("--min-confidence", type=float, default=0.0, hidden=True, help="Least confidence of a key point.")
+@option("--min-confidence", type=float, default=0.0, hidden=True, help="Minimum confidence of a key point.")
 @option("--linkage", default="", metavar="NAME|FILE", help="An articulated object other than a person.")
 @option(
     "--explain", is_flag=True, help="Print the rejected branches and their reasons, and why frames are empty."

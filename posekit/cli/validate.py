@@ -40,7 +40,7 @@ BAD_INPUT = 2
     type=click.Path(path_type=Path),
     help="New folder for the clips that pass; with --keep-spans SECONDS also for good parts of the others.",
 )
-@option("--keep-spans", metavar="SECONDS", default=None, hidden=True, help="Least duration of a good part.")
+@option("--keep-spans", metavar="SECONDS", default=None, hidden=True, help="Minimum duration of a good part.")
 @option(
     "--repair",
     metavar="FILE|DIR",

@@ -1,9 +1,9 @@
-"""Checks of defects of frames: missing, repeated, shuffled, exchanged sides, jumps, trembling, drifting lengths.
+"""Checks of recording defects: missing, repeated and shuffled frames, exchanged sides, jumps, jitter, drifting lengths.
 
-A jump also exceeds bounds of speed, acceleration and jerk; so do exchanged labels and shuffled frames. To report each
-defect once, `explained` looks for defects in a fixed order: time stamps, repeated frames, frames out of order,
-exchanged sides, jumps. Each step leaves out the frames that earlier steps explain. The other checks of motion judge the
-remaining joints, with corrected sides, in slots of even time; NaN replaces frames with a defect.
+Jumps, exchanged labels and shuffled frames also exceed bounds of speed, acceleration and jerk. To report each defect
+once, `explained` searches for defects in a fixed order: time stamps, repeated frames, frames out of order, exchanged
+sides, jumps. Each search skips the frames with defects found earlier. The other checks of motion judge the remaining
+joints: sides are corrected, frames are resampled to slots of equal duration, and frames with a defect are NaN.
 """
 
 from __future__ import annotations
@@ -24,72 +24,74 @@ from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS, SIDE_PAIR
 from posekit.validators.motion.timeline import Timeline, median_of_five, timeline_of
 from posekit.validators.motion.trembling import trembling_frames, trembling_of, usual_trembling
 
-#: Largest share of a step by which a time stamp may be early; an earlier stamp has no slot of its own.
+#: Largest share of a time step by which a time stamp may be early; a frame with an earlier stamp counts as repeated.
 TWICE_FRAMES: Final = 0.75
 
-#: Largest number of successive copies of a frame that `repeated` reports; longer runs are a held posture (`frozen`).
+#: Longest run of copies of a frame that `repeated` reports; longer runs are a frozen posture (`frozen`).
 LONGEST_REPEAT: Final = 4.0
 
-#: Least rate at which thrown limbs do not look like jumps, frames per second.
+#: Minimum frame rate of `teleport`, frames per second; at lower rates fast limbs look like jumps.
 JUMPING_RATE: Final = 15.0
 
-#: Least rate at which fast motion is smooth from frame to frame, frames per second.
+#: Minimum frame rate of `jitter`, frames per second; at lower rates fast motion is not smooth from frame to frame.
 TREMBLING_RATE: Final = 25.0
 
-#: Tolerances for measuring noise, in standard deviations.
+#: Tolerances of `teleport`, `jitter` and `drift` for measurement noise, in standard deviations.
 TELEPORT_DEVIATIONS, JITTER_DEVIATIONS, DRIFT_DEVIATIONS = 5.0, 2.0, 4.0
 
-#: Noise of measuring is alike in all frames: the 2nd percentile of trembling is 0.4 to 0.9 times the median. If the
-#: ratio is smaller than this share, trembling is a local defect, and that percentile is the noise.
+#: Measurement noise is similar in all frames: the 2nd percentile of jitter is 0.4 to 0.9 times the median. If the ratio
+#: is smaller than this share, jitter is a local defect, and the percentile estimates the noise.
 CALM_PERCENT, CALM_SHARE = 2.0, 0.3
 
-#: Share of frames with another length above which either length may be the usual one.
+#: Minimum share of frames with another length, above which this length is a candidate for the usual length.
 LEAST_OTHER: Final = 0.2
 
-#: Trembling of a joint above which `drift` allows for trembling lengths, metres; `jitter` reports it.
+#: Jitter of a joint above which `drift` tolerates the jitter of lengths, metres; `jitter` reports such joints.
 SHAKEN_METRES: Final = 0.0025
 
 
-#: Largest distance of equal positions, metres: a number written with 32 and with 64 bits differs.
+#: Largest distance between positions that count as equal, metres: it covers rounding to 32 bits.
 SAME_METRES: Final = 1e-6
 
-#: Least step of the fastest joint in a frame of a moving body, metres. In slower motion rounding may repeat frames.
+#: Minimum displacement of the fastest joint per frame of a moving body, metres. In slower motion rounding may make
+#: frames equal.
 MOVED_METRES: Final = 1e-3
 
-#: Number of frames before and after a run of duplicates in one of which the body must move.
+#: Number of frames before, and after, a run of duplicates among which the body must move in at least one.
 MOVING_FRAMES: Final = 3
 
 
-#: Joints without a side.
+#: Joints on the midline of the body.
 MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
 
-#: Largest number of frames to order at once; longer stretches are ordered in parts.
+#: Largest number of frames to sort at once; longer intervals are sorted in parts.
 LONGEST_STRETCH: Final = 600
 
 #: Largest path length of a better order, as a share of the path length in the given order.
 SHORTER_SHARE: Final = 0.6
 
-#: Least number of frames out of order in a stretch.
+#: Minimum number of frames out of order in an interval.
 LEAST_FRAMES: Final = 3
 
-#: Least step of a moving joint, metres.
+#: Minimum displacement per frame of a moving joint, metres.
 LEAST_METRES: Final = 0.005
 
-#: Least number of moving joints in a frame out of order; one or two joints that turn back tremble.
+#: Minimum number of moving joints in a frame out of order; one or two reversing joints are jitter.
 LEAST_JOINTS: Final = 3
 
-#: Least rate at which motion shows the order of frames, frames per second; at lower rates people turn back in a frame.
+#: Minimum rate at which motion shows the order of frames, frames per second; at lower rates people reverse their motion
+#: within a frame.
 ORDERED_RATE: Final = 20.0
 
-#: Largest distance between frames of one stretch in which joints turn back.
+#: Largest distance, in frames, between frames with reversing joints in one interval.
 TURNS_APART: Final = 6
 
-#: Number of frames before and after a stretch that are ordered with it, so that its ends find their places.
+#: Number of frames before and after an interval that are sorted together with it.
 AROUND_FRAMES: Final = 4
 
 
 def needs_rate(body: Body, least: float) -> None:
-    """Raise `NotAskedError` if a body has fewer than `least` frames per second."""
+    """Raise `NotAskedError` if the frame rate of a body is below `least` frames per second."""
     if body.rate < least:
         raise NotAskedError(f"it needs {least:g} frames per second")
 
@@ -101,9 +103,9 @@ def timing(body: Body, *, missing: float = 0.5, displaced: float = 0.5) -> Judge
     Parameters
     ----------
     missing : float
-        Allowed number of missing frames before a frame. Inexact time stamps give fractions.
+        Allowed number of missing frames before a frame. It is a fraction if time stamps are inexact.
     displaced : float
-        Allowed number of frames by which a frame is out of order, by its time or by the motion.
+        Allowed difference between a frame's index and its index in the order of time stamps or of motion, frames.
     """
     found = explained(body)
     by_time = found.timeline.place
@@ -118,7 +120,7 @@ def timing(body: Body, *, missing: float = 0.5, displaced: float = 0.5) -> Judge
 
 @check("frozen", unit="frames", reads=("joints",), over_time=True)
 def frozen(body: Body, *, longest: float = LONGEST_REPEAT) -> Judgement:
-    """Postures are held exactly while the body moves before and after.
+    """Postures stay exactly the same while the body moves before and after.
 
     Parameters
     ----------
@@ -149,11 +151,11 @@ def swap(body: Body, *, most: float = 0.0) -> Judgement:
     Parameters
     ----------
     most : float
-        0 allows no exchange, 1 allows all; `posekit.validators.motion.sides` finds them.
+        0 reports each exchange, 1 none. `posekit.validators.motion.sides` detects the exchanges.
     """
     if len(body) < 2 or body.q is not None:
         raise NotAskedError(
-            "it needs two frames" if body.q is None else "the names of q tell right from left"
+            "it needs two frames" if body.q is None else "the names of q determine right and left"
         )
     exchanged = explained(body).exchanged.astype(np.float64)
     return Judgement(SIDE_PAIRS, exchanged, upper=most + 0.5, scale=0.5)
@@ -168,7 +170,7 @@ def teleport(clip: Body, /, *, joint: float = 0.07, body: float = 0.06) -> Judge
     joint : float
         Largest allowed jump of a single joint, metres; `posekit.validators.motion.jumps` measures it.
     body : float
-        Largest allowed jump of the whole body, for one frame or for good, metres.
+        Largest allowed jump of the whole body, for one frame or permanently, metres.
     """
     needs_rate(clip, JUMPING_RATE)
     found = explained(clip)
@@ -205,12 +207,12 @@ def jitter(body: Body, *, deviation: float = 0.006) -> Judgement:
 
 @check("drift", unit="1", reads=("joints",), over_time=True)
 def drift(body: Body, *, share: float = 0.025) -> Judgement:
-    """Limb segments are longer or shorter than they mostly are in the clip.
+    """Limb segments are longer or shorter than usual in the clip.
 
     Parameters
     ----------
     share : float
-        Largest allowed difference from the median length, as a share of it.
+        Largest allowed difference from the usual length, as a share of the usual length.
     """
     found = explained(body)
     starts, ends = (list(one) for one in zip(*LIMB_SEGMENTS, strict=True))
@@ -230,10 +232,10 @@ def drift(body: Body, *, share: float = 0.025) -> Judgement:
 
 
 def _usual(lengths: Array, share: float) -> Array:
-    """Return the usual length (K,) of the segments of `LIMB_SEGMENTS`, metres: the median in most clips.
+    """Return the usual lengths (K,) of the segments of `LIMB_SEGMENTS`, metres: the median in most clips.
 
-    If many frames differ from the median, the median of these frames is a candidate too; the candidate that is nearer
-    to the length of the segment's other side is the usual length.
+    If many frames differ from the median, the median of these frames is a second candidate. The usual length is then
+    the candidate nearer to the length of the same segment on the other side of the body.
     """
     usual = np.array([known_median(column) or np.nan for column in lengths.T])
     for k, column in enumerate(lengths.T):
@@ -245,7 +247,7 @@ def _usual(lengths: Array, share: float) -> Array:
 
 
 def _smooth(lengths: Array) -> Array:
-    """Return medians of lengths over five slots (S, K); the last known length replaces unknown neighbours."""
+    """Return running medians of lengths over five slots (S, K); the last known length replaces unknown lengths."""
     known = np.isfinite(lengths)
     last = np.maximum.accumulate(np.where(known, np.arange(len(lengths))[:, None], 0), axis=0)
     return np.where(known, median_of_five(np.take_along_axis(lengths, last, axis=0)), np.nan)
@@ -253,24 +255,24 @@ def _smooth(lengths: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explained:
-    """Defects of T frames, and the remaining motion in S slots of even time.
+    """Defects of T frames, and the motion without these defects in S time slots of equal duration.
 
     Parameters
     ----------
     timeline : Timeline
-        Slots of the frames.
+        Time slots of the frames.
     repeats : int array (T,)
-        Length of the run of duplicates around each frame; 0 for other frames.
+        Length of the run of duplicates that contains each frame; 0 for frames that are not duplicates.
     displaced : int array (T,)
-        Number of frames by which each frame is out of order, by the motion.
+        Index of each frame minus its index in the order that the motion suggests.
     exchanged : bool array (T, 6)
         Whether right and left of each pair of joints are exchanged.
     jumps : array (S, 15)
-        Jumps of the joints and of the body, metres, by `posekit.validators.motion.jumps.jumps_of`.
+        Jumps of the joints and of the body, metres, from `posekit.validators.motion.jumps.jumps_of`.
     joints : array (S, 14, 3)
-        The remaining motion: corrected sides, NaN in frames with a defect.
+        Joint positions with corrected sides, metres; NaN in frames with a defect.
     trembling : array (S, 14)
-        Standard deviation of the trembling of a coordinate, metres.
+        Standard deviation of the jitter of a coordinate, metres.
     """
 
     timeline: Timeline
@@ -284,7 +286,7 @@ class Explained:
 
 @once
 def explained(body: Body) -> Explained:
-    """Return the defects of the time frames of a recording."""
+    """Detect the defects in the frames of a recording."""
     timeline = timeline_of(body)
     # Frames without a slot come last; no check judges them.
     order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")
@@ -306,7 +308,7 @@ def explained(body: Body) -> Explained:
             joints[kept], body.feet[order][kept], body.head[order][kept], follows, noise
         )
     for edge, beside in ((0, 1), (-1, -2)):
-        # A single frame at an end with all pairs exchanged is another posture, and not an exchange of labels.
+        # If all pairs seem exchanged in the first or last frame only, that frame is another posture.
         if len(joints) > 2 and exchanged[edge].all() and not exchanged[beside].any():
             exchanged[edge] = False
     joints = timeline.spread(put_right(joints, exchanged)[back])
@@ -325,10 +327,11 @@ def explained(body: Body) -> Explained:
 
 
 def duplicates(joints: Array) -> NDArray[np.intp]:
-    """Return the length of the run of duplicates around each frame (T,); 0 unless it copies the frame before.
+    """Return the length of the run of duplicates that contains each frame (T,); 0 unless it copies the frame before.
 
-    A run counts if the body moves by more than `MOVED_METRES` in a frame shortly before and shortly after it; at an end
-    of the clip, on the other side only. In slower motion rounding alone may make two frames equal.
+    A run counts only if the body moves by more than `MOVED_METRES` per frame shortly before and shortly after the run.
+    At the start or end of the clip, motion on the other side is enough. In slower motion rounding alone may make two
+    frames equal.
 
     Parameters
     ----------
@@ -353,20 +356,20 @@ def duplicates(joints: Array) -> NDArray[np.intp]:
 
 
 def displaced(joints: Array) -> NDArray[np.intp]:
-    """Return the number of frames by which each frame is out of order (T,); 0 in smooth motion.
+    """Return how far each frame is from its index in the order of the motion (T,), in frames; 0 in smooth motion.
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, in the given order.
+        Joint positions, metres, in the given order.
 
     Notes
     -----
-    Frames in a wrong order make most joints turn back from step to step. Each stretch of such frames is put into an
-    order with a short path from the frame before it to the frame after it: each frame is inserted at the cheapest place
-    (Rosenkrantz et al. 1977, SIAM J. Comput. 6:563). If that path is shorter than `SHORTER_SHARE` of the given path,
-    the frames were out of order. Noise makes joints turn back too, but no order of noisy frames has a much shorter
-    path.
+    If frames are out of order, most joints reverse their direction from frame to frame. Each interval of such frames is
+    sorted to shorten the path of the joints from the frame before it to the frame after it. The sorting inserts each
+    frame at the position with the smallest extra path (Rosenkrantz et al. 1977, SIAM J. Comput. 6:563). If the new path
+    is shorter than `SHORTER_SHARE` of the given path, the frames are out of order. Noise also makes joints reverse
+    their direction, but no order of noisy frames has a much shorter path.
     """
     count = len(joints)
     places = np.zeros(count, dtype=np.intp)
@@ -385,17 +388,17 @@ def displaced(joints: Array) -> NDArray[np.intp]:
             order = _shortest(joints[rows].reshape(len(rows), -1))
             found = np.zeros(count, dtype=np.intp)
             found[rows[order]] = rows - rows[order]
-            # Frames around the stretch are in order, even if there is a shorter path through them.
+            # Frames around the interval are in order, even if another order has a shorter path.
             near = slice(max(first - 2, 0), last + 3)
             places[near] = found[near]
     return places
 
 
 def _without_sides(joints: Array) -> Array:
-    """Return postures in coordinates without sides (T, 20, 3), metres: exchanged labels do not change them.
+    """Return coordinates of postures that exchanged labels of right and left do not change (T, 20, 3), metres.
 
-    The coordinates are neck, pelvis and the middle of each pair, and for the vector d between a pair the terms of
-    d dᵀ / |d|, which are the same for -d.
+    The coordinates are the positions of neck, pelvis and the midpoint of each pair. The others are the entries of
+    d dᵀ / |d|, where d is half the vector from left to right joint of a pair; they are the same for -d.
     """
     right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
     across = (right - left) / 2.0
@@ -405,7 +408,7 @@ def _without_sides(joints: Array) -> Array:
 
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return whether each frame (T,) is in a stretch with frames out of order."""
+    """Return whether each frame (T,) is in an interval with frames out of order."""
     inside = np.zeros(len(places), dtype=np.bool_)
     for part in groups(np.flatnonzero(places), TURNS_APART):
         inside[part[0] : part[-1] + 1] = True
@@ -413,7 +416,7 @@ def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first and last frames of stretches in which joints turn back."""
+    """Return the first and last frames of intervals in which joints reverse their direction."""
     found = []
     for part in groups(np.flatnonzero(turning), TURNS_APART):
         for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
@@ -424,7 +427,7 @@ def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _shortest(points: Array) -> NDArray[np.intp]:
-    """Return an order (N,) of points (N, K) with a much shorter path from first to last; else the given order."""
+    """Return an order (N,) of points (N, K) with a much shorter path; if none is found, the given order."""
     squares = (points**2).sum(axis=1)
     ways = np.sqrt(np.maximum(squares[:, None] + squares - 2 * points @ points.T, 0.0))
     given = np.arange(len(points))

@@ -1,16 +1,17 @@
 r"""The ground of a clip, estimated from resting parts of the body, and the heights of frames above it.
 
-Files do not state the ground; parts of the body rest on it. Over the frames in which a part rests, the 5th percentile
-of the lowest point is the lowest level of the ground, and the 98th is the highest: feet are seldom flat, some stand on
-stairs, and the floor of a recording is never quite level. A point below the lowest level is in the ground. A body above
-the highest level without a resting part is in the air. Between the levels there is no verdict.
+Files do not state the height of the ground, but parts of the body rest on it. The estimate uses the heights of the
+lowest point in frames in which a part rests. Their 5th percentile is the lowest level of the ground, and their 98th
+percentile is the highest level. The levels differ because feet are seldom horizontal, some stand on stairs, and floors
+are not quite level. A point below the lowest level penetrates the ground. A body above the highest level without a
+resting part is in the air. Heights between the levels are not judged.
 
-Frames may also be lifted or lowered as a whole against the frames around them. Then all points of the body make the
-same vertical step from one frame to the next, but not a frame earlier or later, which no body on its feet does. The
-step at a frame is the median over points of
-:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, with d the vertical displacement from frame to frame,
-if nine tenths of the points agree on its sign. A foot must rest before and after the step, since bodies in the air may
-move in such steps. A step and the next opposite step enclose the lifted frames.
+Frames may also be shifted up or down as a whole relative to neighbouring frames. Then all points of the body make the
+same vertical step between two frames, which does not happen on the feet. Let d be the vertical displacement from frame
+to frame. The step at frame t is the median over points of
+:math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, if nine tenths of the points agree on its sign. A
+foot must rest before and after the step, because bodies in the air may make such steps. The shifted frames lie between
+a step and the next opposite step.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from posekit.skeleton import FEET_POINTS, JOINT, SIDES, both
 from posekit.validators.body import LIMB_ROWS, Body, once
 from posekit.validators.motion.timeline import centred, spaced, timeline_of
 
-#: Height of the points of toes and heels over the sole, metres: joints and labels lie inside the foot.
+#: Height of the points of toes and heels above the sole, metres; joints and labels lie inside the foot.
 TOE_METRES: Final = 0.02
 
 #: Length of the foot, as a share of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1).
@@ -36,7 +37,7 @@ FOOT_SHARE: Final = 0.152
 #: Part of the foot that is in front of the ankle, as a share of its length.
 FORWARD_SHARE: Final = 0.75
 
-#: Height of the ankle over the sole, as a share of the stature (same figure).
+#: Height of the ankle above the sole, as a share of the stature (same figure).
 ANKLE_SHARE: Final = 0.039
 
 #: Length of thigh and shank, as a share of the stature (same figure).
@@ -48,61 +49,61 @@ HAND_SHARE: Final = 0.108
 #: Assumed stature if no leg is known, metres.
 USUAL_STATURE: Final = 1.7
 
-#: Largest speed of a resting point, metres a second: a foot is slower in stance and faster in a swing.
+#: Largest speed of a resting point, metres per second: a foot is slower in stance and faster in swing.
 REST_SPEED: Final = 0.25
 
-#: Largest height above the lowest point of the body of a resting point that carries the body, metres.
+#: Largest height of a resting point that carries the body above the lowest point of the body, metres.
 NEAR_METRES: Final = 0.30
 
-#: Least number of frames with a resting part that give the ground.
+#: Minimum number of frames with a resting part for an estimate of the ground.
 BY_CHANCE: Final = 3
 
-#: Least height of a body in the air above the highest level of the ground, metres.
+#: Minimum height of a body in the air above the highest level of the ground, metres.
 AIR_METRES: Final = 0.03
 
-#: Rise of the ankle of a foot on its toes, as a share of the stature; used if toes are unknown.
+#: Rise of the ankle on tiptoe, as a share of the stature; used if toes are unknown.
 TIPTOE_SHARE: Final = np.hypot(FORWARD_SHARE * FOOT_SHARE, ANKLE_SHARE) - ANKLE_SHARE
 
 
-#: Least rate, frames per second, for central differences: at lower rates the frames around the top of a jump have one
+#: Minimum rate, frames per second, for central differences: at lower rates the frames around the top of a jump have one
 #: height, which looks like rest.
 TURNING_RATE: Final = 20.0
 
-#: Least step, metres: at 30 Hz clean recordings have steps of up to 0.7 cm while a foot rests.
+#: Minimum vertical step of shifted frames, metres; clean recordings at 30 Hz have steps of up to 0.7 cm.
 LEAST_STEP_METRES: Final = 0.012
 
-#: Least step that counts without a resting foot, metres, and the least rate for it, frames per second. Clean recordings
-#: have steps of up to 13 cm (a backflip).
+#: Minimum vertical step of shifted frames without a resting foot, metres, and minimum frame rate, frames per second.
+#: Clean recordings have steps of up to 13 cm (a backflip).
 SURE_STEP_METRES, SURE_RATE = 0.15, 16.0
 
 #: Largest difference between a step and the opposite step, as a share of the larger step.
 SAME_SHARE: Final = 0.35
 
-#: Least number of frames of a lifted stretch; shorter stretches are jumps of the body.
+#: Minimum number of shifted frames in succession; fewer frames are a jump of the body.
 SHORTEST_FRAMES: Final = 3
 
 #: Largest vertical displacement of a resting foot in the frames before and after a step, metres.
 REST_METRES: Final = 0.01
 
-#: Largest difference between heights of rests on one ground, metres.
+#: Largest difference between heights at which a body rests on one ground, metres.
 LEVEL_METRES: Final = 0.05
 
-#: Shortest flight whose fall can be separated from the motion of limbs, seconds.
+#: Shortest flight in which the fall can be separated from the motion of limbs, seconds.
 SHORTEST_FLIGHT: Final = 0.25
 
-#: Acceleration of gravity, metres a second squared.
+#: Acceleration of gravity, metres per second squared.
 GRAVITY_ACCELERATION: Final = 9.81
 
-#: Least number of frames that give the acceleration of a falling centre of mass.
+#: Minimum number of frames for an estimate of the acceleration of the centre of mass.
 FEWEST_FRAMES: Final = 6
 
-#: Least share of gravity by which the centre of mass of a body in the air falls; whole jumps have 0.8 to 1.1.
+#: Minimum downward acceleration of the centre of mass in the air, as a share of gravity; whole jumps have 0.8 to 1.1.
 FALL_SHARE: Final = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
-    """The ground of a clip, and the heights of T frames above it; along up, in metres.
+    """Height of the ground in a clip of T frames, and heights of the body; all along up, in metres.
 
     Parameters
     ----------
@@ -113,17 +114,17 @@ class Ground:
     height : array (T,)
         Height of the lowest sole or joint.
     lifted : array (T,)
-        Height by which each frame is lifted as a whole against the frames around it.
+        Upward shift of each frame as a whole relative to neighbouring frames.
     lowest : array (T,)
-        Height of the lowest sole or joint over `low`, minus `lifted`.
+        Height of the lowest sole or joint above `low`, minus `lifted`.
     resting : bool array (T,)
-        Whether a part of the body rests that can carry it.
+        Whether a part of the body that can carry it rests.
     hanging : bool array (T,)
-        Whether parts rest at another level that the body reached without a step or a jump.
+        Whether a part rests at a level that the body reached neither by a step nor by a jump.
     centre : array (T,)
         Height of the centre of mass.
     in_air : bool array (T,)
-        Whether no part rests and the body is above all levels of the ground, by more than toes and hands reach.
+        Whether no part rests, and the body is higher above all levels of the ground than toes and hands reach.
     """
 
     low: float
@@ -139,30 +140,31 @@ class Ground:
 
 @once
 def stature_of(body: Body) -> float:
-    """Return the stature, metres, by the median length of the legs; the usual one if no leg is known."""
+    """Estimate the stature, metres, from the median length of the legs; `USUAL_STATURE` if no leg is known."""
     legs = [known_median(leg) for leg in body.segment_lengths[LIMB_ROWS[4:]]]
     stature = 2 * float(mean_known(np.array(legs))) / LEG_SHARE
     return stature if stature > 0 else USUAL_STATURE
 
 
 def up_of(body: Body) -> Array:
-    """Return the unit vector against gravity (3,) of a body whose direction up is known."""
+    """Return the unit vector against gravity (3,); the direction up of the body must be known."""
     return np.zeros(3) if body.up is None else body.up
 
 
 @once
 def soles(body: Body) -> tuple[Array, Array]:
-    """Return the points of the feet (T, 6, 3): toes, heels, ankles; and the heights of the soles under them (T, 6)."""
+    """Return toes, heels and ankles (T, 6, 3), and the heights of the soles below these points (T, 6), metres."""
     points = np.concatenate([body.feet, body.joints[:, both("ankle")]], axis=1)
-    toes = TOE_METRES if body.q is None else 0.0  # points of a robot are the ends of its soles
+    toes = TOE_METRES if body.q is None else 0.0  # a robot's points lie on its soles
     over = [toes] * len(FEET_POINTS) + [ANKLE_SHARE * stature_of(body)] * len(SIDES)
     return points, points @ up_of(body) - over
 
 
 def speeds(body: Body, points: Array, frames: int = 1) -> Array:
-    """Return the speeds of points (T, P), metres a second, by central differences over 2 `frames` frames; NaN at ends.
+    """Return the speeds of points (T, P), metres per second, by central differences over 2 `frames` frames.
 
-    Below `TURNING_RATE` frames per second return the larger of the speeds before and after each frame.
+    Speeds at the start and end are NaN. Below `TURNING_RATE` frames per second the result is the larger of the speeds
+    before and after each frame.
     """
     line = timeline_of(body)
     placed = line.spread(points)
@@ -184,13 +186,13 @@ def ground_of(body: Body) -> Ground:
     legs = slice(JOINT["right_ankle"], None)  # ankles, toes and heels
     lifted = line.of_frames(lifted_by(line.spread(height), legs, body.rate, body.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
-    # If the heel of a foot is known, the ankle is no point of its sole; otherwise the ankle stands for the heel.
+    # If the heel of a foot is unknown, the ankle replaces it as a point of the sole.
     over_ground = over_ground.copy()
     over_ground[:, 4:][:, np.isfinite(over_ground[:, 2:4]).any(axis=0)] = np.nan
     sole = np.fmin.reduce(over_ground, axis=1)
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
-    frames = 1.0 if body.rate < TURNING_RATE else 2.0  # between the ends of a speed
+    frames = 1.0 if body.rate < TURNING_RATE else 2.0  # frames spanned by a speed
     noise = np.sqrt(2) * body.noise / (frames * body.dt) if body.dt > 0 else 0.0
     slow = speeds(body, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * noise
     centre = centre_of_mass(body.joints) @ up
@@ -204,7 +206,7 @@ def ground_of(body: Body) -> Ground:
         low, high = np.percentile(held, (5, 98))
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
     air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * stature_of(body))
-    # The palm and the fingers of a hand that carries the body are below its wrist.
+    # Palm and fingers of a hand that carries the body are below the wrist.
     hands = np.fmin.reduce(height[:, both("wrist")], axis=1) - lifted - HAND_SHARE * stature_of(body)
     return Ground(
         low=float(low),
@@ -220,16 +222,19 @@ def ground_of(body: Body) -> Ground:
 
 
 def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: float) -> NDArray[np.bool_]:
-    """Leave out frames in which a body rests in the air: at a level that it reached without a step or a jump.
+    """Return the frames in which a resting part carries the body.
+
+    Frames in which parts rest in the air are excluded: at a level that the body reached neither by a step nor by a
+    jump.
 
     Parameters
     ----------
     resting : bool array (T,)
-        Whether a part of the body rests.
+        Whether a part of the body rests in each frame.
     lowest, centre : array (T,)
         Heights of the lowest point and of the centre of mass, metres.
     step : float
-        Seconds from a frame to the next.
+        Seconds from one frame to the next.
 
     Returns
     -------
@@ -242,7 +247,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
     group = np.zeros(len(rests), dtype=np.intp)
     levels = np.array([np.median(lowest[start:stop]) for start, stop in rests])
     for k in range(1, len(rests)):
-        # The body may come down again to the level of an earlier rest.
+        # The body may return to a level at which it rested earlier.
         alike = np.flatnonzero(~(np.abs(levels[:k] - levels[k]) > LEVEL_METRES))
         between = slice(rests[k - 1][1], rests[k][0])
         if len(alike):
@@ -259,7 +264,10 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
 
 
 def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
-    """Return whether a centre of mass (N,) falls with a share of gravity, by a fitted parabola; True if unknown."""
+    """Return whether heights (N,) of a centre of mass fall with at least a share of gravity; True if unknown.
+
+    The acceleration is that of a fitted parabola.
+    """
     known = np.isfinite(centre)
     if known.sum() < FEWEST_FRAMES:
         return True
@@ -268,14 +276,14 @@ def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
 
 
 def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Array:
-    """Return the height by which frames are lifted against the frames around them.
+    """Return by how much frames are shifted upward as a whole relative to neighbouring frames.
 
     Parameters
     ----------
     height : array (S, P)
         Heights of points of the body along up, metres; NaN if unknown.
     feet : slice
-        Points of the feet; one of them must rest before and after a step.
+        Indices of the points of the feet; a point of a foot must rest before and after a step.
     rate : float
         Frames per second; NaN if unknown.
     noise : float
@@ -284,7 +292,7 @@ def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Ar
     Returns
     -------
     array (S,)
-        Metres; negative in lowered frames, 0 in most frames.
+        Upward shift, metres; negative in lowered frames, 0 in most frames.
     """
     lifted = np.zeros(len(height))
     if len(height) < 2 * SHORTEST_FRAMES:
@@ -313,7 +321,7 @@ def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Ar
 
 
 def steps_of(height: Array) -> Array:
-    """Return the vertical step that most points make at each frame (S,), metres; 0 if the points do not agree."""
+    """Return the common vertical step of most points at each frame (S,), metres; 0 if points disagree on its sign."""
     way = np.diff(height, axis=0)
     padded = np.pad(way, ((2, 2), (0, 0)), mode="edge")
     around = np.stack([padded[k : k + len(way)] for k in (0, 1, 3, 4)])

@@ -1,9 +1,10 @@
 r"""Jumps: distances of joints, and of the body, from the positions that neighbouring frames predict.
 
-A jump lasts one frame, or displaces the body for good, at once or over up to a sixth of a second. Forces bound
-displacements: a body that moves by D in a time T, beyond its velocities before and after, has an acceleration of at
-least :math:`4 D / T^2`, forward in the first half of the time and backward in the second. In rolls, kicks and flips
-people exceed the bound, but their joints then move in different directions; those of a displaced body do not.
+A jump either lasts one frame, or displaces the body permanently within up to a sixth of a second. Forces limit real
+displacements. If a body moves by D in a time T, in addition to its motion at the velocities before and after, its
+acceleration is at least :math:`4 D / T^2`, forward in the first half of the time and backward in the second. In rolls,
+kicks and flips people exceed this limit, but then their joints move in different directions. The joints of a displaced
+body move in the same direction.
 """
 
 from __future__ import annotations
@@ -17,50 +18,50 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, norm
 from posekit.validators.motion.timeline import centred, filtered
 
-#: Jump above which other checks do not judge a frame, metres.
+#: Minimum jump, metres, at which other checks of motion skip the frame or the joint.
 LEAST_JUMP: Final = 0.06
 
-#: Least jump of one frame near a lasting displacement, as a share of it.
+#: Minimum jump of one frame near a permanent displacement, as a share of the displacement.
 DISPLACED_SHARE: Final = 0.5
 
-#: Number of frames on either side that predict a position.
+#: Number of frames on each side from which a position is predicted.
 SIDE_FRAMES: Final = 3
 
-#: Multiples of the neighbours' own misfit to subtract from a jump: inside the clip, and at its ends. Fast motion at few
-#: frames per second fits no smooth curve, and is no jump.
+#: Multiple of the neighbours' misfit that is subtracted from a jump: inside the clip, and near its start and end. Fast
+#: motion at a low frame rate fits no smooth curve either, but is no jump.
 JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 
 
 def _filter(at: int) -> tuple[Array, Array]:
-    """Return filters over seven frames: of a jump of one frame (7,), and of the other frames' misfit (2, 7).
+    """Return filters over seven frames that measure the jump of one frame (7,) and the other frames' misfit (2, 7).
 
-    The filters are the least-squares fit of a cubic and a jump of frame `at`. The two remaining degrees of freedom
-    measure the misfit; their filters have unit length.
+    The filters are those of the least-squares fit of a cubic and a jump of frame `at`. The fit has two remaining
+    degrees of freedom, which measure the misfit. Their filters have unit length.
     """
     times = np.arange(7.0) - at
     design = np.column_stack([np.vander(times, 4, increasing=True), times == 0])
     return np.linalg.pinv(design)[-1], np.linalg.svd(design)[0][:, design.shape[1] :].T / np.sqrt(2.0)
 
 
-#: Filters by the index of the jumping frame among seven frames: 3 inside a clip, 1 and 2 near its ends.
+#: Filters by the index of the jumping frame among seven frames: 3 inside a clip, 1 and 2 near its start and end.
 _FILTERS: Final = {at: _filter(at) for at in (1, 2, SIDE_FRAMES)}
 _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
 def jumps_of(joints: Array, step: float) -> Array:
-    """Return the jumps of joints (S, 14, 3) and of the body, in slots of `step` seconds (NaN if unknown).
+    """Measure the jumps of joints (S, 14, 3) and of the body in time slots of `step` seconds (NaN if unknown).
 
     Returns
     -------
     array (S, 15)
-        Jumps above the neighbours' own misfit, metres: of each joint, relative to a jump of the body, and of the body
-        (the median joint); NaN if unknown.
+        Jumps in excess of the neighbours' misfit, metres; NaN if unknown. The first 14 columns are jumps of the joints
+        relative to the body, the last column is the jump of the body (the median joint).
 
     Notes
     -----
-    The jump of one frame is its distance from the cubic through three frames on either side; at an end of the clip it
-    is the third difference. A multiple of the neighbours' misfit is subtracted. `displaced_by` measures lasting
-    displacements of the body.
+    The jump of one frame is its distance from the cubic that fits three frames on each side; in the first and last
+    frame it is the third difference. A multiple of the neighbours' misfit is subtracted. `displaced_by` measures
+    permanent displacements of the body.
     """
     count = len(joints)
     offset, misfit = (centred(one, count, SIDE_FRAMES) for one in _measured(joints, SIDE_FRAMES))
@@ -69,7 +70,7 @@ def jumps_of(joints: Array, step: float) -> Array:
     moved = alone > 0
     displaced = displaced_by(joints, step)
     if (alone > LEAST_JUMP).any():
-        # Near a lasting displacement, smaller jumps of one frame follow from it.
+        # A permanent displacement also causes smaller jumps of single frames near it.
         beside = sliding_window_view(np.pad(np.nan_to_num(displaced), SIDE_FRAMES), 2 * SIDE_FRAMES + 1)
         alone[alone < DISPLACED_SHARE * beside.max(axis=1)] = np.nan
         displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
@@ -84,15 +85,15 @@ def jumps_of(joints: Array, step: float) -> Array:
             for end, frame, window in ((0, at, joints[:7]), (-1, -1 - at, joints[:-8:-1])):
                 off, misfits = _measured(window, at)
                 jump = norm(off[0]) - JOINT_MISFITS * misfits[0]
-                # If the outermost frame jumps more, the frame beside it does not jump.
+                # If the first or last frame jumps more, its neighbour does not jump.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
     return np.column_stack([joint, np.fmax(alone, displaced)])
 
 
 def _measured(joints: Array, at: int) -> tuple[Array, Array]:
-    """Return the jump of frame `at` of each seven frames (N, 14, 3), and the misfit of the other frames (N, 14).
+    """Measure the jump (N, 14, 3) of frame `at` among every seven frames, and the misfit (N, 14) of the other frames.
 
-    The misfit is scaled by the uncertainty of the jump, which grows with the distance of `at` from the middle.
+    The misfit is multiplied by the uncertainty of the jump, which grows with the distance of `at` from the middle.
     """
     jump, misfit = _FILTERS[at]
     unsure = np.linalg.norm(jump) / np.linalg.norm(_FILTERS[SIDE_FRAMES][0])
@@ -103,37 +104,39 @@ def _measured(joints: Array, at: int) -> tuple[Array, Array]:
 #: Longest time of a displacement, seconds; slower displacements are motion.
 LONGEST_SECONDS: Final = 1.0 / 6.0
 
-#: Difference between the times over which displacements are measured, seconds.
+#: Increment between the durations over which displacements are measured, seconds.
 BETWEEN_SECONDS: Final = 1.0 / 30.0
 
-#: Time before and after a displacement that gives the velocities of joints, seconds.
+#: Time before, and after, a displacement in which the velocities of joints are measured, seconds.
 VELOCITY_SECONDS: Final = 1.0 / 15.0
 
-#: Largest acceleration of a whole body, metres a second squared: three times its weight, less its own; runners and
-#: jumpers reach it (Cavanagh & Lafortune 1980, J. Biomech. 13).
+#: Largest acceleration of a whole body, metres per second squared: a ground force of three times the weight, minus the
+#: weight, as of runners (Cavanagh & Lafortune 1980, J. Biomech. 13).
 PUSHED_ACCELERATION: Final = 20.0
 
-#: Least speed of a second displacement beside one, as a share of its speed: wrong velocities alone give half.
+#: Minimum speed of a displacement next to a faster one, as a share of the faster one's speed. Wrong velocities alone
+#: cause a share of a half.
 BESIDE_SHARE: Final = 0.75
 
-#: Multiple of the median distance of joints from the body's displacement to subtract from the displacement.
+#: Multiple of the joints' median deviation from the body's displacement that is subtracted from the displacement.
 APART_TIMES: Final = 2.0
 
 
 def displaced_by(joints: Array, step: float) -> Array:
-    """Return the lasting displacement of the body (S,) in each slot of even time, metres; NaN in slots without one.
+    """Measure permanent displacements of the whole body that forces do not explain.
 
     Parameters
     ----------
     joints : array (S, 14, 3)
-        Metres, in slots of even time; NaN where unknown.
+        Joint positions in time slots of equal duration, metres; NaN where unknown.
     step : float
-        Seconds a slot. If it is NaN, displacements take one slot only.
+        Duration of a slot, seconds. If it is NaN, only displacements within one slot are measured.
 
     Returns
     -------
     array (S,)
-        Displacement, metres, minus the parts due to forces and to the motion of joints.
+        Displacement in each slot, metres, minus the parts due to forces and to the motion of joints; NaN in slots
+        without a displacement.
     """
     timed = step > 0
     side, apart = (
@@ -141,7 +144,7 @@ def displaced_by(joints: Array, step: float) -> Array:
     )
     most = int(LONGEST_SECONDS / step + 1e-6) if timed else 1
     known = np.isfinite(joints[..., 0])
-    # The mean joint moves with a displaced body: a fast first test.
+    # A fast first test: a displacement of the body also displaces the mean of the joints.
     centre = np.nan_to_num(joints).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, None]
     gaps = np.concatenate([[0], np.cumsum(~known.any(axis=1))])
     best, over = np.full(len(joints), -np.inf), np.ones(len(joints), dtype=np.intp)
@@ -150,13 +153,13 @@ def displaced_by(joints: Array, step: float) -> Array:
         beyond = _beyond(joints, centre, gaps, count, side, pushed) / count
         better = beyond > best
         best[better], over[better] = beyond[better], count
-    # The fastest window covers the displacement exactly; windows that end inside it have wrong velocities.
+    # The window with the fastest displacement covers it exactly. Windows that end inside it have wrong velocities.
     found = np.full(len(joints), np.nan)
     while best.max(initial=0.0) > 0:
         first = int(best.argmax()) + 1
         last = first + int(over[first - 1]) - 1
         found[first : last + 1] = best[first - 1] * over[first - 1]
-        # Windows that overlap the displacement repeat it; slower windows beside it follow from it.
+        # Windows that overlap this displacement measure it again, and it causes slower displacements next to it.
         starts, fastest = np.arange(len(best)), best[first - 1]
         again = (starts < last) & (starts + over >= first)
         beside = (starts - side < last + apart) & (starts + over + side >= first - apart)
@@ -167,10 +170,10 @@ def displaced_by(joints: Array, step: float) -> Array:
 def _beyond(
     joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
 ) -> Array:
-    """Return the unexplained displacement in the `count` slots after each slot (S,), metres, 0 or more.
+    """Return the unexplained displacement over the `count` slots after each slot (S,), metres, at least 0.
 
-    `centre` (S, 3) is the mean of the joints, `gaps` (S + 1,) the number of empty slots before each slot, and `pushed`
-    the displacement that forces explain.
+    `centre` (S, 3) is the mean of the joints. `gaps` (S + 1,) is the cumulative number of empty slots. `pushed` is the
+    displacement that forces explain, metres.
     """
     weights = np.zeros(count + 2 * side + 1)
     share = count / (2.0 * side)

@@ -1,4 +1,4 @@
-"""Orientation: bodies are upside down, or lie because the file states a wrong up axis."""
+"""Orientation: bodies are upside down, or lie because the stated up axis is wrong."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from posekit.validators.body import Body
 from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import up_of
 
-#: Least number of frames of a judged clip.
+#: Minimum number of frames of a judged clip.
 FEWEST_FRAMES: Final = 5
 
-#: Largest cosine between trunk and up of a body that is upside down.
+#: Largest cosine between trunk and up for a body that is upside down.
 INVERTED_COSINE: Final = -0.5
 
-#: Least cosine (32 degrees) between an axis and the trunk and legs of a body that stands along the axis.
+#: Minimum cosine (32 degrees) between an axis and both trunk and legs for a body that stands along the axis.
 UPRIGHT_COSINE: Final = 0.85
 
-#: Largest cosine (60 degrees) between trunk and up of a body that lies.
+#: Largest cosine (60 degrees) between trunk and up for a body that lies.
 LYING_COSINE: Final = 0.5
 
-#: Least range of the hips across an axis, metres, of a body that travels: people who lie do not.
+#: Minimum range of the hips across an axis for a body that travels, metres; lying people do not travel.
 TRAVEL_METRES: Final = 0.4
 
-#: Largest range of the height of the lowest joint, 5th to 95th percentile, metres, of a body that lies.
+#: Largest range (5th to 95th percentile) of the height of the lowest joint for a body that lies, metres.
 LEVEL_METRES: Final = 0.1
 
-#: Range of the lowest joint along up, metres, of a person on the plane through the origin.
+#: Range of the height of the lowest joint for a person who stands on the plane through the origin, metres.
 SOLE_METRES: Final = (-0.03, 0.2)
 
-#: Percentiles of the lowest joint along up, and the largest difference of the outer two, metres, for a person who stays
-#: on that plane. Flights may take 40 % of the frames.
+#: Percentiles of the height of the lowest joint for a person who stays on that plane, and the largest difference
+#: between the outer two, metres. The person may be in the air in 40 % of the frames.
 STEADY_PERCENTILES, STEADY_METRES = (5, 50, 60), 0.12
 
-#: Least distance of both wrists below the neck of a body on its hands, metres.
+#: Minimum depth of both wrists below the neck for a body on its hands, metres.
 REACH_METRES: Final = 0.1
 
 
@@ -45,18 +45,18 @@ REACH_METRES: Final = 0.1
 def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -> Judgement:
     """Bodies are upside down, or lie as if another axis pointed up.
 
-    A body is upside down if neck, pelvis and ankles are one above the other in the wrong order, and hands do not carry
-    it. Another axis than the stated one points up in two cases. First, trunk and legs are straight along that axis, as
-    people stand, while the body travels or its lowest joint rises and sinks, unlike a body that lies. Second, the body
-    does not stand upright along the stated axis, and its lowest knee or ankle stays on the plane through the origin
-    that is perpendicular to the other axis, not on the one perpendicular to the stated axis.
+    A body is upside down if the ankles are above the pelvis, the pelvis is above the neck, and hands do not carry the
+    body. There are two signs that another axis points up. First, trunk and legs are straight along this axis, as in
+    standing, and the body travels or its lowest joint rises and sinks, unlike in lying. Second, the body does not stand
+    upright along the stated axis, and its lowest knee or ankle stays on the plane through the origin that is
+    perpendicular to the other axis, and does not stay on the plane perpendicular to the stated axis.
 
     The value is the angle between up and the trunk, or between up and the other axis.
 
     Parameters
     ----------
     upside_down, aligned : float
-        Least shares of the frames that show a body upside down, and a body straight along another axis.
+        Minimum share of the frames with a body upside down, and with a body straight along another axis.
     """
     if not body.motion or len(body) < FEWEST_FRAMES:
         raise NotAskedError(f"it needs {FEWEST_FRAMES} frames of motion")
@@ -82,7 +82,7 @@ def _inverted(body: Body, cosine: Array, share: float) -> bool:
 
 
 def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | None:
-    """Return the axis (3,) that points up if it is not the stated one; None if nothing speaks for another axis."""
+    """Return the axis (3,) that points up if it differs from the stated axis; otherwise None."""
     up, middle = up_of(body), np.nanmean(trunk, axis=0)
     axes = (*np.eye(3), *-np.eye(3))
     axis: Array = max(axes, key=lambda one: float(one @ middle))
@@ -99,12 +99,12 @@ def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | 
     if upright or np.isnan(legs).all() or _on_origin(body.height):
         return None
     lower = [one for one in axes if one @ up < LYING_COSINE and np.nanmedian(trunk @ one) > 0]
-    # Knees and ankles are the last joints; the knees of a body that sits away from the ground are not on the plane.
+    # Both the lowest joint and the lowest knee or ankle must stay on the plane; the knees of a seated body do not.
     parts = body.joints, body.joints[:, JOINT["right_knee"] :]
     return next((one for one in lower if all(_on_origin(part @ one) for part in parts)), None)
 
 
 def _on_origin(height: Array) -> bool:
-    """Return whether the lowest joint of heights (T, J), metres, mostly stays on the plane through the origin."""
+    """Return whether the lowest joint mostly stays on the plane through the origin, by heights (T, J), metres."""
     low, middle, high = np.nanpercentile(np.fmin.reduce(height, axis=1), STEADY_PERCENTILES)
     return bool(SOLE_METRES[0] < middle < SOLE_METRES[1] and high - low < STEADY_METRES)

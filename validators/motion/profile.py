@@ -1,4 +1,4 @@
-"""Profiles: TOML tables that choose checks over time and their thresholds."""
+"""Profiles: TOML tables that select checks of motion and set their thresholds."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from posekit.validators.motion import frames, orientation, published, sliding, s
 
 PROFILE_SCHEMA: Final = "posekit.profile/1"
 
-#: Profiles that come with the package.
+#: Names of the built-in profiles.
 BUILT_IN: Final = ("posekit", "phuma", "protomotions", "holomotion", "skating")
 
-#: Modules with checks over time, in the order in which their checks are reported.
+#: Modules with checks of motion, in the order of reports.
 _MODULES: Final = (orientation, frames, speed, standing, sliding, published)
 
-#: Checks over time by name.
+#: Checks of motion by name.
 MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
     one.name: one
     for module in _MODULES
@@ -31,12 +31,12 @@ MOTION_CHECKS: Final[dict[str, FunctionCheck]] = {
 def load_profile(name: str) -> tuple[FunctionCheck, ...]:
     """Return the checks of a profile, with its thresholds, in the order of `MOTION_CHECKS`.
 
-    A profile has a name, or is a TOML file of schema ``posekit.profile/1``.
+    The profile is the name of a built-in profile, or the path of a TOML file of schema ``posekit.profile/1``.
 
     Raises
     ------
     InputError
-        If there is no such profile, or it breaks the schema.
+        If there is no such profile, or it does not follow the schema.
     """
     asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "--profile").get("checks", {})
     for check, thresholds in asked.items():

@@ -1,9 +1,9 @@
-"""Published rules for selecting motion, as their authors compute them, for named profiles.
+"""Published rules for selecting motion data, computed as by their authors; the profiles of their names use them.
 
-PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and its code) judges parts of four seconds that overlap by half a
-second. It uses vertices of the feet of SMPL-X; here points of the feet replace them. ProtoMotions (Tessler et al. 2024,
-its data filters) and HoloMotion (2025, its curation) bound values of single frames. `skating` is the measure of Guided
-Motion Diffusion (Karunratanakul et al. 2023, ICCV); unlike `sliding` it rejects many steps of real walks.
+PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and code) judges windows of four seconds that overlap by half a
+second. It uses vertices of the feet of SMPL-X; here toes, heels and ankles replace them. ProtoMotions (Tessler et al.
+2024, data filters) and HoloMotion (2025, data curation) limit values of single frames. `skating` is the measure of
+Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV). Unlike `sliding` it rejects many steps of real walks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.ground import ground_of, soles, up_of
 from posekit.validators.motion.timeline import timeline_of
 
-#: Duration, overlap and least duration of the parts of a clip that PHUMA judges, seconds.
+#: Duration, overlap and minimum duration of the windows that PHUMA judges, seconds.
 CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS = 4.0, 0.5, 1.0
 
 #: Order of the low-pass filter; it runs forward and backward.
@@ -39,13 +39,13 @@ def skating(
     Parameters
     ----------
     height : float
-        Largest height over the ground of a foot that touches it, metres; in this frame and the frame before.
+        Largest height above the ground, in this frame and the previous frame, of a foot that touches it, metres.
     way : float
-        Largest allowed displacement along the ground in a frame at `rate`, metres.
+        Largest allowed displacement along the ground per frame at `rate`, metres.
     rate : float
         Frames per second for which `way` holds.
     smoothed : int
-        Odd number of frames over which displacements are averaged.
+        Number of frames over which displacements are averaged; odd.
     """
     points, height_along = soles(body)
     known = np.asarray(np.isfinite(points).any(axis=(0, 2)))
@@ -68,9 +68,10 @@ def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Ju
     Parameters
     ----------
     least : float
-        Least share of the frames.
+        Minimum share of the frames.
     window : float
-        Range of the heights of soles on the ground, metres. The ground is the window with the soles of most frames.
+        Height of the window of soles that are on the ground, metres. The ground is the window with the soles of most
+        frames.
     """
     level = _voted(body, window)
     touches = np.asarray((np.abs(_soles(body) - level) <= window / 2).any(axis=1), dtype=np.float64)
@@ -79,7 +80,7 @@ def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Ju
 
 @check("root-height", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
 def root_height(body: Body, *, least: float = 0.6, most: float = 1.5, window: float = 0.05) -> Judgement:
-    """Hips are too low or too high over the ground.
+    """Hips are too low or too high above the ground.
 
     Parameters
     ----------
@@ -99,9 +100,11 @@ def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) ->
     Parameters
     ----------
     root : float
-        Largest horizontal distance of the middle of the hips (SMPL's pelvis) from the hull of ankles and toes, metres.
+        Largest horizontal distance from the midpoint of the hips (SMPL's pelvis) to the hull of ankles and toes,
+        metres.
     pelvis : float
-        Largest horizontal distance of the pelvis joint, some 10 cm above (SMPL's first spine joint), metres.
+        Largest horizontal distance from the pelvis joint (SMPL's first spine joint, about 10 cm higher) to this hull,
+        metres.
     """
     feet, _ = soles(body)
     points = _hips(body), body.joints[:, JOINT["pelvis"]]
@@ -117,9 +120,9 @@ def root_jerk(body: Body, *, most: float = 50.0, cutoff: float = 3.0) -> Judgeme
     Parameters
     ----------
     most : float
-        Largest mean jerk of the root, by third differences, metres a second cubed.
+        Largest mean jerk of the root, from third differences, metres per second cubed.
     cutoff : float
-        Cutoff of the low-pass filter of the root's path, hertz.
+        Cutoff frequency of the low-pass filter of the root's path, hertz.
     """
     if body.rate <= 2.0 * cutoff:
         raise NotAskedError(f"it needs more than {2.0 * cutoff:g} frames per second")
@@ -148,9 +151,9 @@ def above_ground(
     Parameters
     ----------
     lowest : float
-        Least allowed height of the lowest point over the ground, metres (negative).
+        Minimum allowed height of the lowest point above the ground, metres (negative).
     highest : float
-        Largest height of the lowest point over the ground that may last longer than `lasting`, metres.
+        Largest height of the lowest point above the ground that may last longer than `lasting`, metres.
     lasting : float
         Longest allowed time above `highest`, seconds.
     """
@@ -169,7 +172,7 @@ def root_speed(body: Body, *, most: float = 10.0) -> Judgement:
     Parameters
     ----------
     most : float
-        Largest allowed speed of the middle of the hips, metres a second.
+        Largest allowed speed of the midpoint of the hips, metres per second.
     """
     return Judgement(("root",), _speeds(body, _hips(body)[:, None]), upper=most)
 
@@ -181,27 +184,27 @@ def body_speed(body: Body, *, most: float = 15.0) -> Judgement:
     Parameters
     ----------
     most : float
-        Largest allowed speed of any joint, metres a second.
+        Largest allowed speed of any joint, metres per second.
     """
     return Judgement(JOINTS, _speeds(body, body.joints), upper=most)
 
 
 def _hips(body: Body) -> Array:
-    """Return the middle of the hips (T, 3)."""
+    """Return the midpoint of the hips (T, 3), metres."""
     return np.asarray(body.joints[:, both("hip")].mean(axis=1))
 
 
 def _speeds(body: Body, points: Array) -> Array:
-    """Return the speeds of points (T, P, 3) since the frame before (T, P), metres a second."""
+    """Return the speeds (T, P) of points (T, P, 3) since the previous frame, metres per second."""
     line = timeline_of(body)
     placed = line.spread(points)
     return line.of_frames(norm(np.diff(placed, axis=0, prepend=np.nan)) / body.dt)
 
 
 def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) -> Array:
-    """Return for each frame (T, K) the worst mean of values (T, K) over the parts of the clip that contain the frame.
+    """Return for each frame the worst mean (T, K) of values (T, K) over the windows that contain the frame.
 
-    The mean leaves out the last `inside` slots of a part, because differences that start there reach beyond the part.
+    The mean excludes the last `inside` slots of a window, because differences that start there end outside the window.
     """
     if len(body) * body.dt < LEAST_SECONDS:
         raise NotAskedError(f"it needs {LEAST_SECONDS:g} s of motion")
@@ -220,14 +223,14 @@ def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) ->
 
 
 def _soles(body: Body) -> Array:
-    """Return the heights of soles (T, P) along up, by toes and heels, or by ankles if toes and heels are unknown."""
+    """Return the heights of toes and heels (T, P) along up, metres; of ankles if toes and heels are unknown."""
     height = soles(body)[1]
     toes = height[:, : len(FEET_POINTS)]
     return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
 
 
 def _voted(body: Body, window: float) -> float:
-    """Return the stated ground, or the middle of the window of heights with the soles of most frames."""
+    """Return the stated height of the ground, or the middle of the window that contains the soles of most frames."""
     if body.settings.ground is not None:
         return body.settings.ground
     lowest = np.sort(np.fmin.reduce(_soles(body), axis=1))

@@ -1,16 +1,16 @@
-r"""Remarks beside the findings: height of the ground, remedies of known causes, doubts about the frame rate.
+r"""Remarks in addition to the findings: height of the ground, remedies for known causes, doubts about the frame rate.
 
-A clip that is played k times too fast has k times the speeds and :math:`k^2` times the accelerations, but gravity is
-the same. So falls and balance show the frame rate:
+If a clip is played k times too fast, speeds are multiplied by k and accelerations by :math:`k^2`, but gravity is the
+same. Therefore falls and balance show the frame rate:
 
-- A body in the air falls with :math:`g`, and nothing pulls a body down much faster.
-- The force of the ground passes near the centre of mass c. Its line meets the ground at the zero moment point, with the
-  horizontal coordinates of :math:`c - \ddot c \, h / (g + \ddot h)`, h the height of c (Vukobratović & Borovac 2004,
-  Int. J. Humanoid Robot. 1:157). While one foot stands, that point is under this foot.
+- A body in the air falls with :math:`g`, and nothing accelerates a body downward much faster.
+- The line of the ground reaction force passes near the centre of mass c. It meets the ground at the zero moment point,
+  with the horizontal coordinates of :math:`c - \ddot c \, h / (g + \ddot h)`, where h is the height of c (Vukobratović
+  & Borovac 2004, Int. J. Humanoid Robot. 1:157). While a person stands on one foot, this point is under that foot.
 
-If a clip shows neither, the tempo of joints decides: the ratio of their accelerations to their speeds, which is
-proportional to the rate. The tempo of recordings has a standard deviation of a factor of 1.35, so that the tempo shows
-one wrong rate in four.
+If a clip has neither falls nor steps, the tempo of joints is compared: the ratio of their accelerations to their
+speeds, which is proportional to the rate. Over recordings the tempo varies by a factor of 1.35 (one standard
+deviation), so that the tempo detects one in four wrong rates.
 """
 
 from __future__ import annotations
@@ -29,59 +29,61 @@ from posekit.validators.check import Judgement
 from posekit.validators.motion.ground import BY_CHANCE, GRAVITY_ACCELERATION, ground_of, soles, up_of
 from posekit.validators.motion.timeline import spaced, timeline_of
 
-#: Least number of jumping joints in a frame with another posture.
+#: Minimum number of jumping joints in a frame that counts as another posture.
 POSTURE_JOINTS: Final = 3
 
-#: Least share of the frames in which feet slide on a treadmill, and least speed of the belt, metres a second.
+#: Minimum share of the frames in which feet slide on a treadmill, and minimum speed of the belt, metres per second.
 BELT_SHARE, BELT_SPEED = 0.5, 0.3
 
 #: Largest range of the hips on a treadmill, as a share of the distance that the belt moves.
 IN_PLACE_SHARE: Final = 0.25
 
 
-#: Time before and after a frame for velocities and accelerations, seconds.
+#: Time before, and after, a frame over which velocities and accelerations are measured, seconds.
 SPAN_SECONDS: Final = 0.1
 
-#: Downward acceleration that nobody has, in g; recordings (a backflip) have up to 1.9 by the approximate centre.
+#: Downward acceleration that people do not reach, in g. Recordings (a backflip) have up to 1.9 g, because the centre of
+#: mass is approximate.
 FASTEST_FALL: Final = 2.0
 
-#: Ranges of the median downward acceleration in flights, in g, of clips at half and at double speed: near 1/4 and 4.
+#: Ranges of the median downward acceleration in flights, in g, of clips at half speed (about 1/4 g) and at double speed
+#: (about 4 g).
 SLOW_FALL, FAST_FALL = (0.1, 0.42), (2.2, 7.0)
 
-#: Least number of frames in flights that give the acceleration.
+#: Minimum number of frames in flights for an estimate of the acceleration.
 FLIGHT_FRAMES: Final = 4
 
-#: Least upward acceleration plus g of a body on the ground, metres a second squared; in flights it is smaller.
+#: Minimum upward acceleration plus g for a body on the ground, metres per second squared; in flights it is smaller.
 LEAST_LOAD: Final = 2.0
 
-#: Largest speed of a standing foot, and least speed of the swinging foot, as shares of the hips' speed.
+#: Largest speed of a standing foot, and minimum speed of the swinging foot, as shares of the hips' speed.
 STANCE_SHARE, SWING_SHARE = 0.35, 1.0
 
-#: Least share of the frames in which each foot stands alone in a clip of steps. A kick stands on one foot only.
+#: Minimum share of the frames in which each foot stands alone in a clip with steps. In a kick only one foot does.
 STEPPING_SHARE: Final = 0.1
 
 #: Bounds of a ratio: distance of the centre of mass from the standing foot, divided by its distance from the zero
-#: moment point; geometric mean of the ratios along the direction of motion and across it. 24 recordings of walks and
-#: runs (CMU, Bandai-Namco, other BVH files) have 0.70 to 1.66, at half speed 1.71 to 5.9, at double speed 0.13 to 0.41.
-#: The bounds were chosen on these recordings.
+#: moment point. The ratio is the geometric mean of two ratios, along the direction of motion and across it. In 24
+#: recordings of walks and runs (CMU, Bandai-Namco, other BVH files) it is 0.70 to 1.66, at half speed 1.71 to 5.9, at
+#: double speed 0.13 to 0.41. The bounds were chosen on these recordings.
 FAST_RATIO, SLOW_RATIO = 0.4, 1.9
 
-#: Least correlation between the two distances, mean of the correlations along the direction of motion and across it. If
-#: it is smaller, something else holds the body, or the motion ignores forces. Walks have 0.38 or more at any rate.
+#: Minimum correlation between the two distances, averaged over the direction of motion and the direction across it. If
+#: it is smaller, something else supports the body, or the motion is not physical. Walks have at least 0.38 at any rate.
 LEAST_CORRELATION: Final = 0.3
 
-#: Least speed of a moving joint, metres a second, and multiple of the speed of noise to add to it: noise has a high
-#: tempo.
+#: Minimum speed of a moving joint, metres per second, and multiple of the speed due to noise that is added to it. Noise
+#: has a high tempo.
 MOVING_SPEED, NOISE_FACTOR = 0.02, 10.0
 
-#: Usual tempo of joints (median acceleration over median speed; median over moving joints), 1/s, and the largest factor
-#: between a tempo and the usual one. 57 recordings of walks, sports, gestures and dances have factors of 0.55 to 1.8.
-#: If one half of them gives the usual tempo, the other half has factors of up to 1.9.
+#: Usual tempo of joints (median acceleration divided by median speed; median over moving joints), 1/s, and the largest
+#: factor between a tempo and the usual tempo. In 57 recordings of walks, sports, gestures and dances the factors are
+#: 0.55 to 1.8. If the usual tempo is computed from one half of them, the other half has factors of up to 1.9.
 USUAL_TEMPO, MOST_TEMPO = 6.65, 2.2
 
 
 def hints(body: Body, found: Mapping[str, Judgement], frame: NDArray[np.intp]) -> list[str]:
-    """Return remarks about a body, by the judgements of checks by name, and the frames' numbers in the file (T,)."""
+    """Return remarks about a body, given the judgements by check and the frames' numbers in the file (T,)."""
     said = []
     if body.settings.ground is None and {"penetration", "floating"} & set(found):
         ground = ground_of(body)
@@ -95,7 +97,7 @@ def hints(body: Body, found: Mapping[str, Judgement], frame: NDArray[np.intp]) -
         for edge in (0, len(body) - 1):
             if jumps[edge].sum() >= POSTURE_JOINTS and jumps.any(axis=1).sum() == 1:
                 said.append(
-                    f"Frame {frame[edge]} is another posture than the frames beside it, as of a skeleton at rest: "
+                    f"Frame {frame[edge]} is another posture than its neighbours, e.g. the skeleton's rest pose: "
                     "cut it off with --keep DIR --keep-spans SECONDS."
                 )
     if "sliding" in found and found["sliding"].violated.any(axis=1).mean() > BELT_SHARE:
@@ -108,14 +110,14 @@ def hints(body: Body, found: Mapping[str, Judgement], frame: NDArray[np.intp]) -
         travel = float(norm(np.nanmax(middle, axis=0) - np.nanmin(middle, axis=0)))
         if speed > BELT_SPEED and travel < IN_PLACE_SHARE * speed * len(body) * body.dt:
             said.append(
-                f"Feet go backward at {speed:.2g} m/s under a body that stays in place, as on a treadmill: judge it "
-                "by a profile without sliding (--profile FILE.toml), or add the way of the belt to all points."
+                f"Feet move backward at {speed:.2g} m/s while the body stays in place, as on a treadmill: use a "
+                "profile without sliding (--profile FILE.toml), or add the motion of the belt to all points."
             )
     return said
 
 
 def rate_doubts(body: Body) -> list[str]:
-    """Return a warning if the motion fits about half or double the stated frame rate; otherwise an empty list."""
+    """Return a warning if about half or double the stated frame rate fits the motion; otherwise an empty list."""
     if not body.knows("time") or not body.knows("joints") or body.up is None or body.q is not None:
         return []
     span = max(round(SPAN_SECONDS / body.dt), 1)
@@ -135,7 +137,7 @@ def rate_doubts(body: Body) -> list[str]:
 
 
 def _by_falls(body: Body, rise: Array, span: int) -> tuple[float, str] | None:
-    """Return the factor from the stated to the likely rate by upward accelerations (S,) in g, and the reason."""
+    """Return the ratio of likely to stated frame rate according to upward accelerations (S,) in g, and the reason."""
     in_air = timeline_of(body).spread(ground_of(body).in_air.astype(np.float64)) > 0
     inside = np.zeros(len(rise), dtype=np.bool_)
     for start, stop in runs(in_air):
@@ -152,7 +154,7 @@ def _by_falls(body: Body, rise: Array, span: int) -> tuple[float, str] | None:
 
 
 def _by_balance(body: Body, centre: Array, acceleration: Array, span: int) -> tuple[float, str] | None:
-    """Return the factor from the stated rate to the likely rate by the zero moment point, and the reason."""
+    """Return the ratio of likely to stated frame rate according to the zero moment point, and the reason."""
     line, up, ground = timeline_of(body), up_of(body), ground_of(body)
     joints, feet = line.spread(body.joints), line.spread(soles(body)[0])
     load = GRAVITY_ACCELERATION + acceleration @ up
@@ -187,7 +189,7 @@ def _by_balance(body: Body, centre: Array, acceleration: Array, span: int) -> tu
 
 
 def _by_tempo(body: Body, span: int) -> tuple[float, str] | None:
-    """Return the factor from the stated to the likely rate by the tempo of joints, and the reason."""
+    """Return the ratio of likely to stated frame rate according to the tempo of joints, and the reason."""
     joints, seconds = timeline_of(body).spread(body.joints), span * body.dt
     paths = np.concatenate([joints, joints - joints[:, [JOINT["pelvis"]]]], axis=1)
     speed, change = (

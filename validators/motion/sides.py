@@ -1,10 +1,10 @@
-"""Exchanged right and left joints, found by continuity, by lengths and by the direction that a body faces.
+"""Detection of exchanged right and left joints, by continuity, segment lengths and the direction that a body faces.
 
-In every frame each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is as labelled or exchanged:
-64 states. A state has an energy by the lengths of segments between pairs, by the direction that the body faces, and by
-the distances of right and left joints from their previous positions. The sequence of states with the least energy is
-found by dynamic programming (Viterbi 1967, IEEE Trans. Inf. Theory 13). States change only at frames in which the
-motion of some pair suggests an exchange.
+In every frame each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is either labelled correctly
+or exchanged: 64 states. The energy of a state has three terms: lengths of the segments between pairs, the direction
+that the body faces, and distances of right and left joints from their previous positions. Dynamic programming finds the
+sequence of states with the lowest energy (Viterbi 1967, IEEE Trans. Inf. Theory 13). The state changes only at frames
+in which the motion of some pair suggests an exchange.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ _PAIR_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
 #: Pairs with a limb segment between them.
 _LIMB_LINKS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
 
-#: Sign of each kind of evidence in each state (7, 64): five for pairs that belong together, hips, shoulders.
+#: Sign of each of seven kinds of evidence in each state (7, 64): five about two pairs that belong together, one about
+#: the hips, one about the shoulders.
 _AS_LABELLED: Final = np.array(
     [
         *(1 - 2 * (_PAIR_STATES[:, a] != _PAIR_STATES[:, b]) for a, b in (*_LIMB_LINKS, (0, 3))),
@@ -37,46 +38,46 @@ _AS_LABELLED: Final = np.array(
     ]
 )
 
-#: Difference between two lengths that is full evidence, as a share of the length.
+#: Difference between two lengths that counts as full evidence, as a share of the length.
 LENGTH_SHARE: Final = 0.1
 
-#: Least median deviation of a limb's length if its ends often belong to two limbs, metres.
+#: Minimum median deviation of a limb's length that shows that its two joints often belong to different limbs, metres.
 TORN_METRES: Final = 0.02
 
-#: Distance of a knee or a toe in front of the leg that is full evidence of the direction of the hips, metres.
+#: Distance of a knee or a toe in front of the leg that counts as full evidence of the hips' direction, metres.
 BEND_METRES: Final = 0.03
 
-#: Distance that is full evidence in measured data, in standard deviations of noise.
+#: Distance that counts as full evidence in measured data, in standard deviations of noise.
 NOISE_FACTOR: Final = 5.0
 
-#: Least distance between right and left that gives full evidence of their identity in the next frame, metres.
+#: Minimum distance between a right and a left joint for full evidence of an exchange in the next frame, metres.
 APART_METRES: Final = 0.1
 
-#: Energy of a change of state between two frames, in frames of evidence.
+#: Energy of a change of state, as a multiple of the full evidence of one frame.
 TURNING_COST: Final = 1.0
 
-#: Weight of the continuity between two frames, in frames of evidence.
+#: Weight of the continuity between two frames, as a multiple of the full evidence of one frame.
 CONTINUITY_WEIGHT: Final = 6.0
 
-#: Energy of an exchanged pair in a frame, in frames of evidence: most labels are right.
+#: Energy of an exchanged pair, as a multiple of the full evidence of one frame; most labels are correct.
 EXCHANGED_COST: Final = 0.03
 
 
 def exchanged_pairs(
     joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_], noise: float
 ) -> NDArray[np.bool_]:
-    """Return whether right and left of each of `SIDE_PAIRS` are exchanged (T, 6).
+    """Return whether right and left joint of each of `SIDE_PAIRS` are exchanged (T, 6).
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, in the order of time; NaN if unknown.
+        Joint positions, metres, in the order of time; NaN where unknown.
     feet : array (T, 4, 3)
-        Right and left toe, right and left heel.
+        Positions of right and left toe, right and left heel, metres.
     head : array (T, 5, 3)
-        Nose, eyes and ears.
+        Positions of nose, eyes and ears, metres.
     follows : bool array (T - 1,)
-        Whether each frame except the first directly follows the frame before it in time.
+        Whether each frame except the first is one time step after the previous frame.
     noise : float
         Standard deviation of measured coordinates, metres.
     """
@@ -98,7 +99,7 @@ def exchanged_pairs(
 
 
 def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
-    """Return joints (T, 14, 3) with right and left exchanged at the given pairs (T, 6)."""
+    """Return joints (T, 14, 3) with right and left exchanged in the given pairs (T, 6)."""
     if not swapped.any():
         return points
     mended, turned = points.copy(), swapped[..., None]
@@ -108,7 +109,7 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
 
 
 def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: float) -> Array:
-    """Return the evidence, -1 to 1, that pairs are as labelled (T, 7), in the order of `_AS_LABELLED`."""
+    """Return the evidence, -1 to 1, that pairs are labelled correctly (T, 7), in the order of `_AS_LABELLED`."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
@@ -126,7 +127,7 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
     sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
     together[:, 4] = _sure(dot(across_shoulders, across_hips) / sizes * 2.0)
     forward = unit(cross(trunk, across_hips))
-    # If the thigh is at more than a right angle to the trunk, the knee is still in front of the line from hip to ankle.
+    # A knee is in front of the line from hip to ankle, even if the thigh is raised above the horizontal.
     legs = (joints[:, both("hip")] + joints[:, both("ankle")]) / 2.0
     bends = dot(joints[:, both("knee")] - legs, forward[:, None])
     toes = dot(feet[:, :2] - joints[:, both("ankle")], forward[:, None])
@@ -140,9 +141,9 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
 def _length(straight: Array, crossed: Array, torn: float) -> float:
     """Return a segment's length: the median of the labelled lengths or, if they scatter, the mode of all lengths.
 
-    All lengths are the labelled and the crossed ones. Half of them are right, whatever share of a clip is exchanged.
-    The mode is the middle of the shortest interval with two fifths of all lengths (Robertson & Cryer 1974, J. Am. Stat.
-    Assoc. 69, 1012-1016).
+    Labelled lengths are between joints with the same side label, crossed lengths between joints with opposite labels.
+    Half of all these lengths are correct, whatever share of a clip is exchanged. The mode is the middle of the shortest
+    interval that contains two fifths of all lengths (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69, 1012-1016).
     """
     middle = known_median(straight)
     if not known_median(np.abs(straight - middle)) > torn:
@@ -155,14 +156,14 @@ def _length(straight: Array, crossed: Array, torn: float) -> float:
 
 
 def _sure(evidence: Array) -> Array:
-    """Return evidence between -1 and 1; unknown evidence is 0."""
+    """Clip evidence to -1 to 1; unknown evidence becomes 0."""
     return np.asarray(np.nan_to_num(np.clip(evidence, -1.0, 1.0)))
 
 
 def _continuity(joints: Array, across: Array) -> Array:
-    """Return the evidence, -1 to 1, that each pair was exchanged since the frame before (T - 1, 6).
+    """Return the evidence, -1 to 1, that each pair was exchanged since the previous frame (T - 1, 6).
 
-    The evidence is the decrease of both joints' displacements, relative to the trunk's, if the joints change places.
+    The evidence is the decrease of both joints' displacements, relative to the trunk's, if their labels are exchanged.
     """
     moved = np.diff(joints[:, :N_TRUNK_JOINTS], axis=0)
     known = np.isfinite(moved[..., 0])
@@ -178,7 +179,7 @@ def _continuity(joints: Array, across: Array) -> Array:
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
-    """Return the sequence of states (N,) of least energy, by energies (N, 64) and evidence of exchanges (N - 1, 6)."""
+    """Return the sequence of states (N,) of lowest energy for energies (N, 64) and evidence of exchanges (N - 1, 6)."""
     differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]

@@ -1,9 +1,9 @@
-r"""Sliding: standing feet that move evenly along the ground.
+r"""Foot slide: standing feet that move with a uniform velocity along the ground.
 
 The points of a standing foot should not move. In recordings they do: skin and markers move, feet roll, and joints lie
-above the sole. Published measures of skating use the speed of the slowest point, and reject every other step of a real
-walk. But real feet never move evenly. Here a foot slides if all its points have the same velocity along the ground for
-some time. The whole body drifts if everything that carries it has one common velocity.
+above the sole. Published measures of foot skating use the speed of the slowest point, and reject every second step of a
+real walk. But the points of a real foot seldom have the same velocity. Here a foot slides if all its points have the
+same velocity along the ground for some time. The whole body drifts if all points that carry it have the same velocity.
 """
 
 from __future__ import annotations
@@ -21,48 +21,49 @@ from posekit.validators.motion.frames import needs_rate
 from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of, up_of
 from posekit.validators.motion.timeline import median_of_five, timeline_of
 
-#: Largest height of a foot on the ground above its highest level, metres. Toes of a swinging foot clear the ground by 1
-#: to 6 cm, but are faster.
+#: Largest height of a standing foot above the highest level of the ground, metres. Toes of a swinging foot are 1 to 6
+#: cm above the ground, but are faster.
 DOWN_METRES: Final = 0.04
 
-#: Largest height above the ground of joints that may carry the body, metres: also hands and knees of crawling bodies.
+#: Largest height above the ground of joints that may carry the body, metres; they include hands and knees.
 LOW_METRES: Final = 0.1
 
 #: Indices of toe, heel and ankle of the right and the left foot in `posekit.validators.motion.ground.soles`.
 FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
 
-#: Largest unevenness of a slide of several points, as a share of its speed.
+#: Largest difference between velocities in a slide of several points, as a share of its speed.
 EVEN_SHARE: Final = 0.3
 
-#: Largest speed of a slide, metres a second, if noise hides the unevenness of swinging feet.
+#: Largest speed of a slide, metres per second, if noise hides the differing velocities in swinging feet.
 SWINGING_SPEED: Final = 1.0
 
-#: Least height of the hips above a standing foot, as a share of the legs' length: crawling bodies drag their feet.
+#: Minimum height of the hips above a standing foot, as a share of the legs' length; crawling people drag their feet.
 UPRIGHT_SHARE: Final = 0.6
 
-#: Least rate without `SLOW_FACTOR`, frames per second.
+#: Frame rate below which `SLOW_FACTOR` applies, frames per second.
 VIDEO_RATE: Final = 29.0
 
-#: Factor of the least duration at lower rates: medians of five frames hide the roll of a foot.
+#: Factor of the minimum duration at lower rates, where medians of five frames hide the roll of a foot.
 SLOW_FACTOR: Final = 2.0
 
-#: Least rate at which resting feet are visible, frames per second.
+#: Minimum frame rate of `sliding`, frames per second; lower rates do not show resting feet.
 SLIDING_RATE: Final = 15.0
 
 
-#: Range of speeds of a drift of the whole body, metres a second; real walks drift by up to 0.04 for a second.
+#: Range of speeds of a drift of the whole body, metres per second; real walks drift by up to 0.04 m/s for a second.
 LEAST_DRIFT, LONGEST_DRIFT = 0.05, 1.0
 
-#: Least duration of a drift, and duration of windows whose median velocities are candidates for its velocity, seconds.
+#: Minimum duration of a drift, seconds; and duration of the windows whose median velocities are candidates for its
+#: velocity, seconds.
 DRIFT_SECONDS, CANDIDATE_SECONDS = 0.8, 0.4
 
-#: Least share of the slots of a drift in which a point is near the ground.
+#: Minimum share of the time slots of a drift in which a point is near the ground.
 KNOWN_SHARE: Final = 0.6
 
-#: Largest mean distance of velocities from the velocity of a drift, as a share of its speed.
+#: Largest mean deviation of velocities from the velocity of a drift, as a share of its speed.
 DRIFT_FIT: Final = 0.55
 
-#: Least improvement of a drift over rest as the explanation of a velocity, as a share of the drift's speed.
+#: Minimum amount by which a velocity is nearer to the drift's velocity than to zero, as a share of the drift's speed.
 DRIFT_PENALTY: Final = 0.25
 
 
@@ -75,13 +76,13 @@ def sliding(
     Parameters
     ----------
     fastest : float
-        Largest allowed speed of a standing foot, metres a second.
+        Largest allowed speed of a standing foot, metres per second.
     lasting : float
-        Least duration of a slide, seconds.
+        Minimum duration of a slide, seconds.
     uneven : float
-        Largest difference of velocities in a slide, between points of the foot and over time, metres a second.
+        Largest difference between velocities in a slide, over points of the foot and over time, metres per second.
     rising : float
-        Largest vertical speed of a foot on the ground, metres a second.
+        Largest vertical speed of a foot on the ground, metres per second.
     """
     needs_rate(body, SLIDING_RATE)
     line, up, (feet, height), ground = timeline_of(body), up_of(body), soles(body), ground_of(body)
@@ -118,9 +119,9 @@ def sliding(
 def _slides(
     body: Body, points: Array, down: Flags, count: int, bounds: tuple[float, float, float, float]
 ) -> Flags:
-    """Return whether a foot (S, 3, 3) slides evenly, for at least `count` slots, in each slot (S,).
+    """Return whether a foot (S, 3, 3) slides in each slot (S,) of slides over at least `count` slots.
 
-    The bounds are those of `sliding` for speed, unevenness and rise, and the noise of a speed, metres a second.
+    `bounds` are `fastest`, `uneven` and `rising` of `sliding`, and the noise of a speed, metres per second.
     """
     fastest, uneven, rising, noise = bounds
     up = up_of(body)
@@ -139,7 +140,7 @@ def _slides(
     share = EVEN_SHARE if known.sum() > 1 else 0.0
     steady = differs < np.maximum(uneven, share * norm(even)) + noise
     steady &= sliding_window_view(flat, count).all(axis=1)
-    # Evenness is no evidence if noise may change velocities by more than the speed of the slide.
+    # Equal velocities are no evidence if noise changes velocities by more than the speed of the slide.
     steady &= norm(even) > max(fastest, noise / EVEN_SHARE)
     if noise > uneven:
         steady &= norm(even) < SWINGING_SPEED
@@ -149,10 +150,10 @@ def _slides(
 
 
 def _stance_way(points: Array, low: Flags, up: Array) -> Array:
-    """Return the way along the ground, since the slot before, of the slowest low point of the body (S, 3), metres.
+    """Return the displacement along the ground of the slowest low point since the previous slot (S, 3), metres.
 
-    A part of the body that carries it stands still, so that the way of clean motion is near zero; NaN in slots without
-    a low point.
+    A part that carries the body does not move, so that the displacement is near zero in clean motion. It is NaN in
+    slots without a low point.
 
     Parameters
     ----------
@@ -170,10 +171,11 @@ def _stance_way(points: Array, low: Flags, up: Array) -> Array:
 
 
 def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
-    """Return start, stop and speed of the stretch of slots with one common velocity of standing points; None if none.
+    """Find an interval of slots in which standing points have a common velocity.
 
-    The stretch maximizes the summed improvement of the common velocity over rest as the explanation of the velocities
-    (S, 3) (the maximum sum of consecutive numbers: Bentley 1984, Commun. ACM 27:865).
+    Returns start, stop and speed of the interval, or None without such an interval. The interval maximizes a sum over
+    slots: by how much the velocity (S, 3) is nearer to the common velocity than to zero (the maximum sum of consecutive
+    numbers: Bentley 1984, Commun. ACM 27:865).
     """
     known = np.isfinite(velocity[:, 0])
     count = max(round(CANDIDATE_SECONDS / step), 3)
@@ -204,7 +206,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
 
 
 def _ends(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
-    """Return the ends of a slide, moved outward by at most `most` slots to the largest sum of gains (S - 1,)."""
+    """Return start and stop of a slide, moved outward by at most `most` slots to maximize the sum of gains (S - 1,)."""
     middle = (start + stop) // 2
     before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
     after = np.cumsum(gained[middle : stop + most])

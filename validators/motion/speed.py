@@ -1,4 +1,4 @@
-"""Speeds, accelerations and jerks of joints against measured bounds of people; joint speeds of robots."""
+"""Checks of joints' speeds, accelerations and jerks against bounds measured on people; joint velocities of robots."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from posekit.validators.check import Judgement, NotAskedError, check
 from posekit.validators.motion.frames import explained
 from posekit.validators.motion.timeline import spaced, timeline_of
 
-#: Shortest time between the points of a difference, seconds: shorter times amplify noise.
+#: Minimum time step of finite differences, seconds; smaller steps amplify noise.
 SHORTEST_SECONDS: Final = 1.0 / 60.0
 
-#: Tolerance of differences in standard deviations of their noise.
+#: Tolerance of finite differences, in standard deviations of their noise.
 NOISE_DEVIATIONS: Final = 5.0
 
-#: A URDF with this or a larger velocity limit has no limit, radians or metres a second.
+#: Velocity limit of a URDF from which on it counts as unlimited, radians or metres per second.
 NO_LIMIT: Final = 1e6
 
 
@@ -31,33 +31,33 @@ def speed(body: Body, *, trunk: float = 14.0, limbs: float = 30.0) -> Judgement:
     Parameters
     ----------
     trunk : float
-        Bound for neck, shoulders, pelvis and hips, metres a second.
+        Largest allowed speed of neck, shoulders, pelvis and hips, metres per second.
     limbs : float
-        Bound for the other joints, metres a second.
+        Largest allowed speed of the other joints, metres per second.
     """
     return _derivative(body, 1, trunk, limbs)
 
 
 @check("acceleration", unit="m/s²", reads=("joints", "time"), over_time=True)
 def acceleration(body: Body, *, trunk: float = 400.0, limbs: float = 1200.0) -> Judgement:
-    """Speeds of joints change faster than those of people can.
+    """Accelerations of joints are larger than people's.
 
-    Parameters are those of `speed`.
+    The parameters are bounds as in `speed`, metres per second squared.
     """
     return _derivative(body, 2, trunk, limbs)
 
 
 @check("jerk", unit="m/s³", reads=("joints", "time"), over_time=True)
 def jerk(body: Body, *, trunk: float = 48_000.0, limbs: float = 144_000.0) -> Judgement:
-    """Accelerations of joints change faster than those of people can.
+    """Jerks of joints are larger than people's.
 
-    Parameters are those of `speed`.
+    The parameters are bounds as in `speed`, metres per second cubed.
     """
     return _derivative(body, 3, trunk, limbs)
 
 
 def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement:
-    """Judge a derivative by differences over a sixtieth of a second, or over one frame if that is longer."""
+    """Judge a time derivative by finite differences with a step of 1/60 s, or of one frame if frames are longer."""
     found = explained(body)
     stride = max(round(SHORTEST_SECONDS / body.dt), 1)
     weights = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
@@ -73,7 +73,7 @@ def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement
 
 
 def _over_gaps(joints: Array) -> Array:
-    """Return the mean speed of each joint over the gap before its slot (S, 14), metres a slot; NaN without a gap."""
+    """Return the mean speed of each joint over the gap before a slot (S, 14), metres per slot; NaN without a gap."""
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)
@@ -89,9 +89,9 @@ def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judg
     Parameters
     ----------
     share : float
-        Share of the URDF's velocity limit that a joint may use.
+        Allowed velocity, as a share of the URDF's velocity limit.
     most : float
-        Bound for all revolute joints instead of the URDF's limits, radians a second; 0 for the URDF's limits.
+        Largest velocity of revolute joints, radians per second, in place of the URDF's limits; 0 for the URDF's limits.
     """
     robot = body.robot
     if robot is None or body.q is None:
@@ -107,7 +107,7 @@ def joint_velocity(body: Body, *, share: float = 1.0, most: float = 0.0) -> Judg
         joints = zip(robot.model.joints, sizes, strict=True)
         revolute = [size == 1 and "P" not in joint.shortname() for joint, size in joints for _ in range(size)]
         limits = np.where(revolute, most, np.inf)
-    # The root has no limit, and 0 or a huge number in a URDF stands for no limit.
+    # The root has no limit, and a limit of 0 or a huge number in a URDF means unlimited.
     limited = np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))
     if not len(limited):
         raise NotAskedError("the URDF has no velocity limits")

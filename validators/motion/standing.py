@@ -1,4 +1,4 @@
-"""Checks against the ground: bodies are in it, hover above it, are in the air for too long, or would fall over."""
+"""Checks of ground contact: bodies penetrate the ground, hover, are in the air for too long, or would fall over."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from posekit.validators.motion.ground import (
 #: Tolerance of the height of the lowest point, in standard deviations of noise.
 PENETRATION_DEVIATIONS: Final = 3.0
 
-#: Time before and after each frame, seconds, in which a body on a stated ground touches it.
+#: Time before, and after, each frame within which a body must touch a stated ground, seconds.
 TOUCH_SECONDS: Final = 0.4
 
-#: Tolerance for a stated ground that is not level, metres: floors of one laboratory slope by 2 to 4 cm.
+#: Tolerance for a stated ground that is not level, metres; measured laboratory floors slope by 2 to 4 cm.
 UNLEVEL_METRES: Final = 0.03
 
-#: Tolerance for lifted heels if toes are unknown, metres: nobody stands on the toes for longer than `TOUCH_SECONDS`
-#: before and after a frame.
+#: Tolerance for lifted heels if toes are unknown, metres.
 HEEL_METRES: Final = 0.04
 
 #: Tolerance of the speed of the fastest joint, in standard deviations of noise.
 STILL_DEVIATIONS: Final = 4.0
 
-#: Largest height of a foot that carries the body above the lowest sole, metres.
+#: Largest height above the lowest sole for a foot that carries the body, metres.
 BEARING_METRES: Final = 0.06
 
-#: Least height of the hips of a standing person above the feet, as a share of the legs' length: lower hips may sit.
+#: Minimum height of the hips above the feet of a standing person, as a share of the legs' length; with lower hips a
+#: person may sit.
 SITTING_SHARE: Final = 0.8
 
 
@@ -59,7 +59,7 @@ def penetration(body: Body, *, depth: float = 0.025, unlevel: float = 0.1) -> Ju
         Allowed depth, metres.
     unlevel : float
         Tolerance for an estimated ground that is not level, metres. It does not apply to parts that rest at a level
-        which the body reached without a step or a jump.
+        that the body reached neither by a step nor by a jump.
     """
     ground, stated = ground_of(body), body.settings.ground
     if stated is None:
@@ -76,19 +76,19 @@ def floating(
 ) -> Judgement:
     r"""Bodies are above the ground, and nothing holds them there.
 
-    The centre of mass of a body in the air has the acceleration :math:`-g`. A body hovers if it is above all levels of
-    the ground, no part of it rests, and its centre of mass falls with less than half of gravity. Over a stated ground a
-    body also floats if its lowest resting parts are above the ground, or if it does not come near the ground within
-    0.4 s.
+    The centre of mass of a body in the air has the acceleration :math:`-g`. A body floats if it is above all levels of
+    the ground, no part of it rests, and its centre of mass falls with less than half of gravity. If the ground is
+    stated, a body also floats if its lowest resting parts are above the ground, or if it does not come near the ground
+    within 0.4 s.
 
     Parameters
     ----------
     height : float
         Allowed height, metres.
     shortest : float
-        Least duration of a judged flight, seconds: in shorter ones, limbs hide the fall.
+        Minimum duration of a judged flight, seconds; in shorter flights the motion of limbs hides the fall.
     fall : float
-        Least downward acceleration of the centre of mass of a body in the air, as a share of gravity.
+        Minimum downward acceleration of the centre of mass of a body in the air, as a share of gravity.
     """
     ground, stated = ground_of(body), body.settings.ground
     over = ground.lifted.copy()
@@ -105,7 +105,7 @@ def floating(
 
 
 def _untouched(height: Array, body: Body) -> Array:
-    """Return the least height (T,) within `TOUCH_SECONDS` of each frame; 0 if that is below the ground."""
+    """Return the minimum height (T,) within `TOUCH_SECONDS` of each frame; 0 for heights below the ground."""
     half = max(round(TOUCH_SECONDS / body.dt), 1)
     padded = np.pad(np.where(np.isnan(height), np.inf, height), half, constant_values=np.inf)
     least = sliding_window_view(padded, 2 * half + 1).min(axis=-1)
@@ -114,7 +114,7 @@ def _untouched(height: Array, body: Body) -> Array:
 
 @check("support", unit="s", reads=("joints", "up", "time", "ground"), over_time=True)
 def support(body: Body, *, longest: float = 1.0) -> Judgement:
-    """Nothing holds the body for longer than a jump lasts.
+    """Bodies are in the air for longer than a jump lasts.
 
     Parameters
     ----------
@@ -131,16 +131,16 @@ def support(body: Body, *, longest: float = 1.0) -> Judgement:
 def balance_still(
     body: Body, *, beyond: float = 0.05, slower: float = 0.1, lasting: float = 1.0
 ) -> Judgement:
-    """Bodies stand still, and would fall over.
+    """Bodies stand still with the centre of mass outside their feet.
 
     Parameters
     ----------
     beyond : float
         Allowed distance of the centre of mass beyond the feet, metres.
     slower : float
-        Largest speed of any joint of a still body, metres a second.
+        Largest speed of any joint of a still body, metres per second.
     lasting : float
-        Least time for which the body is still, seconds.
+        Minimum time for which the body is still, seconds.
     """
     still = _stands(body, slower, lasting)
     value = np.where(still, beyond_feet(body), np.nan) if still.any() else np.full(len(body), np.nan)
@@ -149,7 +149,7 @@ def balance_still(
 
 def _stands(body: Body, slower: float, lasting: float) -> NDArray[np.bool_]:
     """Return whether the body stands still in each frame (T,), for at least `lasting` seconds."""
-    # Number of frames over which noise alone is slower than the bound.
+    # Number of frames over which the speed due to noise is below the bound.
     noise = STILL_DEVIATIONS * body.noise / (np.sqrt(2) * body.dt)
     frames = len(body) if noise >= slower * len(body) else max(int(np.ceil(noise / slower)), 1)
     fast = np.nan_to_num(speeds(body, body.joints, frames), nan=0.0).max(axis=1)
@@ -161,7 +161,7 @@ def _stands(body: Body, slower: float, lasting: float) -> NDArray[np.bool_]:
 
 @check("balance", unit="m", reads=("joints", "up"))
 def balance(body: Body, *, beyond: float = 0.0) -> Judgement:
-    """Centres of mass are beyond the feet, as if the body stood still in every frame.
+    """Centres of mass are outside the feet; each frame is judged as if the body stood still.
 
     Parameters
     ----------
@@ -173,17 +173,17 @@ def balance(body: Body, *, beyond: float = 0.0) -> Judgement:
 
 
 def upright(body: Body, share: float) -> NDArray[np.bool_]:
-    """Return whether the hips are above the feet by a share of the legs' length in each frame (T,)."""
+    """Return whether the hips are above the feet by at least a share of the legs' length in each frame (T,)."""
     hips = body.height[:, both("hip")].mean(axis=1)
     ankles = np.fmin.reduce(body.height[:, both("ankle")], axis=1)
     return np.asarray(hips - ankles > share * LEG_SHARE * stature_of(body))
 
 
 def beyond_feet(body: Body) -> Array:
-    """Return the distance of the centre of mass beyond the feet on the ground (T,), metres; negative over them."""
+    """Return the horizontal distance from the centre of mass to the feet's hull (T,), metres; negative inside."""
     feet, height = soles(body)
     bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
-    # A foot reaches beyond its known points: most of its length beyond an ankle, its end and edges beyond a toe.
+    # The sole extends beyond the known points: by most of the foot's length from an ankle, by less from a toe.
     toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
     reach = (0.4 if toes else FORWARD_SHARE) * FOOT_SHARE * stature_of(body)
     centre = centre_of_mass(body.joints)

@@ -1,4 +1,4 @@
-"""Frames on an even grid of time, so that missing frames leave gaps; and filters on that grid."""
+"""A regular time grid of slots for the frames of a clip, with gaps for missing frames; and filters on this grid."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.validators.body import Body, once
 
-#: Largest number of slots of a gap; longer gaps become this long.
+#: Largest number of slots of a gap; longer gaps are shortened to it.
 LONGEST_GAP: Final = 16
 
 #: Number of slots in one batch of a filter.
@@ -21,19 +21,19 @@ CACHED_SLOTS: Final = 256
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
-    """Slots of the frames of a clip on an even grid of time, with gaps and wrong order by the time stamps.
+    """Slots of a clip's frames on a regular time grid, and the gaps and order of the time stamps.
 
     Parameters
     ----------
     slots : int array (T,)
-        Slot of each frame, ascending with time; slots are one step of the clip's rate apart. -1 for a frame with the
-        time of an earlier frame.
+        Slot of each frame, ascending with time; the distance between slots is one time step. -1 for a frame whose time
+        is that of an earlier frame.
     count : int
         Number of slots.
     place : int array (T,)
-        Number of frames by which each frame is away from its place in the order of time.
+        Index of each frame minus its index in the order of time.
     missing : array (T,)
-        Number of missing steps of time before each frame; NaN if times are unknown.
+        Number of missing time steps before each frame; NaN if times are unknown.
     """
 
     slots: NDArray[np.intp]
@@ -57,7 +57,7 @@ class Timeline:
 
 @once
 def timeline_of(body: Body) -> Timeline:
-    """Return the timeline of a clip; without known times, each frame is in the slot of its index."""
+    """Return the timeline of a clip; if times are unknown, each frame's slot is its index."""
     count = len(body)
     frames = np.arange(count)
     if not body.dt > 0 or not np.isfinite(body.time).all():
@@ -66,7 +66,7 @@ def timeline_of(body: Body) -> Timeline:
         )
     order = np.argsort(body.time, kind="stable")
     steps = np.diff(body.time[order], prepend=body.time[order[:1]] - body.dt) / body.dt
-    # A time stamp may be early by 3/4 of a step, as in some videos. A frame that is hardly later has no slot.
+    # In some videos a time stamp is early by up to 3/4 of a step. A frame with an even earlier stamp has no slot.
     ways = np.clip(np.round(steps), 0, LONGEST_GAP).astype(np.intp)
     ways[(ways == 0) & (steps > 0.25)] = 1
     ways[:1] = 1
@@ -78,7 +78,7 @@ def timeline_of(body: Body) -> Timeline:
 
 
 def filtered(points: Array, weights: Array) -> Array:
-    """Sum `weights` (K,) over K neighbouring slots of (S, ...): (S - K + 1, ...)."""
+    """Return sums of K neighbouring slots of `points` (S, ...) with `weights` (K,): shape (S - K + 1, ...)."""
     room = max(len(points) - len(weights) + 1, 0)
     total = np.zeros((room, *points.shape[1:]))
     # Blocks of this size stay in the cache.
@@ -91,24 +91,24 @@ def filtered(points: Array, weights: Array) -> Array:
 
 
 def centred(values: Array, count: int, first: int) -> Array:
-    """Return the output of a filter (N, ...) padded with NaN to (count, ...); it starts at index `first`."""
+    """Pad the output of a filter (N, ...) with NaN to (count, ...), so that it starts at index `first`."""
     found = np.full((count, *values.shape[1:]), np.nan)
     found[first : first + len(values)] = values[: max(count - first, 0)]
     return found
 
 
 def spaced(points: Array, weights: Sequence[float] | Array, apart: int) -> Array:
-    """Return weighted sums of K slots, `apart` slots apart and centred on each slot (S, ...); NaN at the ends."""
+    """Return weighted sums of K slots at a distance of `apart` slots, centred on each slot; NaN at start and end."""
     spread = np.zeros((len(weights) - 1) * apart + 1)
     spread[::apart] = weights
     return centred(filtered(points, spread), len(points), len(spread) // 2)
 
 
 def median_of_five(values: Array) -> Array:
-    """Return medians over five slots (S, ...), mirrored at the ends; NaN if one of the five is unknown."""
+    """Return running medians over five slots (S, ...), mirrored at start and end; NaN if a slot is unknown."""
     padded = np.pad(values, ((2, 2), *[(0, 0)] * (values.ndim - 1)), mode="reflect")
     a, b, c, d, e = (padded[k : k + len(values)] for k in range(5))
-    # Drop the smaller of two minima and the larger of two maxima: the median of the remaining three is that of all.
+    # Without the smaller of two minima and the larger of two maxima, the three remaining values have the same median.
     low = np.maximum(np.minimum(a, b), np.minimum(d, e))
     high = np.minimum(np.maximum(a, b), np.maximum(d, e))
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))

@@ -1,4 +1,4 @@
-"""Trembling of joints: the remainder of motion without its smooth part."""
+"""Jitter of joints: the part of motion that is not smooth."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from posekit.geometry import Array, groups, norm
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.validators.motion.timeline import centred, filtered, spaced
 
-#: Frames over which trembling is measured.
+#: Number of frames in a window over which jitter is measured.
 TREMBLING_FRAMES: Final = 15
 
-#: Share of the second difference over three frames that fast motion adds to the sixth difference.
+#: Contribution of fast motion to the sixth difference, as a share of the second difference over three frames.
 CURVED_SHARE: Final = 0.4
 
-#: Number of standard deviations of noise to subtract from the trembling of a length.
+#: Number of standard deviations of noise that are subtracted from the jitter of a length.
 LENGTHS_NOISE: Final = 2.0
 
-#: Share of the trembling of a length that is due to one joint; its other end may tremble too.
+#: Share of the jitter of a length that is attributed to one joint; the joint at the other end may jitter too.
 BOTH_ENDS: Final = 0.8
 
-#: Medians of the length of a vector of three normal coordinates of unit deviation, and of the size of one coordinate.
+#: Median norm of a vector of three standard normal coordinates, and median absolute value of one coordinate.
 MEDIAN_OF_THREE, MEDIAN_OF_ONE = 1.5382, 0.6745
 
-#: Largest distance between frames of one stretch.
+#: Largest distance between jittering windows of one interval, frames.
 NEAR_FRAMES: Final = 4
 
-#: Number of frames before and after a stretch in which its ends may lie.
+#: Number of frames before and after an interval in which its start and end are searched.
 EDGE_FRAMES: Final = 20
 
-#: Largest number of frames that give the usual trembling.
+#: Largest number of frames for the estimate of usual jitter.
 SAMPLED_FRAMES: Final = 2000
 
-#: Largest evidence of one joint in one frame: natural logarithm of a ratio of likelihoods.
+#: Largest evidence of one joint in one frame: natural logarithm of a likelihood ratio.
 MOST_EVIDENCE: Final = 6.0
 
-#: Assumed ratio of trembling outside a stretch to trembling inside it: 0.15 to 0.55 give the same ends.
+#: Assumed ratio of jitter outside an interval to jitter inside; ratios from 0.15 to 0.55 give the same start and end.
 OUTSIDE_SHARE: Final = 0.35
 
-#: Order of the differences that measure trembling.
+#: Order of the differences that measure jitter.
 SIXTH_ORDER: Final = 6
 
 _SEGMENTS_OF: Final = tuple(
@@ -57,14 +57,14 @@ _CURVATURE: Final = np.array([1.0, 0, 0, -2.0, 0, 0, 1.0]) / 9.0
 
 
 def trembling_of(joints: Array, noise: float = 0.0) -> Array:
-    """Return the standard deviation (S, 14), metres, of the trembling of a coordinate of joints (S, 14, 3) in slots.
+    """Return the standard deviation (S, 14), metres, of the jitter of each coordinate of joints (S, 14, 3) in slots.
 
     Notes
     -----
-    The sixth difference of noise with deviation s has the deviation s sqrt(924) in each coordinate. Its median length
-    over 15 frames measures lasting noise and ignores single jumps. The part due to the curvature of fast motion is
-    subtracted. The lengths of segments give a second measure, because motion does not change them: a joint also
-    trembles if the lengths of all its segments do, by more than the noise of measuring.
+    The sixth difference of noise with standard deviation s has the standard deviation s sqrt(924) in each coordinate.
+    Its median norm over 15 frames measures persistent noise and ignores single jumps. The contribution of fast motion,
+    estimated from the curvature, is subtracted. Segment lengths are a second measure, because motion does not change
+    them: a joint also jitters if the lengths of all its segments jitter by more than the measurement noise.
     """
     if len(joints) <= SIXTH_ORDER:
         return np.full(joints.shape[:2], np.nan)
@@ -80,14 +80,14 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
 
 
 def usual_trembling(joints: Array, percents: Sequence[float] = (50.0,)) -> Array:
-    """Return percentiles over the frames of the median trembling of joints (T, 14, 3), early in a clip, metres."""
+    """Return percentiles over frames of the median jitter of joints (T, 14, 3) at the start of a clip, metres."""
     rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
     known = rough[np.isfinite(rough).any(axis=1)]
     return np.percentile(np.nanmedian(known, axis=1), percents) if len(known) else np.zeros(len(percents))
 
 
 def _windows(rough: Array) -> Array:
-    """Return running medians of (N, K), computed at every third row and repeated in between; unknown values are 0."""
+    """Return running medians of columns (N, K), computed at every third row and repeated; unknown values count as 0."""
     half = TREMBLING_FRAMES // 2
     padded = np.pad(np.nan_to_num(rough), ((half, half + 2), (0, 0)))
     windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
@@ -96,13 +96,13 @@ def _windows(rough: Array) -> Array:
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return whether joints tremble in each slot (S, 14), given centres of windows in which they do (S, 14).
+    """Return whether joints jitter in each slot (S, 14), given the centres of jittering windows (S, 14).
 
     Notes
     -----
-    Windows blur the ends of a stretch. Fourth differences, which span five frames, are more local. Assuming normal
-    noise that is `OUTSIDE_SHARE` as large outside the stretch, the ends maximize the likelihood of the fourth
-    differences of all trembling joints.
+    Windows blur the start and end of an interval with jitter. Fourth differences span five frames only. Assuming normal
+    noise that is `OUTSIDE_SHARE` times as large outside the interval, start and end maximize the likelihood of the
+    fourth differences of all jittering joints.
     """
     rough = norm(spaced(joints, _FOURTH, 1))
     exact = np.zeros(hot.shape, dtype=np.bool_)
@@ -117,7 +117,7 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
         evidence = np.clip(np.nan_to_num(ratio), -MOST_EVIDENCE, MOST_EVIDENCE).sum(axis=1)
         total = np.concatenate([[0.0], np.cumsum(evidence)])
         middle = (first + last) // 2
-        # Fourth differences reach two frames beyond the noise, where their evidence is weaker.
+        # Fourth differences extend two frames beyond the noise, where their evidence is weaker.
         ends = (
             low + int(total[: middle - low + 1].argmin()) + 1,
             middle + int(total[middle - low :].argmax()) - 2,

@@ -58,7 +58,7 @@ MARGIN_UNITS: Final = {"joint-range": ("°", 1.0), "rigid-parts": ("mm", 1e3), "
 #: Okabe & Ito's palette, one colour a group.
 GROUP_COLOURS: Final = (0x009E73, 0xCC79A7, 0x56B4E9, 0xD55E00, 0xF0E442, 0x0072B2, 0xE69F00, 0x505050)
 
-#: Least difference in depth of a joint that is described as nearer or farther, metres.
+#: Minimum difference in depth of a joint that is described as nearer or farther, metres.
 CLEARLY_NEARER: Final = 0.05
 
 
