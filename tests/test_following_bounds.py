@@ -211,3 +211,39 @@ def test_points_are_within_a_million_pixels(farthest: float, refused: bool) -> N
         assert len(posekit.Detections(points=points[None], names=POINTS, frame=[0])) and not refused
     except InputError:
         assert refused
+
+
+def test_a_tracker_without_a_camera_is_a_webcam_with_five_pixels_of_noise() -> None:
+    """A usual webcam has 78 degrees from corner to corner (Logitech C920, data sheet)."""
+    posture = 0.3 * np.asarray(posekit.load_figure().neutral_points[:14]) @ about("x", 90).T + [0.0, 0.0, 1.5]
+    size, focal = (1280, 720), np.hypot(1280, 720) / 2 / np.tan(np.radians(39.0))
+    camera = PinholeCamera(K=np.array([[focal, 0, 639.5], [0, focal, 359.5], [0, 0, 1.0]]), size=size)
+    points = camera.project(posture) + np.random.default_rng(0).normal(0, 2.0, (14, 2))
+    trackers = (
+        posekit.Tracker(size=size, stature=0.6),
+        posekit.Tracker(camera=camera, stature=0.6, deviation=5.0, lag=5),
+        posekit.Tracker(size=size, stature=0.6, deviation=8.0),
+    )
+    usual, stated, other = (one.update(points, 0.0) for one in trackers)
+    np.testing.assert_array_equal(usual.joints, stated.joints)
+    assert usual.survivors and not np.allclose(usual.joints, other.joints)
+    later = [trackers[0].update(points + k, k / 30).path for k in range(1, 6)]
+    assert [one is None for one in later] == [True] * 4 + [False]
+
+
+def test_rows_without_a_person_or_a_confidence_are_of_people_to_be_told_apart() -> None:
+    names = ("nose", "neck")
+    found = posekit.Detections(names=names, points=np.ones((3, 2, 2)), frame=[0, 0, 2])
+    assert found.person.tolist() == [-1] * 3 and np.isnan(found.confidence).all()
+    assert posekit.Detections(
+        names=names, points=np.ones((2, 2, 2)), frame=[0, 1], person=[4, -1]
+    ).people.keys() >= {4}
+    for wrong, field in (
+        ({"frame": [0]}, "frame"),
+        ({"person": [1, 2, 3]}, "person"),
+        ({"confidence": [[1.0]]}, "confidence"),
+    ):
+        with pytest.raises(InputError, match=f"{field}: got shape"):
+            posekit.Detections(**{"names": names, "points": np.ones((2, 2, 2)), "frame": [0, 1], **wrong})
+    with pytest.raises(InputError, match="frame: got unsorted"):
+        posekit.Detections(names=names, points=np.ones((2, 2, 2)), frame=[1, 0])

@@ -87,7 +87,10 @@ def test_an_angle_is_rejected_beyond_the_end_of_its_range(table: str, dof: str, 
         if beyond > 0:
             (row,) = mine.itertuples()
             assert row.value == pytest.approx(angle, abs=1e-6)
-            assert (row.lower, row.upper) == pytest.approx(ends, abs=ROUNDING)
+            if dof.endswith("rotation"):  # the straighter the limb, the less it shows its rotation
+                assert (row.lower, row.upper) == pytest.approx(ends, abs=ROUNDING)
+            else:
+                assert (row.lower, row.upper) == pytest.approx((ends[0] - 1e-3, ends[1] + 1e-3), abs=5e-4)
             assert row.margin == pytest.approx(-1.0, abs=ROUNDING)
 
 
