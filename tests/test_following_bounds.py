@@ -235,11 +235,11 @@ def test_rows_without_a_person_or_a_confidence_are_of_people_to_be_told_apart() 
     names = ("nose", "neck")
     found = posekit.Detections(names=names, points=np.ones((3, 2, 2)), frame=[0, 0, 2])
     assert found.person.tolist() == [-1] * 3 and np.isnan(found.confidence).all()
-    assert posekit.Detections(
-        names=names, points=np.ones((2, 2, 2)), frame=[0, 1], person=[4, -1]
-    ).people.keys() >= {4}
+    rest = posekit.Detections(
+        names=names, points=np.ones((3, 2, 2)), frame=[0, 1, 2], person=[4, -1, -1], film=False
+    )
+    assert rest.people().tolist() == [4, 5, 6]
     for wrong, field in (
-        ({"frame": [0]}, "frame"),
         ({"person": [1, 2, 3]}, "person"),
         ({"confidence": [[1.0]]}, "confidence"),
     ):

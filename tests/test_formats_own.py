@@ -461,6 +461,31 @@ def test_results_of_the_version_before_are_read(tmp_path: Path) -> None:
     assert same.frames.rejected == found.frames.rejected == ({"collision": 2},) * 2
 
 
+def test_paths_roots_and_pictures_of_the_version_before_are_read(tmp_path: Path) -> None:
+    document = earlier()
+    joints = np.array([document["frames"][k]["postures"][-1]["joints"] for k in (0, 1)])
+    smoothed = joints + 1.0
+    smoothed[1] = np.nan
+    path = {
+        "share": 0.7,
+        "survivor": [1, 0],
+        "smoothed": json.loads(json.dumps(np.where(np.isnan(smoothed), None, smoothed).tolist())),
+        "joints": joints.tolist(),
+    }
+    document["paths"] = {"paths": [path, {**path, "share": 0.3, "survivor": [0, -1]}]}
+    document["settings"] |= {"pictures": ["a.png", "b.png"], "lengths": {SEGMENT_NAMES[0]: 0.2}}
+    document["frames"][1]["root"] = {"method": "head", "estimate": 4.0, "deviation": 0.1, "more": 1}
+    (tmp_path / "r.json").write_text(json.dumps(document), encoding="utf-8")
+    found = posekit.open(tmp_path / "r.json")
+    # The likelier posture of the first frame comes first now.
+    assert found.path.survivor.tolist() == [[0, 2], [1, -1]] and found.path.probability.tolist() == [0.7, 0.3]
+    assert found.path.joints[0] == pytest.approx(np.stack([joints[0] + 1.0, joints[1]]) / 100)
+    assert list(found.frames.pictures) == ["a.png", "b.png"]
+    assert found.lengths == pytest.approx({SEGMENT_NAMES[0]: 0.2})  # settings were in metres
+    root = {"method": "head", "estimate": pytest.approx(0.04), "deviation": pytest.approx(1e-3)}
+    assert list(found.frames.root) == [None, {**root, "lower": None, "upper": None}]
+
+
 def padded(document: dict[str, Any]) -> dict[str, Any]:
     """Return the arrays of the NPZ of that version, padded to two postures a frame."""
     frames = document["frames"]
