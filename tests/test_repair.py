@@ -168,6 +168,47 @@ def test_missing_frames_are_inserted_and_counted(clean: posekit.Motion) -> None:
     assert done.report.ok.all()
 
 
+@pytest.mark.parametrize("start", [20, 50])
+@pytest.mark.parametrize("way", [(0.0, 0.3), (-0.25, 0.1)])
+def test_standing_feet_that_slide_are_held(
+    clean: posekit.Motion, start: int, way: tuple[float, float]
+) -> None:
+    """The frames before or after the slide stay, whichever are more."""
+    slid = np.clip((np.arange(FRAMES) - start) / 20, 0, 1)[:, None, None] * [*way, 0.0]
+    joints = np.asarray(clean.joints)
+    broken = replace(clean, joints=joints + slid)
+    assert set(Validator().check(broken).table()["check"]) == {"sliding"}
+    done = repair(broken)
+    assert done.motion is not None and done.report.ok.all()
+    assert done.notes[1] == "standing feet held"
+    stay = joints + (slid[-1] if start < FRAMES // 2 - 10 else 0.0)
+    np.testing.assert_allclose(done.motion.joints, stay, atol=0.03)
+    kept = slice(start + 20, None) if start < FRAMES // 2 - 10 else slice(0, start + 1)
+    np.testing.assert_array_equal(np.asarray(done.motion.joints)[kept], np.asarray(broken.joints)[kept])
+
+
+def test_several_recordings_are_repaired_each_by_itself(clean: posekit.Motion) -> None:
+    joints = np.asarray(clean.joints)
+    broken = {name: FAULTS[name](joints) for name in ("jump", "lengthened")}
+    both = posekit.Motion(
+        joints=np.concatenate(list(broken.values())),
+        joint_names=JOINTS,
+        time=np.tile(np.asarray(clean.time), 2),
+        clip=np.repeat([0, 1], FRAMES),
+        clips=tuple(broken),
+        up="+z",
+    )
+    done = repair(both)
+    assert done.motion is not None and done.report.ok.all()
+    assert done.motion.clips == tuple(broken) and done.motion.clip.tolist() == [0] * FRAMES + [1] * FRAMES
+    for number, one in enumerate(broken.values()):
+        alone = repair(replace(clean, joints=one)).motion
+        assert alone is not None
+        np.testing.assert_array_equal(
+            np.asarray(done.motion.joints)[done.motion.clip == number], alone.joints
+        )
+
+
 def test_single_postures_are_repaired_by_themselves() -> None:
     standing = posekit.load_figure().neutral_points[:14].copy()
     standing[[10, 12]] += [[0.35, 0, 0.1], [0.2, 0, 0.5]]
