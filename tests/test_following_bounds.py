@@ -199,7 +199,11 @@ def test_uncertain_points_outside_the_picture_are_invented(
 def test_a_film_without_a_rate_has_thirty_pictures_a_second(rate: float | None, expected: float) -> None:
     points = np.repeat(PERSON[None], 4, axis=0)
     film = posekit.Detections(points=points, names=POINTS, frame=np.arange(4), rate=rate)
-    np.testing.assert_allclose(film.view().time, np.arange(4) / expected)
+    with warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always")
+        np.testing.assert_allclose(film.view().time, np.arange(4) / expected)
+    said = [str(one.message) for one in raised]
+    assert any("30 pictures a second are assumed" in line for line in said) is (rate is None)
     np.testing.assert_allclose(film.view(rate=25.0).time, np.arange(4) / 25)
 
 
