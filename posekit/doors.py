@@ -32,7 +32,7 @@ def opened(source: Source, layout: str = "", **facts: Any) -> Any:
     if isinstance(source, str | PathLike):
         return open_file(source, layout, **facts)
     if isinstance(source, list | tuple | np.ndarray):
-        read: Any = Judge(None, facts.get("urdf", ""), {}).motion(source, facts_of(layout=layout, **facts))
+        read = Judge(None, facts.get("urdf", ""), {}).motion(source, facts_of(layout=layout, **facts))
         return replace(read, frame=None) if isinstance(read, Motion) else read  # rows are frames in order
     return source
 
@@ -219,13 +219,12 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
         raise refusal(
             path, "", f"a {type(cameras).__name__}", "the calibration of cameras", "give another file"
         )
-    if name and name not in cameras:
-        raise refusal(path, "", f"no camera {name}", f"one of {', '.join(cameras)}", f"write {path}:NAME")
-    if not name and len(cameras) > 1:
-        raise refusal(
-            path, "", f"{len(cameras)} cameras", f"one of {', '.join(cameras)}", f"write {path}:NAME"
-        )
-    return cameras[name or next(iter(cameras))]
+    if len(cameras) == 1 and not name:
+        return next(iter(cameras.values()))
+    if name not in cameras:
+        got = f"no camera {name}" if name else f"{len(cameras)} cameras"
+        raise refusal(path, "", got, f"one of {', '.join(cameras)}", f"write {path}:NAME")
+    return cameras[name]
 
 
 def frame_range(frame: Any) -> int | tuple[int, int] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import gzip
 import os
 import stat
@@ -41,8 +40,7 @@ def read_bytes(path: str | Path) -> bytes:
     except IsADirectoryError:
         raise refusal(path, "", "a folder", "a file", "give one of its files") from None
     except OSError as error:
-        near = difflib.get_close_matches(Path(path).name, _names_beside(Path(path)), n=1)
-        remedy = f"did you mean {near[0]}?" if near else "check the path"
+        remedy = nearest(Path(path).name, _names_beside(Path(path)), "check the path")
         raise refusal(path, "", error.strerror or "an error", "a file that can be read", remedy) from None
     except ValueError:  # a null character in the path
         raise refusal("", "", repr(str(path)), "the path of a file", "check the path") from None

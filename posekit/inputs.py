@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
+from glob import glob
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,14 +33,9 @@ def files_of(given: Any) -> Iterator[Path]:
         if path.is_file():
             yield path
             continue
-        if path.is_dir():
-            found = list(_below(path))
-        else:
-            found = (
-                sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
-                if "*" in str(path)
-                else []
-            )
+        # `Path.glob` refuses patterns with an absolute path.
+        matches = glob(str(path), recursive=True)  # noqa: PTH207
+        found = list(_below(path)) if path.is_dir() else sorted(map(Path, matches))
         if not found:
             what = "a folder without files of motion" if path.is_dir() else "no file"
             remedy = "write them with posekit samples DIR" if str(one) == "samples" else "check the path"

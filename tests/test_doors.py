@@ -470,3 +470,17 @@ def test_an_empty_result_is_not_drawn_or_converted_but_says_why(tmp_path: Path) 
         with pytest.raises(posekit.InputError, match=r"no posture: \w+"):
             door(none, tmp_path / target)
     assert not list(tmp_path.iterdir())
+
+
+def test_findings_in_an_array_are_numbered_by_its_rows() -> None:
+    postures = STANDING.copy()
+    postures[[3, 7], 8] += 1.0  # the right wrist is torn off
+    for report in (posekit.validate(postures), posekit.Validator().check(postures)):
+        assert set(report.table()["frame"]) == {3, 7} == set(np.flatnonzero(~report.ok))
+    with pytest.raises(AssertionError, match="frame 3"):
+        posekit.assert_valid(postures)
+
+
+def test_assert_valid_judges_a_file_by_its_own_robot(folder: Path) -> None:
+    with pytest.raises(AssertionError, match="left_elbow_joint"):
+        posekit.assert_valid(folder / "robot.npz")

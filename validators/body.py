@@ -176,9 +176,8 @@ class Body(Record):
     @cached_property
     def height(self) -> Array:
         """Height of each joint along `up` (T, 14), metres; NaN if `up` is None."""
-        return (
-            np.full(self.joints.shape[:2], np.nan) if self.up is None else np.asarray(self.joints @ self.up)
-        )
+        up = np.full(3, np.nan) if self.up is None else self.up
+        return np.asarray(self.joints @ up)
 
     @cached_property
     def ground(self) -> float:

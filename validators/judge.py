@@ -425,7 +425,8 @@ class Validator:
                 robot = figure
             else:
                 motion = replace(motion, joints=figure.points(motion.q), joint_names=JOINTS)
-        return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
+        report = validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
+        return report if isinstance(given, Motion) else replace(report, frame=np.arange(len(report)))
 
     def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
         """Return an array of postures as a motion whose frames are not successive in time.
@@ -494,7 +495,7 @@ def _loaded(urdf: Any, settings: ValidateSettings) -> Robot:
 @names_checked
 def assert_valid(
     given: Any,
-    urdf: Any = "figure",
+    urdf: Any = "",
     settings: ValidateSettings | None = None,
     *,
     checks: Any = None,
@@ -505,9 +506,8 @@ def assert_valid(
     Parameters
     ----------
     given : array, Motion or path
-        Postures as in `Validator.check`, or the path of a file.
     urdf, settings, checks, ranges
-        As in `Validator`.
+        As in `posekit.validate`.
 
     Raises
     ------
@@ -524,12 +524,9 @@ def assert_valid(
     >>> import posekit
     >>> posekit.assert_valid(posekit.load_figure().neutral_points[:14])
     """
-    if isinstance(given, str | Path):
-        import posekit
+    import posekit
 
-        report = posekit.validate(given, settings, urdf=urdf, checks=checks, ranges=ranges)
-    else:
-        report = Validator(urdf, settings, checks=checks, ranges=ranges).check(given)
+    report = posekit.validate(given, settings, urdf=urdf, checks=checks, ranges=ranges)
     for line in report.warnings:
         warnings.warn(line, UserWarning, stacklevel=3)
     bad = int((~report.ok).sum())

@@ -18,17 +18,7 @@ from posekit.geometry import (
     unit,
     vector_from_rotation,
 )
-from posekit.skeleton import (
-    HEAD,
-    HIPS,
-    JOINT,
-    JOINTS,
-    LIMB_JOINTS,
-    N_TRUNK_JOINTS,
-    NAMES,
-    PARENTS,
-    POINTS,
-)
+from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, LIMB_JOINTS, N_TRUNK_JOINTS, NAMES, PARENTS, POINTS
 
 TORSO_PIECE, HIPS_PIECE, HEAD_PIECE = 0, 1, 2
 N_PIECES: Final = 3 + 2 * len(LIMB_JOINTS)

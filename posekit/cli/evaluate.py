@@ -39,13 +39,12 @@ def evaluate(
     from posekit.recovery import Recovery
 
     settings = settings_from(RecoverSettings, given)
-    layout = given.pop("layout")
-    held = open_file(source, layout, **given)
+    held = open_file(source, **given)
     if isinstance(held, Recovery):
         if truth is None:
             expected = "the true joints of a result: a view with truth, or motion"
             raise refusal(source, "--truth", "none", expected, "give --truth FILE")
-        found = compare(held, open_file(truth, layout, **given))
+        found = compare(held, open_file(truth, **given))
     else:
         found = evaluate_method(held, settings, noise=numbers("--noise", noise), views=views, seed=seed)
     if output is not None:

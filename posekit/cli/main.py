@@ -50,6 +50,8 @@ class Commands(click.Group):
         """Load a command."""
         if name not in COMMANDS:
             remedy = nearest(name, COMMANDS, "see posekit --help")
+            if name == "repair":
+                remedy = "write posekit validate FILE --repair OUTPUT"
             raise refusal("posekit", name, "an unknown command", ", ".join(COMMANDS), remedy)
         module = import_module(f"posekit.cli.{name}")
         found: click.Command = getattr(module, name)

@@ -91,13 +91,8 @@ def random(output: Path, frames: int, noise: float, seed: int, distance: str, un
     from posekit.synthesis import random_views
 
     near, far = numbers("--distance", distance, 2)
-    write(
-        random_views(frames, np.random.default_rng(seed), distance=(near, far)),
-        output,
-        noise,
-        seed,
-        uncalibrated,
-    )
+    views = random_views(frames, np.random.default_rng(seed), distance=(near, far))
+    write(views, output, noise, seed, uncalibrated)
 
 
 @synth.command("mocap", cls=Command, examples=["posekit synth mocap jump.bvh -o jump.json --noise 2"])
@@ -129,7 +124,6 @@ def mocap(
     dt: float | None,
     camera: str,
     uncalibrated: bool,
-    layout: str,
     **facts: Any,
 ) -> None:
     """See motion capture through a virtual camera that stands still."""
@@ -139,7 +133,7 @@ def mocap(
     from posekit.motion import Motion
     from posekit.synthesis import mocap_view
 
-    motion = open_file(source, layout, **facts)
+    motion = open_file(source, **facts)
     if not isinstance(motion, Motion):
         raise refusal(source, "", f"a {type(motion).__name__}", "motion", "give a file of motion")
     place = numbers("--camera", camera, 3) if camera else None

@@ -42,10 +42,7 @@ BAD_INPUT = 2
 )
 @option("--keep-spans", metavar="SECONDS", default=None, hidden=True, help="Minimum duration of a good part.")
 @option(
-    "--repair",
-    metavar="FILE|DIR",
-    type=click.Path(path_type=Path),
-    help="Write a motion nearby that passes.",
+    "--repair", metavar="FILE|DIR", type=click.Path(path_type=Path), help="Write a motion nearby that passes."
 )
 @reading()
 @settings_options(ValidateSettings, SHOWN, panel="Judging")
@@ -96,8 +93,6 @@ def write_page(report: Report, output: Path, facts: dict[str, Any]) -> None:
     from posekit.motion import Motion
     from posekit.viewer import draw
 
-    layout = facts["layout"]
-    rest = {name: value for name, value in facts.items() if name != "layout"}
-    opened = [open_file(name, layout, **rest) for name in dict.fromkeys(report.files) if Path(name).is_file()]
+    opened = [open_file(name, **facts) for name in dict.fromkeys(report.files) if Path(name).is_file()]
     motions = [one for one in opened if isinstance(one, Motion)]
     draw(report, output, view=motions if len(motions) == len(opened) else None, urdf=facts["urdf"])

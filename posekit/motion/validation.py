@@ -93,7 +93,9 @@ def validate(
     judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
     facts = facts_of(layout=layout, unit=unit, up=up, rate=rate, person=person)
     if not are_paths(given):
-        return judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
+        of_rows = not isinstance(given, Motion) and not hasattr(given, "survivors")
+        report = judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
+        return replace(report, frame=np.arange(len(report))) if of_rows else report
     report = _files(list(files_of(given)), judge, facts)
     if keep is not None:
         spans = None if keep_spans is None else number(keep_spans, "keep-spans", "seconds")
@@ -132,16 +134,18 @@ class Judge:
             self._made[str(body)] = Validator(body, self.settings, **self.changes)
         return self._made[str(body)]
 
-    def motion(self, given: Any, facts: Mapping[str, Any]) -> Motion:
-        """Return an array or a motion as a `Motion` with the stated facts: layout, unit, up, rate."""
+    def motion(self, given: Any, facts: Mapping[str, Any]) -> Any:
+        """Return an array or a motion as a `Motion` with the stated facts: layout, unit, up, rate.
+
+        Points of pictures become `Detections`.
+        """
         from posekit.formats.arrays import has_layout
 
         layout, unit, up, rate = (facts.get(name) for name in ("layout", "unit", "up", "rate"))
         if has_layout(given, layout):
             import posekit
 
-            opened: Motion = posekit.open(given, layout or "", unit=unit, up=up, rate=rate, urdf=self.name)
-            return opened
+            return posekit.open(given, layout or "", unit=unit, up=up, rate=rate, urdf=self.name)
         if isinstance(given, Motion):
             motion, frame = given, np.asarray(given.frame)
         else:
@@ -151,9 +155,8 @@ class Judge:
             if rate and motion.q is not None and motion.robot != "figure":
                 up = up or "+z"  # of URDFs (REP-103)
             frame = np.arange(len(motion))
-        changes: dict[str, Any] = {"up": up} if up else {}
-        changes |= {"frame": frame, "time": frame / rate} if rate else {}
-        return replace(motion, **changes) if changes else motion
+        times = {"frame": frame, "time": frame / rate} if rate else {}
+        return replace(motion, up=up or motion.up, **times)
 
     def report(self, given: Any) -> Report:
         """Judge a motion, or the survivors of a result."""

@@ -20,16 +20,7 @@ from posekit.cameras import Camera
 from posekit.geometry import Array, Ints
 from posekit.skeleton import JOINTS, POINT, SEGMENTS
 from posekit.tree import steps
-from posekit.tree.candidates import (
-    DEPTH,
-    FIRST,
-    NO_SOLUTION,
-    UNJUDGED,
-    Candidates,
-    bits,
-    path_of,
-    support_of,
-)
+from posekit.tree.candidates import DEPTH, FIRST, NO_SOLUTION, UNJUDGED, Candidates, bits, path_of, support_of
 from posekit.tree.steps import BRANCH, Step, step
 
 #: Ratio of possible keys to nodes. Above it distinct keys are found by sorting, below it with a table of all keys.
