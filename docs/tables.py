@@ -101,21 +101,14 @@ def files_written() -> Iterator[str]:
 
 
 def layouts() -> Iterator[str]:
-    """List the layouts that come with posekit, and their sources."""
+    """List the built-in layouts and the first clause of their sources."""
     from posekit.formats.layout import layout_names, load_layout
 
     rows = []
     for name in layout_names():
         source = " ".join(str(load_layout(name).fields.get("source", "")).split())
-        rows.append((f"`{name}`", _shortened(source)))
-    return grid(("layout", "source"), rows)
-
-
-def _shortened(text: str, most: int = 110) -> str:
-    """Return the beginning of a text, cut behind a word."""
-    if len(text) <= most:
-        return text
-    return text[:most].rsplit(" ", 1)[0].rstrip(",;:(") + " …"
+        rows.append((f"`{name}`", re.split(r"[:;]| \(", source)[0]))
+    return grid(("layout", "origin"), rows)
 
 
 def checks() -> Iterator[str]:
