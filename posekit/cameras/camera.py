@@ -1,4 +1,4 @@
-"""The base of all cameras: rays of image points, and the two possible ends of a segment on a ray."""
+"""The base class of cameras: rays of image points, and the two possible ends of a segment on a ray."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from posekit.geometry import FARTHEST_COORDINATE, Array, Flags, Record, read_onl
 
 #: Half the distance (m) between the two candidates below which they count as one.
 #:
-#: The candidates are at the foot of the perpendicular on the ray, plus and minus ``sqrt(l^2 - h^2)``. Rounding
-#: leaves about 1e-15 m^2 under the root a few metres away, so closer candidates cannot be distinguished.
+#: The candidates are at distances of ``sqrt(l^2 - h^2)`` from the foot of the perpendicular on the ray. At a few metres
+#: from the camera, ``l^2 - h^2`` has a rounding error of about 1e-15 m^2, so closer candidates cannot be distinguished.
 COINCIDENT_METRES: Final = 1e-7
 
 
@@ -25,8 +25,8 @@ class Lift(NamedTuple):
     points : array (..., 2, 3)
         The nearer and the farther candidate, camera frame, metres. NaN if the ray is unknown.
     valid : bool array (..., 2)
-        Whether each candidate is a solution: both, only the nearer one (the ray is tangent, and both coincide), or
-        none.
+        Whether each candidate is a solution. If the ray is tangent to the sphere, both candidates coincide and only the
+        nearer is valid.
     excess : array (...)
         Distance from the segment's start to the ray minus the segment's length, metres: positive if the
         segment is too short for its image.
@@ -38,11 +38,11 @@ class Lift(NamedTuple):
 
 
 class Camera(Record):
-    """Base of the three cameras.
+    """Base class of the three camera models.
 
-    Camera frame as OpenCV's: x right, y down, z forward. Normalised image points are free of intrinsics and lens:
-    (x/z, y/z) of a perspective camera, (x, y) in metres of the scaled orthographic one. The first axis of every
-    array counts frames, for cameras whose focal length or scale differs between frames.
+    The camera frame is OpenCV's: x right, y down, z forward. Normalised image points do not depend on intrinsics and
+    lens: they are (x/z, y/z) of a perspective camera, and (x, y) in metres of the scaled orthographic camera. The first
+    axis of every array is the frame, since focal length or scale may differ between frames.
     """
 
     #: Whether rays meet in the optical centre; otherwise they are parallel.
@@ -54,11 +54,11 @@ class Camera(Record):
 
     @abstractmethod
     def normalize(self, image: Array) -> Array:
-        """Turn image points (F, ..., 2) into normalised ones; NaN if no ray reaches the point."""
+        """Convert image points (F, ..., 2) to normalised image points; NaN if no ray projects to the point."""
 
     @abstractmethod
     def jacobian(self, normalized: Array) -> Array:
-        """Return the derivatives (F, ..., 2, 2) of image points by their normalised ones (F, ..., 2)."""
+        """Return the derivatives (F, ..., 2, 2) of image points by normalised image points (F, ..., 2)."""
 
     def rays(self, image: Array) -> tuple[Array, Array]:
         """Return origins and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
@@ -67,39 +67,39 @@ class Camera(Record):
         return np.zeros_like(direction), direction
 
     def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
-        """Find the ends of segments: see `meet_sphere`.
+        """Compute the candidates for the far ends of segments; see `meet_sphere`.
 
         Parameters
         ----------
         start : array (F, ..., 3)
-            Known ends, camera frame, metres.
+            Known ends of the segments, camera frame, metres.
         rays : pair of arrays broadcastable to (F, ..., 3)
             `rays` of the image points of the other ends.
         length : array broadcastable to (F, ...)
             Lengths, metres.
         tolerance : float
-            Metres by which a segment may be too short for its image.
+            Distance by which a segment may be too short for its image, metres.
         """
         return meet_sphere(*rays, start, length, tolerance=tolerance)
 
 
 def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float) -> Lift:
-    r"""Intersect the ray of an image point with the sphere of a segment's ends.
+    r"""Intersect the ray of an image point with the sphere around a segment's start.
 
-    With the foot of the perpendicular from the start :math:`s` on the ray at parameter :math:`t_0`, and
-    :math:`h` the distance between the two, the ends are at :math:`t_0 \pm \sqrt{l^2 - h^2}` (Lee & Chen 1985,
-    eqs. 6-7, solved for the ray's parameter instead of k).
+    The sphere's radius is the segment's length :math:`l`. The perpendicular from the start to the ray has length
+    :math:`h` and its foot at the ray's parameter :math:`t_0`. The possible ends are at :math:`t_0 \pm \sqrt{l^2 - h^2}`
+    (Lee & Chen 1985, eqs. 6-7, solved for the ray's parameter instead of k).
 
     Parameters
     ----------
     origin, direction : array (..., 3)
-        The ray, its direction of unit length; points with negative parameters are behind the camera.
+        The ray, with a direction of unit length; points with negative parameters are behind the camera.
     start : array (..., 3)
         The segment's known end, metres.
     length : array (...)
         The segment's length, metres.
     tolerance : float
-        Metres by which the ray may miss the sphere and still count as tangent.
+        Distance by which the ray may miss the sphere and still count as tangent, metres.
     """
     offset = start - origin
     along = np.einsum("...i,...i->...", offset, direction)
@@ -116,12 +116,12 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
 
 
 def positive(name: str, value: float | Array | None) -> float | Array | None:
-    """Return a focal length or a scale, one number or one per frame, as a float or a read-only array; None if unknown.
+    """Check a focal length or scale, one or one per frame; return a float or a read-only array, None if unknown.
 
     Raises
     ------
     CameraError
-        If it is not positive and finite.
+        If a value is not positive and finite.
     """
     if value is None:
         return None
@@ -139,7 +139,7 @@ def per_frame(name: str, value: float | Array | None, ndim: int) -> Array:
     Raises
     ------
     CameraError
-        If it is unknown.
+        If the value is unknown.
     """
     if value is None:
         raise refusal("camera", name, "null", "a positive number", "give it", error=CameraError)

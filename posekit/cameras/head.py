@@ -1,15 +1,15 @@
-r"""The pose of the camera, and if unknown its focal length, from six or more points of a head (Lee & Chen 1985, §2.1).
+r"""The camera's pose, and its focal length if unknown, from six or more head points (Lee & Chen 1985, §2.1).
 
-The squared reprojection error is minimised over the head's pose. With the points centred and of size 1,
-:math:`q = R\,(p - c) / \sigma`, and the head's centre at depth :math:`z`, their perspective image is
+The squared reprojection error is minimised over the head's pose. With points that are centred and scaled to size 1,
+:math:`q = R\,(p - c) / \sigma`, and the head's centre at depth :math:`z`, the perspective image is
 
 .. math:: u = \frac{a + s\,q_{xy}}{1 + d\,q_z}, \qquad s = f \sigma / z, \quad d = \sigma / z,
 
-where :math:`a` is the image of the centre. Each of the unknowns :math:`R, a, s, d` has an effect in the image, and a
-camera at infinity is the regular point :math:`d = 0`, the scaled orthographic projection. With depth and f as unknowns,
-both would diverge together. With f free there are seven unknowns. With a known camera :math:`u` is the normalised image
-(f = 1), :math:`d = s`, and there are six; residuals are then multiplied by the camera's derivatives at the image
-points, which makes them pixels.
+where :math:`a` is the image of the centre. The image depends on each of the unknowns :math:`R, a, s, d`, and a camera
+at infinity is the regular point :math:`d = 0`, the scaled orthographic projection. If z and f were the unknowns, both
+would diverge for a distant camera. If f is unknown, there are seven unknowns. If the camera is known, :math:`u` is the
+normalised image (f = 1) and :math:`d = s`, so there are six unknowns. Residuals are then multiplied by the camera's
+Jacobian, which converts them to pixels.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from posekit.geometry import Array, Flags, Ints, Record, cross, rotation_from_ve
 __all__ = ["TABLE_A2", "HeadPoints", "HeadPose", "HeadWarning", "solve_pose"]
 
 MAX_STEPS: Final = 60
-#: Decrease of the squared error, as a fraction of it, that ends a fit: unknowns are then within about 1e-5 of
-#: their standard deviation.
+#: Relative decrease of the squared error that ends a fit. The error of the unknowns is then about 1e-5 of their
+#: standard deviation.
 FIT_PRECISION: Final = 1e-10
 
-#: The same for a fit without one point: enough to judge it.
+#: The same for a fit that leaves out one point: this precision is sufficient to compare errors.
 MISFIT_PRECISION: Final = 1e-3
 
-#: Slope d of a head seen from half a metre, too near for a start from the scaled orthographic view.
+#: Slope d of a head at half a metre from the camera, where a start from the scaled orthographic pose can fail.
 NEAR_SLOPE: Final = 0.15
 
-#: First, smallest and largest damping, as a fraction of the normal equations' diagonal; beyond the largest no step
-#: decreases the error any more.
+#: Initial, smallest and largest damping, as a fraction of the normal equations' diagonal. Above the largest damping no
+#: step decreases the error.
 DAMPING: Final = (1e-4, 1e-13, 1e8)
 
-#: Error of an image point, as a fraction of the head's size in the image, that is rounding.
+#: Rounding error of an image point, as a fraction of the head's size in the image.
 ROUNDING_ERROR: Final = 1e-10
 
-#: p-value below which the better fit of a head behind the camera is not due to chance.
+#: p-value below which a better fit of a head behind the camera is significant.
 BETTER_BEHIND: Final = 1e-4
 
 #: Probability that a point of a correct head with normal errors is reported as a misfit.
@@ -74,22 +74,22 @@ class HeadPose(Record):
     head : HeadPoints
         The head points, in the camera frame.
     reasons : tuple of str
-        Why a frame gives no pose; empty if it does. Its R, t, f and points are then NaN.
+        Reason why each frame has no pose; empty if it has one. R, t, f and points of a frame without a pose are NaN.
     R_cam_head : array (F, 3, 3)
         Rotation from the head's frame to the camera's (OpenCV: x right, y down, z forward).
     t_cam_head : array (F, 3)
         The head frame's origin in the camera frame, metres.
     f : array (F,)
-        The focal length, in the image's unit; a known camera's own. A distant head hardly determines f.
+        The focal length, in the image's unit: estimated, or the known camera's. A distant head hardly determines f.
     points_cam : array (F, P, 3)
-        All points of the head, seen or not, in the camera frame, metres.
+        All head points, seen or unseen, in the camera frame, metres.
     residuals : array (F, P)
         Distance between a point's projection and its image point, in the image's unit; NaN if not seen.
     rms : array (F,)
         Root of the mean squared residual of the seen points.
     misfit : tuple of str or None
-        The point that does not fit the others, None if all do. With normal errors, one correct head in two hundred has
-        a misfit by chance; only a higher share causes a warning.
+        For each frame, the point that does not fit the other points; None if all points fit. With normal errors, one
+        correct head in two hundred has a misfit by chance. There is a warning only if more heads have one.
     """
 
     head: HeadPoints
@@ -104,7 +104,7 @@ class HeadPose(Record):
 
     @property
     def found(self) -> Flags:
-        """Whether a frame gives a pose (F,)."""
+        """Whether each frame has a pose (F,)."""
         return np.array([not reason for reason in self.reasons], dtype=np.bool_)
 
     def point(self, name: str) -> Array:
@@ -113,30 +113,30 @@ class HeadPose(Record):
 
 
 def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeChenCamera) -> HeadPose:
-    r"""Find the head's pose in the image of a camera (perspective-n-point), and f if it is not known.
+    r"""Estimate the head's pose from its image (perspective-n-point), and f if it is unknown.
 
-    The reprojection error is measured in the image's unit, to first order of the lens at the image points. A point
-    that does not fit the rest is named in a `HeadWarning`.
+    The reprojection error has the image's unit; the lens is linearised at the image points. A `HeadWarning` names a
+    point that does not fit the other points.
 
     Parameters
     ----------
     head : HeadPoints
         P points, metres.
     image : array (P, 2) or (F, P, 2)
-        Image points; NaN if not seen. A pixel that no ray reaches counts as not seen.
+        Image points; unseen points are NaN. A pixel to which no ray projects counts as unseen.
     camera : PinholeCamera or LeeChenCamera
-        With an f of None it is found: image points are then relative to the principal point, y down.
+        If its f is None, f is estimated; image points are then relative to the principal point, y down.
 
     Returns
     -------
     HeadPose
-        It has no axis of frames if the image is (P, 2).
+        The pose of each frame; an image (P, 2) is one frame.
 
     Raises
     ------
     HeadError
-        If the image does not fit the head, or the only frame of an image (P, 2) gives no pose: too few
-        points, points that are degenerate, a head behind the camera, or f left undetermined.
+        If the image's shape does not fit the head, or an image (P, 2) has no pose: its points are too few or
+        degenerate, the head is behind the camera, or f is undetermined.
 
     Examples
     --------
@@ -179,7 +179,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
                 reasons[row] += f"; check head point {misfit[row]} first, which does not fit the others"
 
     def whole(values: Array, kept: Flags) -> Array:
-        """Return values for all frames: those of the fitted frames, and NaN for the others."""
+        """Return the values of the kept frames in an array of all frames; other frames are NaN."""
         full = np.full((len(points), *values.shape[1:]), np.nan)
         full[rows[kept]] = values[kept]
         return full
@@ -235,10 +235,10 @@ def _pose(R: Array, shift: Array, scale: Array, slope: Array) -> Array:
 
 
 class _Problem(NamedTuple):
-    """F heads to fit.
+    """Least-squares problem of F heads.
 
-    Centred points (F, P, 3) of size 1, normalised image points (F, P, 2), the derivatives (F, P, 2, 2) of the image by
-    them (0 for unseen points), and whether f is free.
+    The fields are centred points (F, P, 3) of size 1, normalised image points (F, P, 2), the derivatives (F, P, 2, 2)
+    of image points by normalised image points (0 for unseen points), and whether f is unknown.
     """
 
     points: Array
@@ -252,12 +252,12 @@ class _Problem(NamedTuple):
 
     @property
     def freedom(self) -> Array:
-        """Number of residuals less the number of unknowns (F,)."""
+        """Number of residuals minus number of unknowns (F,)."""
         return np.asarray(2 * self.seen.sum(axis=-1) - (7 if self.free else 6))
 
     @property
     def rounding(self) -> Array:
-        """Squared error (F,) below which the error is rounding."""
+        """Squared error (F,) that rounding causes."""
         _, size, offset = _centred(self.plane, self.seen)
         spread = np.einsum("fpij,fpj->fpi", self.to_image, size[:, None, None] * offset)
         return np.asarray(ROUNDING_ERROR**2 * (spread**2).sum(axis=(1, 2)))
@@ -267,10 +267,10 @@ class _Problem(NamedTuple):
         return _Problem(self.points[rows], self.plane[rows], self.to_image[rows], self.free)
 
     def look(self, x: Array) -> tuple[Array, Array, Array]:
-        """Return squared errors (F,), infinite if points are behind the camera, residuals (F, P, 2), and derivatives.
+        """Return squared errors (F,) (infinite if a point is behind the camera), residuals (F, P, 2), and derivatives.
 
-        The derivatives (F, P, 2, 6 or 7) are by a rotation vector in the camera's frame, shift, scale, and slope if f
-        is free.
+        The derivatives (F, P, 2, 6 or 7) are by a rotation vector in the camera frame, by shift, by scale, and by slope
+        if f is unknown.
         """
         R, shift, scale, slope = _parts(x)
         q = self.points @ np.swapaxes(R, -1, -2)
@@ -319,11 +319,11 @@ class _Problem(NamedTuple):
         return x, cost, residual
 
     def best(self) -> tuple[Array, Array, Array]:
-        """Fit from the scaled orthographic view, and from the same with depths reversed (Necker 1832).
+        """Return the best fit from the scaled orthographic pose and from this pose with reversed depths (Necker 1832).
 
-        Coarse image points have a second minimum there. Its start is the head mirrored across its thinnest direction
-        and then along the optical axis; both reflections together are a rotation. With f free, a third start is near
-        the camera.
+        For coarse image points there is a second minimum near the reversed pose. That pose mirrors the head along its
+        thinnest direction and then along the optical axis; the two reflections together are a rotation. If f is
+        unknown, a third fit starts near the camera.
         """
         fits = [self.fit(self.start())]
         thinnest = np.linalg.svd(self.points, full_matrices=False)[2][:, 2]
@@ -339,7 +339,7 @@ class _Problem(NamedTuple):
         return x, cost, residual
 
     def start(self) -> Array:
-        """Fit a scaled orthographic view: the limit of a distant camera (DeMenthon & Davis 1995)."""
+        """Return the scaled orthographic pose, the limit for a distant camera (DeMenthon & Davis 1995)."""
         middle, size, offset = _centred(self.plane, self.seen)
         centre, extent, space = _centred(self.points, self.seen)
         affine = np.swapaxes(np.linalg.pinv(space) @ offset, -1, -2)
@@ -351,7 +351,7 @@ class _Problem(NamedTuple):
         return _pose(R, shift, scale, np.zeros(len(R)) if self.free else scale)
 
     def behind(self, cost: Array) -> Flags:
-        """Return the frames (F,) that a head behind the camera fits better; it looks like its mirror image in front."""
+        """Return whether a head behind the camera fits each frame (F,) better: its image is that of a mirrored head."""
         mirrored = self._replace(points=self.points * [1.0, 1.0, -1.0])
         other = mirrored.fit(mirrored.start())[1]
         ratio = np.maximum(other, self.rounding) / np.maximum(cost, self.rounding)
@@ -369,7 +369,7 @@ class _Problem(NamedTuple):
         without = self.take(frames)
         without.to_image[np.arange(len(points)), points] = 0.0
         left = np.full(self.seen.shape, np.inf)
-        # A misfit can lead the fit of all points far astray, hence the start from the orthographic view.
+        # A misfit can make the fit of all points useless, so each fit starts from the scaled orthographic pose.
         left[frames, points] = without.fit(without.start(), MISFIT_PRECISION)[1]
         least = np.maximum(left.min(axis=1), self.rounding)
         ratio = np.divide(least, cost, out=np.ones(len(cost)), where=np.isfinite(least) & np.isfinite(cost))
@@ -378,7 +378,7 @@ class _Problem(NamedTuple):
 
 
 def _warn(pose: HeadPose, chance: Array, rows: Ints) -> None:
-    """Warn once for each point that misfits in more frames than chance explains; name its worst frame.
+    """Warn once for each point that does not fit in more frames than chance explains; name its worst frame.
 
     The k smallest p-values are reported, for the largest k whose k-th p-value is at most k / F of `FALSE_ALARMS`
     (Benjamini & Hochberg 1995).

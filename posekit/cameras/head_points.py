@@ -16,10 +16,10 @@ from posekit.errors import HeadError, refusal
 from posekit.geometry import Array, Flags, Record
 from posekit.skeleton import HEAD_POINTS
 
-#: Points that a camera's eleven unknowns need (Lee & Chen 1985, §2.1).
+#: Minimum number of points that determine a camera's eleven unknowns (Lee & Chen 1985, §2.1).
 MIN_POINTS: Final = 6
 
-#: Fraction of a set's size below which it is a plane, or a line in the image.
+#: Ratio of a point set's thickness to its size; below it the points lie in one plane, or on one line of the image.
 DEGENERATE_EXTENT: Final = 1e-3
 
 
@@ -30,14 +30,14 @@ class HeadPoints(Record):
     Parameters
     ----------
     names : tuple of str
-        One a point, each once.
+        Unique name of each point.
     points : array (P, 3)
         Metres. The origin of the frame is arbitrary: in Table A.2 the neck is at (-0.34, 0.52, 0).
 
     Raises
     ------
     HeadError
-        If there are fewer than six, a coordinate is not finite, or all lie in one plane.
+        If there are fewer than six points, a coordinate is not finite, or all points lie in one plane.
 
     Examples
     --------
@@ -89,8 +89,8 @@ def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
 
 #: The head of Lee & Chen 1985, Table A.2(a), in metres.
 #:
-#: The right eye's x is printed as -32.168 cm. Only -31.168, the left eye's, gives the projection of Table A.2(b)
-#: and the depth of Table 2(d), so it stands here.
+#: The right eye's x is printed as -32.168 cm. Only -31.168, the value of the left eye, reproduces the projection of
+#: Table A.2(b) and the depth of Table 2(d), so it is used here.
 TABLE_A2: Final = HeadPoints(
     names=("neck", *HEAD_POINTS),
     points=np.array(

@@ -1,9 +1,9 @@
-r"""The camera of Lee & Chen 1985; this module alone converts the paper's conventions to posekit's.
+r"""The camera of Lee & Chen 1985. Only this module converts between the paper's conventions and posekit's.
 
 The paper's frame is left-handed: x right, y up, z away from the camera, with the origin *on the image plane*, f in
-front of the centre of projection, so that :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6).
-Inside posekit the camera is a pinhole with intrinsics ``diag(f, f, 1)``, y down and the origin in the centre of
-projection: y changes sign, z gains f. Both directions are exact.
+front of the centre of projection, so that :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6). Inside posekit the
+camera is a pinhole with intrinsics ``diag(f, f, 1)``, y down and the origin in the centre of projection. The conversion
+changes the sign of y and adds f to z; it is exact in both directions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class LeeChenCamera(Camera):
     Parameters
     ----------
     f : float or array (F,), optional
-        Distance from the centre of projection to the image plane, metres, one or one a frame; None if unknown.
+        Distance from the centre of projection to the image plane, metres, one number or one per frame; None if unknown.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class LeeChenCamera(Camera):
         )
 
     def normalize(self, image: Array) -> Array:
-        """Turn image points (F, ..., 2), metres, into (x/z, y/z)."""
+        """Convert image points (F, ..., 2), metres, to (x/z, y/z)."""
         return np.asarray(image / per_frame("f", self.f, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
@@ -65,17 +65,17 @@ class LeeChenCamera(Camera):
 
 
 def image_from_paper(image: Array) -> Array:
-    """Turn the paper's image points (y up) into posekit's (y down), or back: the map is its own inverse."""
+    """Convert the paper's image points (y up) to posekit's (y down), or back: the map is its own inverse."""
     return image * UP_FLIP[:2]
 
 
 def points_to_paper(points: Array, f: float | Array) -> Array:
-    """Turn points (F, ..., 3) of OpenCV's camera frame into the paper's; f one, or one a frame (F,)."""
+    """Convert points (F, ..., 3) from OpenCV's camera frame to the paper's; f is one number, or one per frame (F,)."""
     return (points - _forward(f, points.ndim)) * UP_FLIP
 
 
 def rotation_to_paper(R: Array) -> Array:
-    """Turn R_cam_head (..., 3, 3) of OpenCV's frame into the matrix [R] that the paper prints (Table 2b).
+    """Convert R_cam_head (..., 3, 3) in OpenCV's convention to the matrix [R] that the paper prints (Table 2b).
 
     Its columns are the right-handed camera's axes, right, up and backward, in the head's coordinates.
     """
@@ -85,7 +85,7 @@ def rotation_to_paper(R: Array) -> Array:
 def camera_position(R: Array, t: Array, f: float | Array) -> Array:
     """Return the paper's camera position (Table 2c): the image plane's origin in the head's coordinates.
 
-    R (..., 3, 3) and t (..., 3) map the head's frame to OpenCV's camera frame; f one, or one a frame.
+    R (..., 3, 3) and t (..., 3) map the head's frame to OpenCV's camera frame; f is one number, or one per frame.
     """
     return np.asarray(np.einsum("...ji,...j->...i", R, _forward(f, t.ndim) - t))
 

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 
-#: Real or complex numbers: derivatives are complex steps.
+#: Real numbers, or complex numbers for complex-step derivatives.
 Numbers = NDArray[Any]
 
 #: Numbers of coefficients of OpenCV's models: Brown's four or five, the rational model's eight, twelve with thin
 #: prism, fourteen with a tilted sensor. The fisheye model has none or four.
 COEFFICIENT_COUNTS: Final = (0, 4, 5, 8, 12, 14)
 
-#: Largest accepted coefficient: no lens is near it, and products of five remain finite.
+#: Largest accepted coefficient: far above any lens, and products of five coefficients remain finite.
 MAX_COEFFICIENT: Final = 1e9
 
 NEWTON_STEPS: Final = 30
@@ -29,7 +29,7 @@ def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> A
     r"""Apply a lens to ideal image points.
 
     With :math:`r^2 = x^2 + y^2`, the radial factor is
-    :math:`(1 + k_1 r^2 + k_2 r^4 + k_3 r^6) / (1 + k_4 r^2 + k_5 r^4 + k_6 r^6)`; tangential, thin prism and tilt
+    :math:`(1 + k_1 r^2 + k_2 r^4 + k_3 r^6) / (1 + k_4 r^2 + k_5 r^4 + k_6 r^6)`; tangential, thin prism and tilt terms
     follow (OpenCV's documentation of `calib3d`, "Detailed Description"). The fisheye model replaces r by
     :math:`\theta_d = \theta (1 + k_1 \theta^2 + k_2 \theta^4 + k_3 \theta^6 + k_4 \theta^8)`,
     :math:`\theta = \arctan r` (Kannala & Brandt 2006, as in OpenCV's `fisheye`).
@@ -46,14 +46,14 @@ def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> A
     Returns
     -------
     array (..., 2)
-        Distorted points, before K.
+        Distorted normalised points, before K is applied.
     """
     x, y = _bent(normalized[..., 0], normalized[..., 1], distortion, fisheye)
     return np.stack([x, y], axis=-1)
 
 
 def undistort(distorted: Array, distortion: Array, *, fisheye: bool = False) -> Array:
-    """Invert `distort`; NaN if no ray inside `fold_radius` reaches the point.
+    """Invert `distort`; NaN if no ray inside `fold_radius` projects to the point.
 
     Newton's method converges from different starts for different lenses: the result of a fixed-point iteration (as
     OpenCV's `undistortPoints`), the point itself, and a point near the optical axis are tried in turn.
@@ -108,7 +108,7 @@ def _first_root(ascending: list[Array]) -> float:
     """Return the square root of the smallest positive zero of polynomials in r^2 that are 1 at zero."""
     smallest = 0.0
     for coefficients in ascending:
-        # In 1 / r^2 the leading coefficient is one, however small the lens's own are.
+        # The roots are found in 1 / r^2, where the leading coefficient is one even if the lens's coefficients are tiny.
         roots = np.roots(coefficients)
         real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
         smallest = max(smallest, float(real.max(initial=0.0)))

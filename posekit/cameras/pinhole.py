@@ -19,9 +19,9 @@ MAX_PICTURE_SIDE: Final = 10**6
 #: Largest error of an entry of R R^T: rounding R to four digits causes up to this.
 ROTATION_ROUNDING: Final = 1e-3
 
-#: Relative standard deviation of f. Angles and equivalents are rounded, measured along one axis or another, and quoted
-#: for a lens without distortion. Rounding 26 mm to a millimetre costs 2 %; an equivalent by width instead of by
-#: diagonal 4 % at 4:3.
+#: Relative standard deviation of an f that is computed from an angle of view or a 35 mm equivalent. Such numbers are
+#: rounded, refer to different axes, and ignore distortion. Rounding 26 mm to a millimetre changes f by 2 %. An
+#: equivalent by width instead of diagonal changes f by 4 % for a 4:3 picture.
 FOCAL_DEVIATION: Final = 0.05
 
 
@@ -41,13 +41,13 @@ class PinholeCamera(Camera):
     R : array (3, 3), optional
         Rotation from the world to the camera: ``p_cam = R p_world + t``. A rounded R is made orthonormal.
     t : array (3,), optional
-        Translation of the same, metres.
+        Translation from the world to the camera, metres.
     size : (int, int), optional
         Width and height of the pictures, pixels.
     up : str
         The world's axis that points up, ``+x`` … ``-z``; empty if unknown.
     name : str
-        Name in its file.
+        Name of the camera in its file.
     how : str
         ``calibrated``, or a description of the guess.
     deviation : float
@@ -154,7 +154,7 @@ class PinholeCamera(Camera):
         return np.asarray(normalized @ self.K[:2, :2].T + self.K[:2, 2])
 
     def normalize(self, image: Array) -> Array:
-        """Turn pixels (..., 2) into ideal image points (x/z, y/z); NaN if no ray reaches the pixel."""
+        """Convert pixels (..., 2) to ideal image points (x/z, y/z); NaN if no ray projects to the pixel."""
         y = (image[..., 1] - self.K[1, 2]) / self.K[1, 1]
         x = (image[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
         normalized = np.stack([x, y], axis=-1)
@@ -208,9 +208,9 @@ def camera_from_fov(
     size : (int, int)
         Width and height of the whole picture, pixels.
     fov_degrees : float
-        The angle, between 0 and 180 degrees.
+        The angle of view, between 0 and 180 degrees.
     axis : str
-        ``diagonal``, ``horizontal`` or ``vertical``: direction of the angle.
+        Direction of the angle: ``diagonal``, ``horizontal`` or ``vertical``.
     deviation : float
         Standard deviation of f as a fraction of it.
 

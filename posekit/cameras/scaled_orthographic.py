@@ -10,22 +10,24 @@ import numpy as np
 from posekit.cameras.camera import COINCIDENT_METRES, Camera, Lift, per_frame, positive
 from posekit.geometry import PER_METRE, Array
 
-#: Relative rounding of coordinates: at the lower bound of s the segment that sets it must neither fail nor split.
+#: Relative rounding error of coordinates. At the smallest possible s one segment is parallel to the image; despite
+#: rounding it must have one end, neither none nor two.
 BOUND_ROUNDING: Final = 1e-15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ScaledOrthographicCamera(Camera):
-    r"""A distant camera, which sees all of the body at one scale: :math:`(u, v) = s\,(x, y)` (Taylor 2000, eq. 1).
+    r"""A distant camera with one scale for the whole body: :math:`(u, v) = s\,(x, y)` (Taylor 2000, eq. 1).
 
-    The frame is OpenCV's: x right, y down, z forward; its origin is the image's, and its depth is arbitrary.
+    The frame is OpenCV's: x right, y down, z forward. x and y are zero at the image's origin; depth has an arbitrary
+    origin.
 
     Parameters
     ----------
     scale : float or array (F,), optional
-        s, pixels a metre, one or one a frame; None if unknown.
+        s, pixels per metre, one number or one per frame; None if unknown.
     aspect : float
-        Width of a pixel over its height, if pixels are not square: u is rescaled by it, and s counts in v.
+        Ratio of a pixel's width to its height. u is multiplied by it, and s is the scale of v.
 
     Raises
     ------
@@ -48,7 +50,7 @@ class ScaledOrthographicCamera(Camera):
         return np.asarray(points[..., :2] * scale)
 
     def normalize(self, image: Array) -> Array:
-        """Turn pixels (F, ..., 2) into x, y (F, ..., 2), metres: only the depth remains unknown."""
+        """Convert pixels (F, ..., 2) to x, y (F, ..., 2), metres; the depth remains unknown."""
         return np.asarray(image * np.array([self.aspect, 1.0]) / per_frame("scale", self.scale, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
@@ -63,16 +65,16 @@ class ScaledOrthographicCamera(Camera):
         return origin, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
 
     def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
-        r"""Find the ends of segments: the start's depth plus or minus :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}`.
+        r"""Compute the candidates for the far ends of segments, at the start's depth plus or minus dZ.
 
-        (Taylor 2000, eq. 2.) Nothing is behind this camera.
+        :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}` (Taylor 2000, eq. 2). No point is behind this camera.
         """
         place = rays[0][..., :2]
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
         sizes = np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1)
         rounding = BOUND_ROUNDING * (length + sizes)
         squared = np.maximum((length - apart) * (length + apart), 0.0)
-        # Lengths may be relative, hence large: the coincidence threshold grows with them.
+        # Lengths may be relative and thus large, so the threshold of coincident candidates is proportional to them.
         tangent = squared <= (COINCIDENT_METRES * np.maximum(length, 1.0)) ** 2 + 2 * length * rounding
         half = np.where(tangent, 0.0, np.sqrt(squared))
         depth = start[..., 2, None] + np.stack([-half, half], axis=-1)

@@ -18,13 +18,13 @@ from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 CameraModel = LeeChenCamera | PinholeCamera | ScaledOrthographicCamera
 
-#: The usual points of the rigid head; a view may have others, with names of their own.
+#: The standard points of the rigid head; a view may have other head points with other names.
 HEAD_NAMES: Final = ("neck", *HEAD_POINTS)
 
-#: Characters of the name of a head point of the user's own.
+#: Largest number of characters in the name of a user's own head point.
 MAX_NAME_CHARACTERS: Final = 60
 
-#: Fields with one row a frame.
+#: Fields with one row per frame.
 FRAME_ARRAYS: Final = ("time", "image", "head_image", "own_head_image", "confidence", "root", "truth")
 
 
@@ -34,7 +34,7 @@ def _no_frames() -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class View(Record):
-    """A view of one person, a frame or a sequence. NaN marks an unknown value.
+    """A view of one person in one or more frames. NaN marks an unknown value.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ class View(Record):
     time : array (F,)
         Seconds.
     image : array (F, 14, 2)
-        Image points of the joints, in tree order. OpenCV's convention, y down, always: pixels, or metres on the image
-        plane of Lee & Chen's camera. A joint is seen in at least one frame.
+        Image points of the joints, in tree order, y down: pixels, or metres on the image plane of Lee & Chen's camera.
+        At least one joint is known in at least one frame.
     head_image : array (F, 5, 2), optional
         Image points of the head, in the order of `posekit.skeleton.HEAD_POINTS`.
     own_head_image : array (F, K, 2), optional
         Image points of the user's own head points, in the order of `own_head_names`.
     confidence : array (F, 19), optional
-        Confidence of the image points of joints and head points, as the detector gives it: mostly 0 to 1.
+        Confidence of the image points of joints and head points, as reported by the detector, usually 0 to 1.
     root : array (F, 3), optional
         The neck, OpenCV camera frame, metres.
     truth : array (F, 14, 3), optional
@@ -66,24 +66,24 @@ class View(Record):
     length_deviation : float, optional
         Relative standard deviation of the person's lengths, 0 to 0.3; 0 if they are exact.
     derived : tuple of str
-        Joints of `image` that the detector does not report: they were placed between joints that it reports.
+        Joints of `image` that the detector does not report; they were computed from joints that it reports.
     head_points : mapping of str to array (3,), optional
         Points of the rigid head in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them,
         and any number of others under names of their own (Lee & Chen 1985, §2.1, recommend more than six).
     unit : {"m", "cm", "mm"}
-        The unit of its file; in memory all lengths are in metres.
+        Unit of lengths in the view's file; in memory all lengths are in metres.
     source : str
         File that the view came from; empty if there is none.
     pictures : tuple of str
-        Names of the pictures, one a frame; empty if they have none.
+        Names of the pictures, one per frame; empty if there are none.
     layout : str
         Name of the key-point layout that the image points came from.
 
     Raises
     ------
     InputError
-        If a shape is wrong, a number is infinite, a point is known in part, a name is unknown, a length is
-        not positive, or no frame shows a joint.
+        If a shape is wrong, a number is infinite, only some coordinates of a point are NaN, a name is unknown, a length
+        is not positive, or no frame has a known joint.
 
     Notes
     -----
@@ -136,7 +136,7 @@ class View(Record):
             raise refusal("view", "time", "no frame", "at least one", "give every frame its time")
         for name, shape in shapes.items():
             given = np.array(getattr(self, name), dtype=np.float64)
-            # `replace` hands over the array without own head points of the original view.
+            # `replace` passes on the empty array of a view without own head points.
             absent = given.shape == (0,) or (name == "own_head_image" and not given.size)
             values = np.full(shape, np.nan) if absent else given
             if values.shape != shape:
@@ -217,7 +217,7 @@ def is_head_name(name: str) -> bool:
 
 
 def _check_points(name: str, values: Array) -> None:
-    """Raise if a number is infinite or too far, or if a point is known in part."""
+    """Raise if a number is infinite or too large, or if only some coordinates of a point are NaN."""
     unknown, bad = np.isnan(values), np.isinf(values)
     if name in ("root", "truth"):  # metres; image points may have any unit
         bad |= np.abs(values) > FARTHEST_COORDINATE

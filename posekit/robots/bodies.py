@@ -19,18 +19,19 @@ from posekit.robots.urdf import MAX_NUMBER, Element, need, parse_xml, text_with
 
 Kind = Literal["collision", "visual"]
 
-#: Bytes of all meshes of a robot: about two million triangles of STL.
+#: Largest total size of a robot's mesh files, bytes: about two million triangles of STL.
 MAX_MESHES_BYTES: Final = 100_000_000
-#: Largest length of a line of an OBJ file, bytes. The time to triangulate a face grows with the square of its corners.
+#: Largest length of a line of an OBJ file, bytes. The time to triangulate a polygon grows with the square of its
+#: corners.
 MAX_LINE: Final = 65_536
-#: Bytes of the header of a binary STL file, which ends with the number of triangles, and of one triangle.
+#: Size of the header of a binary STL file, which ends with the number of triangles, and size of one triangle, bytes.
 STL_HEADER, STL_TRIANGLE = 84, 50
 
 
 def build_bodies(
     model: pin.Model, robot: Element, package_dirs: Sequence[Path], source: str, kind: Kind
 ) -> pin.GeometryModel:
-    """Load the bodies of a checked URDF.
+    """Load the collision or the visual bodies of a checked URDF.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def build_bodies(
     package_dirs : sequence of Path
         The only directories from which meshes are read.
     source : str
-        Name of the URDF in errors.
+        Name of the URDF in error messages.
     kind : {"collision", "visual"}
         The bodies to load.
 
@@ -87,7 +88,7 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
     package_dirs : sequence of Path
         The only directories from which meshes are read.
     source, place : str
-        The file and the link, for errors.
+        The file and the link, for error messages.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
 
 
 def _check_mesh_file(path: Path) -> int:
-    """Return the size of a mesh file, bytes. Refuse files that would exhaust a native reader or lead it elsewhere."""
+    """Return the size of a mesh file, bytes; refuse files that are too large to read or name other files."""
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
     ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
     expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"
@@ -134,7 +135,7 @@ def _check_mesh_file(path: Path) -> int:
     if suffix == ".obj":
         longest = max(map(len, data.splitlines()), default=0)
         check(longest <= MAX_LINE, "", f"a line of {longest:,} bytes", f"up to {MAX_LINE:,}", "use triangles")
-    # The native reader goes by the content: it opens the material library that a file of any suffix names.
+    # The native reader opens the material library of an `mtllib` line, even if the file is not an OBJ file.
     for library in re.findall(rb"^[ \t]*mtllib[ \t]*(.*?)\s*$", data, re.MULTILINE):
         plain = re.fullmatch(rb"(\./)?\w[\w. -]*", library)
         check(plain, "", f"the library {shown(repr(library))}", "a file beside the mesh", "remove the line")

@@ -1,4 +1,4 @@
-"""Collision capsules for humanoids without meshes, along their limbs."""
+"""Collision capsules along the segments of a humanoid, in place of meshes."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     Parameters
     ----------
     robot : Robot
-        Its own primitive shapes stay. A humanoid without any body gets a capsule for every part. A robot that is not
-        a humanoid gets none, as nothing is known of its shape.
+        The robot keeps its primitive shapes. A humanoid without any body gets a capsule for every part. A robot that is
+        not a humanoid gets no capsule, because its shape is not known.
     figure : Robot
-        The stick figure. The capsules have its proportions.
+        The stick figure, which determines the proportions of the capsules.
     """
     model, plain, meshed = robot.model, copy.deepcopy(robot.tree), set[int]()
     for link in plain.findall("link"):
@@ -75,7 +75,7 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
 
 
 def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
-    """Return the start, the end and the radius of the figure's capsules, as shares of their segment's length."""
+    """Return the start, the end and the radius of the figure's capsules, as fractions of their segment's length."""
     found, (data, place) = {}, _neutral(figure)
     for body in figure.geometry.geometryObjects:
         part = link_of(figure.model, body)

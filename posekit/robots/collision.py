@@ -16,12 +16,12 @@ from posekit.robots.kinematics import Kinematics, Site
 from posekit.robots.urdf import need, parse_xml
 from posekit.skeleton import PARTS
 
-#: Number of pairs of bodies that are measured at once and stay in the processor's cache, and least number of
-#: configurations, which spreads NumPy's overhead.
+#: Number of body pairs processed in one block, whose data stay in the processor's cache; minimum number of
+#: configurations in one block, so that NumPy's overhead is shared.
 PAIRS_AT_ONCE, LEAST_AT_ONCE = 20_000, 128
 #: Margin added to bodies in tests that exclude contact, metres. It exceeds the tolerance of coal's GJK.
 ROOM: Final = 1e-6
-#: Tolerance of the depth of a penetration, metres.
+#: Tolerance of penetration depths, metres.
 DEPTH: Final = 1e-5
 #: Shapes whose distances have a closed form.
 ROUND: Final = coal.Sphere | coal.Capsule
@@ -40,7 +40,7 @@ def set_pairs(
     checked_parts = {frozenset(map(_part, pair)) for pair in parts}
     pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects
     joints, names = [body.parentJoint for body in bodies], [_part(body.name) for body in bodies]
-    # The neighbour of a body is the nearest body above it: the pelvis for a thigh, even if the hip has three hinges.
+    # A body's neighbour is the nearest body toward the root: for a thigh the pelvis, even if the hip has three hinges.
     above = {joint: set(list(model.supports[joint])[:-1]).intersection(joints) for joint in joints}
     near = [{joint, max(carriers, default=0)} for joint, carriers in above.items()]
     data, geometry_data = model.createData(), geometry.createData()
@@ -84,7 +84,7 @@ class Contacts(NamedTuple):
     Attributes
     ----------
     hit : bool array (N,)
-        Whether any pair touches, as `pinocchio.computeCollisions` has it.
+        Whether any pair touches, as `pinocchio.computeCollisions` returns it.
     frame, pair : int arrays (K,)
         Row of the configuration and index of the pair, for each pair nearer than the margin; sorted.
     distance : array (K,)
@@ -102,9 +102,9 @@ class Contacts(NamedTuple):
 class SelfCollision:
     """Collision queries of one model.
 
-    NumPy excludes pairs whose bounding balls or bounding boxes are apart (Gottschalk, Lin and Manocha 1996, §5), and
-    measures capsules and spheres exactly. coal tests the convex hulls of the remaining pairs, and their meshes only if
-    the hulls touch.
+    NumPy excludes pairs whose bounding balls or bounding boxes do not overlap (Gottschalk, Lin and Manocha 1996, §5),
+    and measures capsules and spheres exactly. coal tests the convex hulls of the remaining pairs, and their meshes only
+    if the hulls touch.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class SelfCollision:
         Parameters
         ----------
         q : array (N, nq)
-            Configurations, checked.
+            Configurations that `Robot.checked` has accepted.
         margin : float
             Metres, at least 0; only touching pairs by default.
         """
@@ -186,7 +186,7 @@ class SelfCollision:
         return row[near], pair[near], distance[near]
 
     def _measure(self, q: Array, row: Ints, pair: Ints, distance: Array, margin: float) -> None:
-        """Replace distances that are NaN and below the margin by distances from coal, in place."""
+        """Compute missing (NaN) distances with coal, in place; without a margin, pairs that do not touch stay NaN."""
         model, data, meshes, mesh_data = self.model, self._data, self._meshes, self._mesh_data
         hulls, hull_data = self._hulls, self._hull_data
         rows, pairs, placed, placed_meshes = row.tolist(), pair.tolist(), -1, -1

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 #: Distance (m) from their targets within which all known points must be; otherwise other starts are tried.
 MET: Final = 1e-3
-#: Weight of the squared distance from the start, m^2/rad^2. It selects among configurations with equal points.
+#: Weight of the squared distance from the start, m^2/rad^2. It selects one of the configurations that have the same
+#: points.
 PULL: Final = 1e-10
 #: Largest number of steps of a search.
 STEPS: Final = 40
@@ -126,10 +127,10 @@ class _Problem:
 
 
 def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
-    r"""Find configurations within the limits that place the mapped joints.
+    r"""Find configurations within the limits whose mapped joints are nearest to given positions.
 
     Minimise :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, for all
-    postures at once. If a posture is not reached, the search is repeated from other starts.
+    postures at once. If a known point is farther than `MET` from its target, the search is repeated from other starts.
 
     Parameters
     ----------
@@ -137,15 +138,15 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     joints : array (14, 3) or (N, 14, 3)
         Metres, world; NaN is unknown.
     start : array (N, nq), optional
-        Configurations near the solution; by default the neutral configuration. Joints that the points do not determine
-        stay near it.
+        Configurations near the solution; by default the neutral configuration. Robot joints that the targets do not
+        determine stay near this start.
 
     Returns
     -------
     q : array (N, nq)
         Mimicking joints follow their targets.
     distance : array (N,)
-        Largest distance of a known joint from its place, metres. NaN if no joint is known.
+        Largest distance of a known joint from its target, metres; NaN if no joint is known.
 
     Raises
     ------

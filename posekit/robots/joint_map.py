@@ -1,4 +1,4 @@
-"""Joint maps: the frames of a model that stand for the 14 joints, from a file or from the model's own names."""
+"""Joint maps: the frames of a model that represent the 14 joints, from a file or from the model's joint names."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SCHEMA: Final = "posekit.joint_map/1"
 #: Joint maps that come with posekit, in the order in which `find_joint_map` tries them.
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
 
-#: Place on a robot of each point that it has, by the point's name, in the order of `posekit.skeleton.POINTS`.
+#: Site of each mapped point on a robot, by the point's name, in the order of `posekit.skeleton.POINTS`.
 JointMap = Mapping[str, Site]
 
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from posekit.geometry import Array, cross, rotation_from_quaternion
 
-#: Configurations worked on at once, so that their rotations stay in the processor's cache.
+#: Number of configurations processed in one block, so that their rotations stay in the processor's cache.
 BLOCK: Final = 256
 
-#: Entries of q of a joint, by their number, if it has more than one: a floating, a planar, a continuous joint.
+#: Suffixes of a joint's entries of q, by the number of entries: a floating, a planar and a continuous joint.
 SUFFIXES: Final = {
     7: ("x", "y", "z", "qx", "qy", "qz", "qw"),
     4: ("x", "y", "cos", "sin"),
@@ -23,26 +23,26 @@ SUFFIXES: Final = {
 
 
 class Site(NamedTuple):
-    """A place on a body: the joint's index, and an offset (3,) in metres in the joint's frame."""
+    """A point fixed to a joint: the joint's index, and the point's offset (3,) in the joint's frame, metres."""
 
     joint: int
     offset: ArrayLike
 
 
 class Kinematics:
-    """Places points on the joints of a model for a batch of configurations.
+    """Batched positions and Jacobians of points that are fixed to the joints of a model.
 
     The results equal those of Pinocchio's `forwardKinematics` and joint Jacobians up to rounding, at about 30 times the
-    speed of a loop over them. Arrays inside have the batch as their last axis, and a frame lists its axes x, y, z as
-    rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a hinge then
-    changes the axes x and y alone.
+    speed of a loop over configurations. Arrays inside have the batch as their last axis, and a frame lists its axes x,
+    y, z as rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a
+    hinge then changes the axes x and y alone.
 
     Parameters
     ----------
     model : pinocchio.Model
         Joints may be revolute, continuous, prismatic, planar and floating.
     points : sequence of Site
-        The points to place. Joints that no point depends on are not computed.
+        The points. Joints that no point depends on are not computed.
     """
 
     def __init__(self, model: pin.Model, points: Sequence[Site]) -> None:
@@ -104,7 +104,7 @@ class Kinematics:
         return out
 
     def jacobians(self, q: Array) -> tuple[Array, Array]:
-        r"""Return the points (N, P, 3) and their derivatives (N, P, 3, nv) along `pinocchio.integrate`.
+        r"""Return the points (N, P, 3) and their derivatives (N, P, 3, nv) by the step of `pinocchio.integrate`.
 
         A joint at origin o with rotation R moves a point p by :math:`R s_v + (R s_\omega) \times (p - o)` for each
         column s of its motion subspace (Featherstone 2008, §3.5).
@@ -117,7 +117,7 @@ class Kinematics:
         return points, np.swapaxes(moved * self._moves[..., None], 2, 3)
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
-        """Return the axes (njoints, 3, 3, N) and origins (njoints, 3, N) of the joints that lead to a point."""
+        """Return the axes (njoints, 3, 3, N) and origins (njoints, 3, N) of the joints that points depend on."""
         columns = np.concatenate([q.T, np.zeros((1, len(q)))])  # the last row serves the universe if nq is 0
         first, second = columns[self._at]
         cos, sin = first.copy(), second.copy()  # entries of a continuous joint

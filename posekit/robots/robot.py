@@ -49,7 +49,7 @@ class Robot(Record):
     srdf : str or None
         Text of the SRDF, which names pairs of links that are not checked for collision.
     name, source : str
-        The robot's name, and the file it came from, for errors.
+        The robot's name, and its file, for error messages.
     package_dirs : tuple of Path
         The only directories from which meshes are read.
     fixed_base : bool
@@ -64,7 +64,7 @@ class Robot(Record):
     Raises
     ------
     InputError
-        If a text or a mesh is damaged or against the rules of URDF. The message names the place in one line.
+        If a text or a mesh is damaged or violates the URDF format. The message names the place in one line.
 
     Examples
     --------
@@ -191,7 +191,7 @@ class Robot(Record):
 
     @cached_property
     def joint_map(self) -> JointMap:
-        """The place on the robot of each of the 14 joints; empty if the robot is not a humanoid.
+        """The site on the robot of each of the 14 joints; empty if the robot is not a humanoid.
 
         It is the given map, a built-in map, or a map derived from the names of the robot's joints.
 
@@ -216,7 +216,7 @@ class Robot(Record):
         ----------
         q : array (nq,) or (N, nq)
         source : str
-            Name of the configurations in errors.
+            Name of the configurations in error messages.
 
         Returns
         -------
@@ -337,7 +337,9 @@ class Robot(Record):
         return self._collision.contacts(self.checked(q), margin)
 
     def configurations(self, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return configurations within the limits that place the joints: see `posekit.robots.inverse.solve`.
+        """Return configurations within the limits whose joints are nearest to given positions.
+
+        See `posekit.robots.inverse.solve`.
 
         Parameters
         ----------
@@ -350,7 +352,7 @@ class Robot(Record):
         -------
         q : array (N, nq)
         distance : array (N,)
-            Largest distance of a known joint from its place, metres.
+            Largest distance of a known joint from its target, metres.
         """
         return solve(self, joints, start=start)
 
@@ -387,7 +389,8 @@ def load_robot(
     bodies : {"meshes", "capsules", "none"}
         Collision bodies: see `Robot`. Capsules need no mesh files.
     package_dirs : sequence of path
-        More directories with the packages of the robot's meshes. Its own folders are always searched.
+        More directories with the packages of the robot's meshes. The folders of the URDF's own package are always
+        searched.
     fixed_base : bool
         Whether the root is fixed, as for an arm.
     joint_map : str or path

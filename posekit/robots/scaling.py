@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 #: Plausible ratios of a person's segment length to the robot's (dimensionless); beyond them the unit is wrong.
 RATIO: Final = (0.05, 20.0)
-#: Distance within which two places coincide, metres.
+#: Distance below which two points coincide, metres.
 SAME: Final = 1e-9
 
 
 def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     """Return the robot with the median segment lengths of postures.
 
-    Limb segments have the person's lengths in every configuration; distances within torso and hips are the person's at
-    the neutral configuration. Bodies grow with their segments; hands, feet and head keep their size.
+    Limb segments have the person's lengths in every configuration. Distances within torso and hips equal the person's
+    at the neutral configuration. Bodies scale with their segments; hands, feet and head keep their size.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     Raises
     ------
     InputError
-        If a length is more than 20 times larger or smaller than the robot's.
+        If a segment of the person is more than 20 times longer or shorter than the robot's.
     """
     given = np.asarray(joints, dtype=np.float64).reshape(-1, *np.shape(joints)[-2:])[:, : len(JOINTS)]
     model, tree, data = robot.model, copy.deepcopy(robot.tree), robot.model.createData()

@@ -30,8 +30,8 @@ MAX_BYTES: Final = 10_000_000
 MAX_NESTING: Final = 64
 #: Largest number of links from the root to a leaf. Pinocchio's reader overflows its stack at about 5000.
 MAX_CHAIN: Final = 250
-#: Largest numbers of parts. The largest published robots have about 150 links and 112 bodies; Pinocchio's data grow
-#: with the cube of the degrees of freedom and have 0.3 GB at 200.
+#: Largest accepted counts. The largest published robots have about 150 links and 112 bodies. The memory of Pinocchio's
+#: data grows with the cube of the degrees of freedom: 0.3 GB at 200.
 MOST: Final = {"links": 1000, "bodies": 500, "degrees of freedom": 200}
 #: Largest coordinate, metres or radians; products of larger numbers overflow.
 MAX_NUMBER: Final = 1e6
@@ -60,7 +60,7 @@ _SINGLES: Final = (
     "radius",
     "length",
 )
-#: Elements with numbers, and those whose numbers are coordinates and sizes.
+#: Elements whose numbers are coordinates or sizes, and all elements with numbers.
 _PLACED: Final = ("origin", "axis", *SIZES)
 _NUMERIC: Final = ("limit", "mimic", "mass", *_PLACED)
 #: Children of links and joints that the model is built from. Others, such as those of simulators, are removed.
@@ -113,7 +113,7 @@ def check_urdf(text: str, source: str) -> Element:
     text : str
         The URDF.
     source : str
-        Its name in errors.
+        Name of the URDF in error messages.
 
     Returns
     -------
