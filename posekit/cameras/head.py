@@ -54,7 +54,7 @@ BETTER_BEHIND: Final = 1e-4
 FALSE_ALARMS: Final = 5e-3
 
 BEHIND_CAMERA: Final = (
-    "the points fit only a head behind the camera, as those of a mirrored image do: y must point down in the "
+    "the points fit only a head behind the camera, as in a mirrored image: y must point down in the "
     "image, and left and right must be the person's own"
 )
 WEAK: Final = "the image does not determine f (the head is far away, or mirrored); give f"

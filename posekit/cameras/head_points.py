@@ -81,7 +81,7 @@ def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
     size, _, thickness = np.linalg.svd(known - known.mean(axis=0), compute_uv=False) / np.sqrt(count)
     if thickness <= DEGENERATE_EXTENT * size:
         return (
-            f"the {count} head points lie in one plane (off it {thickness:.3g} m, along it {size:.3g} m): "
+            f"the {count} head points lie in one plane (thickness {thickness:.3g} m, size {size:.3g} m): "
             "a plane does not determine a camera; add a point off it, the nose or the neck"
         )
     return ""

@@ -1,4 +1,4 @@
-r"""A posture described by unit vectors in the frame of its torso. Unlike angles they have no singularities.
+r"""Postures as unit vectors in the frame of the torso. Unlike angles, unit vectors have no singularities.
 
 The torso's axes are x forward, y left and z from the pelvis to the neck. The vectors are the left and the down axis of
 the hips, the directions of the eight limb segments, and the direction against gravity if it is known.
@@ -32,8 +32,8 @@ UP_INDEX: Final = len(DIRECTION_NAMES) - 1
 #: the pelvis does not determine the hips' down axis.
 FLAT_PELVIS: Final = 0.1
 
-#: Smoothing constant c of `log_room` (dimensionless): noise of a few pixels, or of a few per cent in the lengths, hides
-#: a slope of ten degrees.
+#: Smoothing constant c of `log_room` (dimensionless). With noise of a few pixels, or a few per cent in the lengths,
+#: slopes below ten degrees cannot be distinguished.
 LEAST_COSINE: Final = 0.2
 
 #: Mean of one segment's term of `log_room` over uniformly distributed directions.
@@ -76,8 +76,8 @@ def log_room(joints: Array) -> Array:
 
     A direction is a point on the unit sphere, and its image is the projection of that point:
     :math:`d\omega = dA / |\cos\theta|`, with :math:`\theta` the angle between segment and ray. The same area of the
-    image holds more directions for a segment parallel to the image than for one that points to the camera. Noise limits
-    the density: :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
+    image corresponds to more directions if the segment is parallel to the image than if it points to the camera. Noise
+    limits the density: :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
 
     Parameters
     ----------

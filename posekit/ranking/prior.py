@@ -5,7 +5,8 @@ r"""The prior of postures: mixtures of t distributions of segment directions, an
     \log p(x) = c + \log \sum_k s_k \left(1 + \frac{(x - m_k)^T S^{-1} (x - m_k)}{\nu}\right)^{-(\nu + d) / 2}
 
 The marginal distribution of some coordinates has the same form, with their rows of m and their rows and columns of S
-(Kotz & Nadarajah 2004, Multivariate t distributions and their applications, §1.10). Unknown coordinates are dropped.
+(Kotz & Nadarajah 2004, Multivariate t distributions and their applications, §1.10). Unknown coordinates are removed in
+this way.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX
 
 PRIORS: Final = DATA / "priors"
 
-#: Weights of a sum of coordinates by which equal points are recognised: different points have different sums.
+#: Weights of the weighted sum of coordinates that identifies equal points: different points have different sums.
 UNEVEN: Final = np.sqrt(2.0 + np.arange(3 * len(DIRECTION_NAMES)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StudentMixture(Record):
-    """A mixture of K t distributions of d coordinates with the same scale and different centres.
+    """A mixture of K multivariate t distributions of d coordinates, with one scale matrix and different centres.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ class StudentMixture(Record):
     dof : float
         Degrees of freedom; fewer degrees give heavier tails.
     share : array (K,)
-        Share s of each distribution; the shares are scaled to sum to one.
+        Weight s of each distribution; the weights are normalised to sum to one.
     """
 
     means: Array
@@ -63,7 +64,7 @@ class StudentMixture(Record):
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.scale)))
 
     def part(self, rows: Any) -> StudentMixture:
-        """Return the marginal distribution of some coordinates."""
+        """Return the marginal distribution of selected coordinates."""
         return replace(self, means=self.means[:, rows], scale=self.scale[rows][:, rows])
 
     def widened(self, variance: Array) -> StudentMixture:
@@ -94,7 +95,7 @@ class StudentMixture(Record):
         return found
 
     def _usual(self, count: int) -> float:
-        """Return the mean log-density of the first `count` coordinates, as if the components did not overlap."""
+        """Return the mean log-density of the first `count` coordinates, assuming that the components do not overlap."""
         if count not in self._averages:
             power = (self.dof + count) / 2
             own = power * (digamma(power) - digamma(self.dof / 2))
@@ -142,12 +143,12 @@ class Prior(Record):
         For each block: names of directions, their joint distribution, and whether only the conditional density of `up`
         given the other directions is used.
     temperature : float
-        Metres. The log-density of directions of exact postures is divided by 1 + deviation / temperature, because the
-        directions of a posture with errors of a centimetre vary by more than the prior's fine structure.
+        Metres. The log-density of directions of exact postures is divided by 1 + deviation / temperature, because
+        errors of a centimetre change directions by more than the width of the prior's peaks.
     weights, noisy : mapping of str to float
         Weight of each log term for exact postures, and for modes under noise.
     balance, contact : (float, float)
-        Scale s (m) and mean u of the log-density :math:`u - \log(1 + (d / s)^2)` of a distance d.
+        Scale s (m) and mean u of the log-density :math:`u - \log(1 + (d / s)^2)` of a distance d of `standing`.
     """
 
     blocks: Sequence[tuple[tuple[str, ...], StudentMixture, bool]]

@@ -25,8 +25,8 @@ MISFIT_DEGREES_OF_FREEDOM: Final = 4.0
 #: capture).
 MIN_DEVIATION_METRES: Final = 0.006
 
-#: Ratio of the tolerance of rigid distances to the deviation of the survivors (dimensionless), as in the fit of the
-#: prior's weights.
+#: Ratio of the tolerance of rigid distances to the standard deviation of the survivors' joints (dimensionless). The
+#: prior's weights were fitted with this ratio.
 PER_TOLERANCE: Final = 2.2
 
 #: Distance from ankles to centre of mass, and between the ankles, metres: an error of `up` by a small angle changes
@@ -85,7 +85,7 @@ def log_terms(
     joints : array (N, 14, 3)
         Camera frame, metres; NaN where a joint is not known.
     deviation : float
-        Deviation of the joints of exact postures, metres.
+        Standard deviation of the joints of exact postures, metres.
     chi2 : array (N,), optional
         Chi-square of modes under noise. Without it, the errors of the four rigid distances are used.
     log_volume : array (N,), optional
@@ -95,9 +95,9 @@ def log_terms(
     length_residual : array (N,), optional
         Metres by which the worst segment is too short to reach the ray of its image point.
     up : Up, optional
-        Without it there are no terms for gravity, balance and contact.
+        The up direction; without it there are no terms for gravity, balance and contact.
     prior : Prior, optional
-        The built-in one by default.
+        The prior of postures; by default the built-in prior.
 
     Notes
     -----
@@ -107,7 +107,7 @@ def log_terms(
     term that cannot be evaluated is 0.
     """
     prior = prior or load_prior()
-    # NumPy's loops then run along the postures, not along x, y, z.
+    # In this order NumPy's inner loops run over postures, not over x, y, z.
     joints = np.asfortranarray(joints)
     direction = None if up is None else up.direction
     sine = 0.0 if up is None else math.sin(math.radians(up.deviation))

@@ -1,7 +1,7 @@
-r"""Balance of a standing person: the centre of mass against the support, and the heights of the ankles.
+r"""Balance of a standing person: distance of the centre of mass from the support, and height of the ankles.
 
 One picture does not show the height of the ground. A standing person is supported by the lower foot, and by both feet
-if both are low. The support is the line from the lower ankle towards the higher one, times
+if both are low. The support is the line from the lower ankle towards the higher ankle, shortened by the factor
 :math:`e^{-h^2 / 2 (10 cm)^2}`, with h the height difference of the ankles.
 """
 
@@ -36,7 +36,7 @@ LIMB_MASSES: Final = (
 def centre_of_mass(joints: Array) -> Array:
     """Return the centre of mass (N, 3) of postures (N, 14, 3).
 
-    Parts of limbs with an unknown end are left out. The result is NaN if the neck or a hip is unknown.
+    Limb segments with an unknown end are omitted. The result is NaN if the neck or a hip is unknown.
     """
     neck = joints[:, JOINT["neck"]]
     down = joints[:, [JOINT["right_hip"], JOINT["left_hip"]]].mean(axis=1) - neck
@@ -53,7 +53,7 @@ def centre_of_mass(joints: Array) -> Array:
 
 
 def standing(joints: Array, up: Array) -> tuple[Array, Array]:
-    """Measure how postures stand.
+    """Return the distance of the centre of mass from the support, and the height difference of the ankles.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def _check_mesh_file(path: Path) -> int:
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
     ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
     expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"
-    check(ok, "", f"{size:,} bytes of {suffix or 'no kind'}", expected, "convert or simplify it")
+    check(ok, "", f"{size:,} bytes with suffix {shown(suffix)}", expected, "convert or simplify it")
     data = path.read_bytes()
     if suffix == ".stl" and not data.lstrip().startswith(b"solid"):
         declared = int.from_bytes(data[80:STL_HEADER], "little")

@@ -41,13 +41,13 @@ def path_of(joint: int) -> tuple[int, ...]:
 
 @lru_cache(maxsize=1024)
 def support_of(points: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the joints, in tree order, whose branches determine the positions of some points."""
+    """Return the joints, in tree order, whose branches determine the positions of given points."""
     return tuple(sorted({joint for point in points if point < len(JOINTS) for joint in path_of(point)}))
 
 
 @lru_cache(maxsize=512)
 def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return the bits of some joints in every code (2^level,) of a level; the first joint has the highest bit."""
+    """Return the bits of given joints in every code (2^level,) of a level; the first joint has the highest bit."""
     codes = np.arange(1 << level, dtype=np.int64)
     picked = np.zeros_like(codes)
     for joint in joints:

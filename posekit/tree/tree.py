@@ -111,8 +111,11 @@ class Trees:
 
     @cached_property
     def levels(self) -> NDArray[np.int64]:
-        """Number of nodes at each level (F, 14) from which a survivor descends (Lee & Chen 1985, section 4.1.B)."""
-        return ancestors(self.frame, self.code, self.count)
+        """Number of nodes at each level (F, 14) that have a survivor below them (Lee & Chen 1985, section 4.1.B)."""
+        shift = DEPTH - np.arange(DEPTH + 1)
+        key = (self.frame[:, None] << DEPTH | self.code[:, None]) >> shift  # ascending, as the survivors are
+        new = np.diff(key, axis=0, prepend=-1) > 0
+        return np.stack([np.bincount(self.frame[one], minlength=self.count) for one in new.T], axis=1)
 
     def pruned(self, frame: int) -> list[tuple[str, str, str, float, float, float, str]]:
         """List every pruned branch of a frame: its code, joint, reason, value, bounds and unit."""
@@ -203,7 +206,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check, the level at which it judges, and the points that it reads; the check None branches a joint."""
+    """A check, its level, the points that it reads, and its compiled steps; without a check, a joint's near or far branch."""
 
     level: int
     check: Any
@@ -214,7 +217,7 @@ class _Planned(NamedTuple):
 def _planned(
     checks: Sequence[Any], form: Callable[[Any], Sequence[Step] | None] | None, head: Array
 ) -> list[_Planned]:
-    """Return branches and checks in the order of levels, with their steps where the compiled tree has them."""
+    """Return branches and checks in the order of levels, with compiled steps for checks that the compiled tree has."""
     branch = [step(BRANCH, ())] if steps.compiled else None
     plan = [_Planned(level, None, (), branch) for level in range(1, DEPTH + 1)]
     for check in checks:
@@ -242,7 +245,7 @@ def _compiled(
     code: NDArray[np.int64],
     reasons: dict[tuple[str, str], int],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
-    """Apply consecutive steps of the compiled tree to nodes: return the remaining and the pruned ones."""
+    """Apply consecutive steps of the compiled tree to nodes; return the remaining nodes and the pruned branches."""
     rows, limits = [], None
     for planned in plan:
         for one in planned.steps or ():
@@ -267,7 +270,7 @@ def _taken(
     reasons: dict[tuple[str, str], int],
     ask: Callable[[Any, Array], Any],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
-    """Apply one step, a branch or a check, to nodes: return the remaining and the pruned ones."""
+    """Apply one step, a branch or a check, to nodes; return the remaining nodes and the pruned branches."""
     level, check = planned.level, planned.check
     if check is None:
         frame, code, reason, value, lower, upper = _branched(found, level, frame, code)
@@ -313,7 +316,7 @@ def _asked(
 ) -> tuple[tuple[str, ...], Ints, Array, Array, Array]:
     """Judge each distinct combination of the branches that a check reads.
 
-    Return the places of the check, and the violated place (-1 for none), value and bounds of each node.
+    Return the places of the check, and for each node the violated place (-1 if it passes), its value and its bounds.
     """
     level, check, points, _ = planned
     support = support_of(points)
