@@ -39,7 +39,7 @@ struct Frame {
   Vec forward, left, up, first, normal;
   double length, lean, across;
   bool by_down;  // the first axis is down (torso), or left (hips)
-  // The products of the transposed maps with a covector w of rotations: on_first = G' w, on_other = H' w.
+  // Transposed maps, applied to a derivative w by rotations: on_first = G' w, on_other = H' w.
   void pull(Vec w, Vec& on_first, Vec& on_other) const {
     double along = dot(w, first);
     on_first = (1 / length) * (cross(w, first) - (along * lean / across) * normal);
@@ -76,7 +76,7 @@ double interpolated(double x, const double* at, const double* y, int n) {
   return y[n - 1];
 }
 
-// Powers and roots of the sinus exponent; 2 and 3 are the usual ones.
+// Powers and roots with the exponent of a sinus, fast for the usual exponents 2 and 3.
 double raised(double x, double power) { return power == 2 ? x * x : power == 3 ? x * x * x : std::pow(x, power); }
 double root(double x, double power) {
   return power == 2 ? std::sqrt(x) : power == 3 ? std::cbrt(x) : std::pow(x, 1 / power);
@@ -100,7 +100,7 @@ Reading reading_of(int limb, const double g[4]) {
 struct Written {
   double value[4], bound[2][4];
 };
-// `slack` (radians) widens the sinus. An unknown angle (NaN) bounds nothing.
+// `slack` (radians) widens the sinus. A coupling to an unknown angle (NaN) adds no bound.
 Written written(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double slack) {
   const int kind = limb / 2, over = way / 2, flipped = way & 1;
   const bool arm = kind == 0 && L.by_elevation > 0;
@@ -199,12 +199,13 @@ Pelvis pelvis_of(const Frame& torso, const Frame& hips) {
   return s;
 }
 
-// The judgement of a limb by the check of joint ranges: rows angle, lower bound, upper bound, tolerance, degrees.
+// What the check of joint ranges reports of a limb: rows angle, lower bound, upper bound, tolerance, degrees.
 struct Stated {
   double row[4][4];
 };
-// The usual Euler branch is stated if it passes, else the least violated one. The rotation is unknown (NaN) if the bend
-// is below `straight`, or if `tolerance` does not determine it (validators/joint_range.py; all in degrees).
+// The usual Euler branch is reported if it passes, otherwise the branch with the smallest violation. The rotation is
+// unknown (NaN) if the bend is below `straight`, or if `tolerance` does not determine it (validators/joint_range.py;
+// all in degrees).
 Stated stated(const Limits& L, int limb, const double g[4], double tolerance, double straight) {
   constexpr double RADIAN = M_PI / 180, UNSEEN = 45;
   const double sine = std::fabs(std::sin(g[3])), least = std::max(tolerance * RADIAN / M_PI, 2.2250738585072014e-308);

@@ -3,9 +3,9 @@ r"""Joint ranges and their couplings as arrays of numbers, which the solver and 
 A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball joint in the parent's
 frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. Up to four sets of angles give the same two
 directions. The limb is within its limits if every angle of one set is between its bounds. A bound is a constant or a
-piecewise linear function of another angle (a coupling). A range may also shrink where other angles of the joint are
-near the ends of their ranges (a joint sinus). An arm whose elevation is bounded is judged by elevation, plane of
-elevation and turn. Flexion and abduction have a singularity at an arm that is stretched out sideways.
+piecewise linear function of another angle (a coupling). A range may also shrink if other angles of the joint are near
+their limits (a joint sinus). If the table has a bound of elevation, an arm is judged by elevation, plane of elevation
+and axial turn, because flexion and abduction are singular for an arm that points sideways.
 """
 
 from __future__ import annotations
@@ -37,23 +37,24 @@ KINDS: Final = (
     ("shoulder.flexion", "shoulder.abduction", "shoulder.rotation", "elbow.flexion"),
     ("hip.flexion", "hip.abduction", "hip.rotation", "knee.flexion"),
 )
-#: Readings that couplings use besides the four angles, numbered from 4.
+#: Derived angles that couplings use besides the four limb angles, numbered from 4.
 READINGS: Final = ("elevation", "plane", "turn", "valgus")
 
 ELEVATION, PLANE, TURN, VALGUS = range(4, 8)
 
-#: Sign of the axial rotation that is read from a lower segment which leaves the hinge's plane away from the body: arms,
-#: legs.
+#: Sign of the apparent axial rotation of arms and of legs if the lower segment leaves the hinge's plane away from the
+#: body (valgus).
 VALGUS_SIGNS: Final = np.array([-1.0, 1.0])
 
-#: Fraction of a range that a sinus leaves at the very end of another angle (dimensionless).
+#: Fraction of a range that remains under a sinus if another angle is at its limit (dimensionless).
 LEAST_LEFT: Final = 0.1
 
 MAX_COUPLINGS: Final = 12
 MAX_KNOTS: Final = 8
 
 #: The numbers as the compiled solver reads them, radians. `role` of a coupling: kind of limb (0 arm, 1 leg), bounded
-#: angle, side (0 lower, 1 upper), angle that it depends on, number of knots; `knots`: that angle, mean end, limit.
+#: angle, side (0 lower, 1 upper), angle that it depends on, number of knots. `knots`: values of that angle, mean bound,
+#: and limit.
 LIMITS: Final = np.dtype(
     [
         ("mean", "f8", (2, 4, 2)),
@@ -237,7 +238,7 @@ class Limits:
                 outward[0] += np.where(upward, 0.0, turn)
                 outward[1] += np.where(upward, turn, 0.0)
             else:
-                # A bound by an angle that is not known (NaN) is none.
+                # A coupling to an unknown angle (NaN) adds no bound.
                 pick, column = np.fmin if side else np.fmax, 0 if target == ELEVATION else target
                 bounds[side][..., column] = pick(bounds[side][..., column], end)
                 middle = np.interp(readings[of], at, mean)
@@ -251,7 +252,7 @@ class Limits:
 
         Without `writing`, the set of angles that violates its limits least is used. A rotation that exceeds its limit
         by v has the residual :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`, which vanishes for a straight limb, whose
-        rotation is not determined. The first angle is weighted in the same way near its pole.
+        rotation is not determined. The first angle is weighted in the same way near its singularity.
         """
         value, lower, upper, _ = self.read(limb, rotations, writing=writing)
         above, below = value - upper, lower - value

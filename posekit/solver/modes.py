@@ -19,22 +19,23 @@ MERGE_DISTANCE_METRES: Final = 0.01
 #: Two minima are different modes if any joint, relative to the neck, differs by more than this.
 MERGE_REACH_METRES: Final = 0.08
 
-#: Two minima between both distances are the same mode if their difference d has :math:`d^T H d` below this value, the
-#: square of three standard deviations along the line between them. H is the information on all joints at once; it
-#: includes their correlations, so the error of depth that all joints share does not make limbs look uncertain.
+#: Two minima whose largest difference is between these distances are the same mode if the difference d of all unknowns
+#: has :math:`d^T H d` below this value (three standard deviations, squared). H is the information matrix of all joints.
+#: It includes correlations, so an error of depth that all joints share does not hide a difference between limbs.
 MERGE_CHI2: Final = 9.0
 
-#: Standard deviation of the prior of every joint position.
+#: Standard deviation of the weak prior of every joint position.
 UNKNOWN_PLACE_METRES: Final = 10.0
 
 #: Standard deviation of a hidden joint about its mode.
 HIDDEN_METRES: Final = 0.15
 
-#: Information on the turn of a segment near a right angle to its ray, times noise over length (dimensionless).
+#: Information on the rotation of a segment that is nearly perpendicular to its ray, times noise over length
+#: (dimensionless).
 #:
-#: There the depth of the end shows to second order alone: a length l that is seen too short by the noise
-#: :math:`\sigma` (metres) turns by :math:`\sqrt{2\sigma/l}`. With :math:`0.5\, l/\sigma` stated and measured errors
-#: agree over random legal postures at 0.5 to 5 pixels.
+#: The image of such a segment depends on the depth of its end only to second order: noise :math:`\sigma` (metres) in
+#: the seen length l corresponds to a rotation by :math:`\sqrt{2\sigma/l}`. With an information of
+#: :math:`0.5\, l/\sigma`, predicted and measured errors agree for random postures within the limits at 0.5 to 5 pixels.
 TURN_INFORMATION: Final = 0.5
 
 KNOWN: Final = np.array([UNKNOWN_PLACE_METRES**-2, HIDDEN_METRES**-2, TURN_INFORMATION])
@@ -76,7 +77,7 @@ class Modes:
         return self.x[:, 42]
 
     def take(self, rows: Ints | Flags | slice) -> Modes:
-        """Return some modes."""
+        """Return the selected modes."""
         return Modes(problem=self.problem, frame=self.frame[rows], x=self.x[rows], chi2=self.chi2[rows])
 
     @property
@@ -89,7 +90,7 @@ class Modes:
         return np.asarray(-self.chi2 / 2 - found / 2)
 
     def covariance(self, rows: Ints | slice = slice(None)) -> Array:
-        """Return the covariance of all joint positions of some modes (K, 42, 42), square metres."""
+        """Return the covariance of all joint positions of selected modes (K, 42, 42), square metres."""
         return np.asarray(run("covariance", self.problem, self.frame[rows], self.x[rows], KNOWN))
 
     def residuals(self) -> Mapping[str, Array]:
@@ -119,10 +120,11 @@ def distinct(
     within: float | Array,
     sure: bool = False,
 ) -> Flags:
-    """Return a mask of the bodies (N, 43), sorted by chi2 in each group, that differ from every better kept body.
+    """Return a mask of the bodies (N, 43) that differ from every kept body of lower chi2 in their group.
 
-    Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` metres, a number
-    or (N,). With `sure`, they are also the same if their difference is within their uncertainty (`MERGE_CHI2`).
+    Bodies are sorted by group, then by chi2. Two bodies are the same if no joint of `parts`, relative to the neck,
+    differs by more than `within` metres, a number or (N,). With `sure`, they are also the same if their difference is
+    within their uncertainty (`MERGE_CHI2`).
     """
     near = np.broadcast_to(np.asarray(within, dtype=np.float64), group.shape)
     reach = MERGE_REACH_METRES if sure else 0.0

@@ -24,22 +24,24 @@ from posekit.geometry import Array, Flags, Ints, unit
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.solver.limits import Limits
 
-#: Relative deviation of lengths that are given as exact: two millimetres a metre, below which steps become short.
+#: Smallest relative standard deviation of lengths, also of exact lengths. With smaller values the solver's steps become
+#: short.
 LEAST_LENGTH_DEVIATION: Final = 2e-3
 
 #: Standard deviation (radians) with which joint limits are known.
 LIMIT_DEVIATION: Final = float(np.radians(2.0))
 
-#: Standard deviations at which a detector's image point keeps half of its squared residual (Geman & McClure 1985).
+#: Error of a detected image point, in standard deviations, that halves its squared residual (Geman & McClure 1985).
 ROBUST_DEVIATIONS: Final = 4.0
 
-#: One over metres: holds the depth of the neck before a camera without perspective, which does not show it.
+#: Weight (1/metres) that fixes the depth of the neck for a camera without perspective, whose image does not depend on
+#: it.
 HELD_DEPTH_WEIGHT: Final = 1e3
 
 #: Standard deviation (metres) of a given neck position whose uncertainty is not stated.
 EXACT_ROOT_METRES: Final = 2e-4
 
-#: Names of the residuals of `posekit.solver.modes.Modes.residuals`, limits aside.
+#: Names of the residuals of `posekit.solver.modes.Modes.residuals`, except limits.
 RESIDUAL_NAMES: Final = (
     *(f"image {joint}" for joint in JOINTS),
     *(f"length {JOINTS[min(pair)]}-{JOINTS[max(pair)]}" for pair in SEGMENTS),
@@ -72,7 +74,7 @@ PROBLEM: Final = np.dtype(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """Image points and prior knowledge of F frames, which the solver treats one by one.
+    """Image points and prior knowledge of F frames, which the solver treats independently.
 
     Parameters
     ----------
@@ -147,7 +149,7 @@ class Problem:
         return len(self.records)
 
     def take(self, frames: Ints | slice) -> Problem:
-        """Return some frames."""
+        """Return the problem of selected frames."""
         return Problem(records=self.records[frames], limits=self.limits)
 
     @property
@@ -174,9 +176,9 @@ class Problem:
     def freedom(self) -> Ints:
         """Degrees of freedom of chi2 (F,): image coordinates and priors in excess of the unknowns.
 
-        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. Counted are the
-        coordinates of torso points and root beyond the six unknowns of the torso's pose, and those of hip points beyond
-        the three unknowns of the hips' orientation.
+        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. The degrees of
+        freedom are the coordinates of torso points and root beyond the six unknowns of the torso's pose, and the
+        coordinates of hip points beyond the three unknowns of the hips' orientation.
         """
         seen = self.seen_joints
         priors = (self.records["root_weight"] != 0).any(axis=2).sum(axis=1) - self.sized

@@ -31,10 +31,10 @@ FLOOR: Final = 1e-6
 #: Step of the finite differences of limit residuals with respect to limb angles, radians.
 ANGLE_STEP: Final = 1e-4
 
-#: Smallest sine or cosine by which derivatives of limb angles are divided: they are infinite at a pole.
+#: Smallest sine or cosine that divides derivatives of limb angles, which are infinite at a singularity.
 LEAST_SINE: Final = 0.02
 
-#: Smallest cosine by which derivatives of pelvis angles are divided.
+#: Smallest cosine that divides derivatives of pelvis angles.
 LEAST_COSINE: Final = 0.05
 
 #: Step of the finite differences of the caller's own residuals, metres.
@@ -47,29 +47,30 @@ PULL_STEP: Final = 1e-6
 FIRST_DAMPING: Final = 30.0
 LEAST_DAMPING: Final = 1.0
 
-#: A start has converged only with a damping up to the first value; it is given up above the second value (1/m^2).
+#: Largest damping at which a start can have converged, and damping above which a start is abandoned (1/m^2).
 ARRIVED_DAMPING: Final = 3e3
 MOST_DAMPING: Final = 1e6
 
-#: A start has converged if its next step promises a smaller decrease of chi2.
+#: A start has converged if the predicted decrease of chi2 in its next step is at most this.
 PRECISION: Final = 1e-2
 
-#: Ends of the 17 segments, and the matrix (17, 14) that takes joints to segments.
+#: Start and end joints of the 17 segments, and the matrix (17, 14) that maps joint positions to segment vectors.
 SEGMENT_STARTS, SEGMENT_ENDS = np.sort(SEGMENTS, axis=1).T
 INCIDENCE: Final = np.eye(14)[SEGMENT_ENDS] - np.eye(14)[SEGMENT_STARTS]
 
 #: Frames of `posekit.solver.problem.PROBLEM`.
 Records = NDArray[np.void]
 
-#: Function that returns residuals (N, K), standard deviations, of postures (N, 14, 3); zero for a posture that fits.
+#: Caller's function that returns residuals (N, K), in standard deviations, of postures (N, 14, 3); zero for a posture
+#: that fits.
 Pull = Callable[[Array], Array]
 
 
 class Normal:
-    """Normal equations of N postures along C unknowns: the coordinates of F free joints, then the size.
+    """Normal equations of N postures in C unknowns: the coordinates of F free joints, then the size.
 
-    chi2 (N,), matrix (N, C, C), gradient (N, C), and the residuals of joint limits (N, K), zero within the limits, with
-    their derivatives (N, K, C).
+    The attributes are chi2 (N,), matrix (N, C, C), gradient (N, C), the residuals `beyond` of joint limits (N, K), zero
+    within the limits, and their derivatives `slopes` (N, K, C - 1).
     """
 
     def __init__(self, count: int, width: int) -> None:
@@ -89,7 +90,7 @@ class Normal:
 
 
 def free_joints(parts: int) -> Ints:
-    """Return the indices (F,) of the joints that the parts free, ascending."""
+    """Return the indices (F,) of the joints of the free parts, ascending."""
     limbs = [joint for k in range(4) if parts >> (k + 1) & 1 for joint in LIMB_JOINTS[k][1:]]
     return np.sort([*range(6 * (parts & 1)), *limbs])
 
@@ -117,7 +118,7 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
     on_joints = keep[..., None] * np.einsum("nkji,nkjl->njil", on_place, on_place)
     on_lines = d[..., None] * d[..., None, :] + bend
     out.matrix[:, :-1, :-1] = _laid(np.concatenate([on_joints, on_lines], axis=1), to_joints)
-    # A size that is not varied keeps a unit on the diagonal.
+    # The diagonal element of a fixed size is one.
     on_size = np.where(w[:, None] > 0, -records["length_weight"][:, some], 0.0)
     shared = (to_joints[len(free) :].T @ (on_size[..., None] * d)).reshape(len(x), -1)
     out.matrix[:, -1, :-1] = out.matrix[:, :-1, -1] = shared
@@ -142,7 +143,8 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
 def _laid(blocks: Array, to_joints: Array) -> Array:
     """Return matrices (N, 3F, 3F) over F joints from blocks (N, P, 3, 3) over P points.
 
-    A point is a joint or a segment: the combination `to_joints` (P, F) of joints.
+    A point is a joint position or a segment vector: a linear combination of joints with coefficients `to_joints` (P,
+    F).
     """
     pairs = to_joints[:, :, None] * to_joints[:, None]
     laid = np.tensordot(blocks, pairs, (1, 0)).transpose(0, 3, 1, 4, 2)
@@ -175,10 +177,10 @@ def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) 
 
 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
-    """Yield the excess of angles over their limits, radians, and its derivatives along the joints.
+    """Yield the excess of angles over their limits, radians, and its derivatives by joint positions.
 
     If the trunk is free, the first pair (N, 3), (N, 3, 14, 3) belongs to the pelvis. A pair (N, 5), (N, 5, 14, 3) for
-    each free limb follows; its fifth row is curvature without a residual: see `_limb_slopes`.
+    each free limb follows; its fifth row has residual zero and adds only curvature (see `_limb_slopes`).
     """
     frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
@@ -216,7 +218,7 @@ def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w:
 
 
 def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, some: Flags) -> Array:
-    """Return the derivatives (N, 3, 14, 3) of the pelvis angles along the joints; zero except for `some` (N, 3)."""
+    """Return the derivatives (N, 3, 14, 3) of pelvis angles by joint positions; zero where `some` (N, 3) is False."""
     left, up = torso[:, :, 1], hips[:, :, 2]
     lean = dot(left, up)[:, None]
     square = np.maximum(1 - lean * lean, LEAST_COSINE**2)
@@ -231,7 +233,7 @@ def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, som
 def _limb_slopes(
     limits: Limits, joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array
 ) -> Array:
-    """Convert derivatives (M, 4, 4) of a limb's residuals along its angles into derivatives along the joints.
+    """Convert derivatives (M, 4, 4) of a limb's residuals by its angles to derivatives by joint positions.
 
     Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians: if an elbow or
     knee is almost straight, moving its end sideways in any direction increases the bend to second order.
@@ -386,11 +388,11 @@ def distinct(
     level: float,
     known: Array,
 ) -> Flags:
-    """Return a mask (N,) of the bodies, sorted by chi2 in each group, that differ from every better kept body.
+    """Return a mask (N,) of the bodies that differ from every kept body of lower chi2 in their group.
 
-    Two bodies are the same if no joint of `parts`, relative to the neck, differs by more than `within` (N,) metres.
-    They are also the same if no joint differs by more than `reach` metres and their difference d has
-    :math:`d^T H d` below `level`.
+    Bodies are sorted by group, then by chi2. Two bodies are the same if no joint of `parts`, relative to the neck,
+    differs by more than `within` (N,) metres. They are also the same if no joint differs by more than `reach` metres
+    and their difference d has :math:`d^T H d` below `level`.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
     free = free_joints(parts)

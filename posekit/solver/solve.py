@@ -1,4 +1,4 @@
-"""The method: minimise chi2 of trunks, then of each limb on each trunk, then of whole bodies made of both."""
+"""The method: minimise chi2 of trunks, then of each limb on each trunk, then of whole bodies that combine both."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIRST_STEPS: Final = 4
 #: Two trunks are the same if no joint, relative to the neck, differs by more than this.
 SAME_TRUNK_METRES: Final = 0.03
 
-#: Two limbs on one trunk are the same if neither joint differs by more than this: no, one or two hidden joints.
+#: Two limbs on one trunk are the same if neither joint differs by more than this, for no, one and two hidden joints.
 #:
 #: Every position of a hidden joint within its limits fits, so only representatives are kept.
 SAME_LIMB_METRES: Final = np.array([0.02, 0.25, 0.45])
@@ -35,8 +35,8 @@ LOOSE_LIMB: Final = 300.0
 #: Largest sum of the chi2 of trunk and limbs that is combined into a whole body.
 LOOSE_BODY: Final = 600.0
 
-#: A body is given up if its chi2 is above this multiple of the largest that passes, and its next step promises to
-#: remove less than half of it.
+#: A body is abandoned if its chi2 exceeds this multiple of the largest passing chi2, and the predicted decrease in its
+#: next step is less than half of its chi2.
 HOPELESS: Final = 2.0
 
 #: The same multiple for a trunk without limbs.
@@ -48,7 +48,7 @@ PULL_STEPS: Final = 15
 #: All parts: the trunk and the four limbs.
 WHOLE: Final = 31
 
-#: Largest number of whole bodies tried in a frame, the best ones; only frames with several hidden joints have more.
+#: Largest number of whole bodies tried in a frame, by lowest chi2; only frames with several hidden joints have more.
 MOST_BODIES: Final = 1500
 
 #: Smallest number of degrees of freedom of chi2: limits and lengths also contribute to it.
@@ -67,7 +67,7 @@ def solve(
     max_chi2 : float, optional
         Largest chi2 of a mode. If not given, noise exceeds it with `REJECTION_PROBABILITY`.
     most : int, optional
-        Largest number of modes a frame, the best ones; all if not given.
+        Largest number of modes per frame, by lowest chi2; all modes if not given.
     pull : callable, optional
         Function that returns further residuals (N, K), standard deviations, of postures (N, 14, 3), such as the excess
         over a check's bounds. Modes are refined with these residuals.
@@ -99,7 +99,7 @@ def solve(
 
 
 def _rank(group: Ints) -> Ints:
-    """Return the rank of each entry within its group; the groups ascend."""
+    """Return the rank of each entry within its group; groups are sorted in ascending order."""
     return np.arange(len(group)) - np.searchsorted(group, group)
 
 
@@ -131,8 +131,8 @@ def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
     """Combine trunks with limbs into whole bodies: frames (B,) and unknowns (B, 43)."""
     open_ = problem.sized | ~problem.rooted
     if open_[frame].any():
-        # At the depth of the trunk's own minimum a limb may be too short for its image; its near and far positions are
-        # then the same. So each trunk is first moved by a descent together with its best limbs.
+        # At the depth of the trunk's own minimum a limb may be too short for its image; its near and far positions then
+        # coincide. Therefore each trunk is first minimised together with its best limbs.
         row, body = _combined(problem, frame, x, chi2, most=1)
         row, body = row[open_[frame[row]]], body[open_[frame[row]]]
         body, value, _ = descend(problem, frame[row], body, WHOLE, hopeless=HOPELESS * passing[frame[row]])
@@ -163,7 +163,7 @@ def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -
         keep = distinct(problem, on, frame[on], alone, 2 << limb, SAME_LIMB_METRES[hidden], sure=True)
         keep &= _rank(on) < most
         on, ends, value = on[keep], alone[keep][:, column], value[keep]
-        # Every body so far with every position of this limb on its trunk.
+        # Combine every body so far with every position of this limb on its trunk.
         first = np.searchsorted(on, np.arange(len(frame) + 1))
         count = np.diff(first)[row]
         which = np.repeat(np.arange(len(row)), count)

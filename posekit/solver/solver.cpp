@@ -35,13 +35,14 @@ struct Problem {
   double size_weight, limit_weight, perspective, robust;
 };
 
-// Normal equations, and the rows of violated limits: three of the pelvis, and four of each limb.
+// Normal equations, and residuals of violated limits: three rows of the pelvis, and four of each limb.
 constexpr int ROWS = 19;
 struct Normal {
   double H[N][N], g[N], r[ROWS], d[ROWS][N];
 };
 
-// Residuals (radians, without the deviation) of a limb's four angles g in one writing; returns their sum of squares.
+// Residuals (radians, without the deviation) of a limb's four angles g in one Euler branch; returns their sum of
+// squares.
 double limb_residual(const Limits& L, int limb, const double g[4], const Reading& reading, int way, double out[4]) {
   const Written w = written(L, limb, g, reading, way, 0);
   const bool arm = limb < 2 && L.by_elevation > 0;
@@ -56,7 +57,7 @@ double limb_residual(const Limits& L, int limb, const double g[4], const Reading
   return total;
 }
 
-// The least violated writing, the usual one first (elbows bend the other way); residuals are in `out`.
+// The Euler branch with the smallest violation, the usual branch first; its residuals are in `out`.
 int least_writing(const Limits& L, int limb, const double g[4], const Reading& reading, double out[4], double& best) {
   const int ways = limb < 2 && L.by_elevation > 0 ? 2 : 4;
   int which = 0;
@@ -69,7 +70,7 @@ int least_writing(const Limits& L, int limb, const double g[4], const Reading& r
   return which;
 }
 
-// Adds one residual with its derivative along the unknowns.
+// Adds one residual and its derivative by the unknowns.
 void add_row(Normal& n, const double d[N], double r) {
   for (int i = 0; i < N; ++i)
     if (d[i] != 0) {
@@ -128,7 +129,7 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
     int way = least_writing(L, m, s.g, reading, r, total);
     chi2 += scale * scale * total;
     if (!n || total == 0) continue;
-    double slope[4][4];  // of each residual along each angle
+    double slope[4][4];  // of each residual by each angle
     for (int i = 0; i < 4; ++i) {
       double g[4] = {s.g[0], s.g[1], s.g[2], s.g[3]}, moved[4];
       g[i] += ANGLE_STEP;
@@ -151,7 +152,7 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
       if (trunk) put(t, START[m], du, -1), put_turn(t, R, between, w);
       add_limit(*n, 3 + 4 * m + k, t, scale * r[k]);
     }
-    // Curvature of an almost straight joint that bends too far, as `bend` of a length.
+    // Curvature of the residual of an almost straight joint that bends too far; compare `bend` of a length.
     const double bent = std::max(r[3] * slope[3][3] * ce, 0.0) * ie;
     if (bent > 0) {
       double t[N] = {};
@@ -166,7 +167,7 @@ double limit_terms(const Problem& p, const Limits& L, const double x[J][3], unsi
 
 bool freed(int joint, unsigned parts) { return parts >> (LIMB_OF[joint] + 1) & 1; }
 
-// Sum of squares at x; with `n` the normal equations.
+// Returns the sum of squares at x, and the normal equations in `n` unless it is null.
 double evaluate(const Problem& p, const Limits* limits, const double* at, unsigned parts, Normal* n) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
   const double size = at[42];
@@ -210,7 +211,7 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
     }
     chi2 += p.size_weight * p.size_weight * size * size;
     if (n) {
-      n->H[SIZE][SIZE] = sized ? p.size_weight * p.size_weight : 1;  // a size that is not varied keeps a unit
+      n->H[SIZE][SIZE] = sized ? p.size_weight * p.size_weight : 1;  // the diagonal element of a fixed size is one
       n->g[SIZE] = p.size_weight * p.size_weight * size;
     }
   }
@@ -222,7 +223,7 @@ double evaluate(const Problem& p, const Limits* limits, const double* at, unsign
     double r = w * (0.5 * std::log(q) - p.log_length[s] - size);
     chi2 += r * r;
     if (!n) continue;
-    double t = w / q, bend = std::max(w * r, 0.0) / q;  // curvature of a segment that turns, where it is positive
+    double t = w / q, bend = std::max(w * r, 0.0) / q;  // curvature of the length, if positive
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) h[i][k] = t * t * e[i] * e[k] + bend * ((i == k) - e[i] * e[k] / q);
     const double along = sized ? w : 0;
@@ -259,8 +260,8 @@ void cholesky(double M[K][K]) {
 constexpr int TRUNK_AT[T] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, SIZE};
 inline int limb_at(int m, int i) { return 3 * (i < 3 ? MID[m] : END[m]) + i % 3; }
 
-// Cholesky factors of the damped matrix: the limbs', what couples them to the trunk divided by these, and the trunk's
-// with the limbs eliminated.
+// Cholesky factors of the damped matrix: of each limb's block, of the coupling of limb and trunk (multiplied by the
+// inverse of the limb's factor), and of the trunk's block after the elimination of the limbs.
 struct Factor {
   double L[4][6][6], C[4][6][T], S[T][T];
   unsigned parts;
@@ -337,7 +338,7 @@ struct Factor {
 };
 
 // Levenberg-Marquardt; returns chi2. Limits that a refused step violates, but not its start, are added to the model of
-// the next step. `damping` is infinite in the end if x has converged or is given up.
+// the next step. At return, `damping` is infinite if x has converged or is abandoned.
 double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int most, double hopeless,
                double& damping) {
   Normal three[3], *here = three, *there = three + 1, *ahead = three + 2;
@@ -379,8 +380,8 @@ double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int
   return chi2;
 }
 
-// Adds the information of priors: on the place of every joint, on hidden joints about their modes, and on turns of
-// segments near a right angle to their rays (see modes.py).
+// Adds the information of priors: on the position of every joint, on hidden joints about their modes, and on rotations
+// of segments nearly perpendicular to their rays (see modes.py).
 void inform(Normal& n, const Problem& p, const double* at, unsigned parts, const double known[3]) {
   const double(*x)[3] = reinterpret_cast<const double(*)[3]>(at);
   for (int j = 0; j < J; ++j)
@@ -447,7 +448,7 @@ py::tuple descend_all(py::array problems, py::object limits, Longs which, Double
   return py::make_tuple(x, chi2, damping);
 }
 
-// Hands the information on the unknowns of each body to `take`.
+// Calls `take` with the information matrix of each body.
 template <typename Take>
 void informed(const py::array& problems, const py::object& limits, const Longs& which, const Doubles& at,
               const Doubles& known, Take take) {
@@ -477,7 +478,7 @@ py::array_t<double> covariance(py::array problems, py::object limits, Longs whic
   return found;
 }
 
-// Logarithms of the determinants (M,); NaN where one is not positive.
+// Logarithms of the determinants (M,); NaN if a determinant is not positive.
 py::array_t<double> log_determinants(py::array problems, py::object limits, Longs which, Doubles at, Doubles known) {
   py::array_t<double> found(which.size());
   informed(problems, limits, which, at, known, [&](py::ssize_t k, Normal& n) {
@@ -491,7 +492,7 @@ py::array_t<double> log_determinants(py::array problems, py::object limits, Long
   return found;
 }
 
-// Whether each body, sorted by chi2 in its group, differs from every better body that is kept: see modes.py.
+// Whether each body differs from every kept body of lower chi2 in its group: see modes.py.
 py::array_t<bool> distinct(py::array problems, py::object limits, Longs group, Longs which, Doubles at, unsigned parts,
                            Doubles within, double reach, double level, Doubles known) {
   const Problem* p = problems_of(problems);

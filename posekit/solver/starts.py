@@ -1,4 +1,4 @@
-"""Starts of the solver: seen joints near and far on their rays, hidden joints in many directions."""
+"""Initial positions for the solver: seen joints near and far on their rays, hidden joints in many directions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from posekit.solver.problem import Problem
 
 TRUNK: Final = 6
 TRUNK_SEGMENTS: Final = tuple(k for k, pair in enumerate(SEGMENTS) if max(pair) < TRUNK)
-#: The segment that lifts each joint from its parent.
+#: Index of the segment from each joint's parent to the joint.
 LIFTED: Final = {max(pair): k for k, pair in enumerate(SEGMENTS[:13])}
 
 #: Distances at which an unknown neck starts, as fractions of the largest distance at which the trunk fits its image.
@@ -35,7 +35,7 @@ def sphere(count: int) -> Array:
 #: Directions (30, 3) in which a hidden joint starts from its neighbour.
 DIRECTIONS: Final = sphere(30)
 
-#: Offsets of hidden hips from the hips of a straight trunk, metres: a pelvis turns by some 20 degrees.
+#: Offsets of hidden hips from the hips of a straight trunk, metres: a pelvis rotates by up to about 20 degrees.
 HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
 
 
@@ -82,7 +82,7 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
 def branches(
     problem: Problem, frame: Ints, joint: int, start: Array, ways: Array, hidden: Ints | int
 ) -> tuple[Ints, Array]:
-    """Return rows (S,), ascending, and ends (S, 3) of the segments that lift a joint from N starts.
+    """Return rows (S,), ascending, of parent positions `start` (N, 3), and the initial positions (S, 3) of their child.
 
     A seen joint is placed near and far on its ray. A hidden joint is placed in each of the first `hidden`, int or (N,),
     of the directions `ways` (N, W, 3).
@@ -112,10 +112,10 @@ def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
 
 
 def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
-    """Place the hidden joints of torso or hips: fit a straight trunk of the person's lengths to the seen joints.
+    """Place the hidden joints of torso or hips by fitting a straight trunk of the person's lengths to seen joints.
 
     One or two seen joints leave a rotation undetermined. The trunk is then fitted in `DIRECTIONS` different rotations,
-    each fixed by one more point beside the trunk.
+    each determined by one more point beside the trunk.
     """
     seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
     seen[:, part] = problem.seen_joints[frame, part]
@@ -166,7 +166,7 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     start, count = trunk[:, STARTS[limb]], len(DIRECTIONS)
     around = np.broadcast_to(DIRECTIONS, (len(frame), count, 3))
     row, middle = branches(problem, frame, MIDDLES[limb], start, around, count)
-    # Beyond a hidden joint the limb goes straight on, back, or at a right angle.
+    # After a hidden middle joint, the lower segment continues straight, folds back, or is at a right angle.
     upper = unit(middle - start[row])
     side = unit(cross(upper, np.where(np.abs(upper[:, 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])))
     bent = np.stack([upper, -upper, side] * (count // 3), axis=1)

@@ -17,12 +17,12 @@ constexpr int FIRST[J] = {0, 1, 3, 5, 7, 11, 15, 19, 23, 31, 39, 47, 55, 71};  /
 constexpr double PARALLEL = 1e-30, NEAR = 0.1;  // as in geometry/segments.py and validators/collision.py
 enum Kind { BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES };
 
-// Level, number of the first reason, and the numbers of a step of steps.py.
+// Level, number of the first reason, and then the numbers of a `Step` of steps.py.
 struct Step {
   double level, reason, kind, limb, tolerance, points[8], numbers[14];
 };
 struct Verdict {
-  int place;  // of the first violation, or PASSED
+  int place;  // place of the first violation; PASSED if there is none, UNKNOWN before the judgement
   double value, lower, upper;
   std::int64_t frame = -1;  // that was judged
 };

@@ -206,7 +206,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check, its level, the points that it reads, and its compiled steps; without a check, a joint's near or far branch."""
+    """A check, its level, the points that it reads, and its compiled steps; without a check, the branch of a joint."""
 
     level: int
     check: Any
