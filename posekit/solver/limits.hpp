@@ -199,7 +199,7 @@ Pelvis pelvis_of(const Frame& torso, const Frame& hips) {
   return s;
 }
 
-// What the check of joint ranges reports of a limb: rows angle, lower bound, upper bound, tolerance, degrees.
+// A limb as the check of joint ranges reports it: rows angle, lower bound, upper bound, tolerance, degrees.
 struct Stated {
   double row[4][4];
 };
