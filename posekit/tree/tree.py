@@ -112,10 +112,7 @@ class Trees:
     @cached_property
     def levels(self) -> NDArray[np.int64]:
         """Number of nodes at each level (F, 14) that have a survivor below them (Lee & Chen 1985, section 4.1.B)."""
-        shift = DEPTH - np.arange(DEPTH + 1)
-        key = (self.frame[:, None] << DEPTH | self.code[:, None]) >> shift  # ascending, as the survivors are
-        new = np.diff(key, axis=0, prepend=-1) > 0
-        return np.stack([np.bincount(self.frame[one], minlength=self.count) for one in new.T], axis=1)
+        return ancestors(self.frame, self.code, self.count)
 
     def pruned(self, frame: int) -> list[tuple[str, str, str, float, float, float, str]]:
         """List every pruned branch of a frame: its code, joint, reason, value, bounds and unit."""
