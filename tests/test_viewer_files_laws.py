@@ -17,7 +17,10 @@ import posekit
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.motion import Motion
 from posekit.synthesis import random_views
+from posekit.validators.report import joined
 from posekit.viewer.files import encoded, stride
+from posekit.viewer.page import data as data_module
+from posekit.viewer.page.data import page_data
 from posekit.viewer.scene import Stage
 from posekit.viewer.subjects import subjects_of
 from tests.test_report_laws import random_report
@@ -240,3 +243,62 @@ def test_image_points_are_ringed_where_they_are(seen: posekit.View, tmp_path: Pa
             radii.append(np.median(np.linalg.norm(away, axis=1)))
     assert len(off) > 5 and np.abs(np.median(off, axis=0)).max() < 0.3
     assert 2.0 < min(radii) and max(radii) < 3.5
+
+
+# Pages that leave something out
+
+
+def test_a_page_lists_the_worst_three_hundred_clips(tmp_path: Path) -> None:
+    report = random_report(7, (2,) * 301)
+    data = page_data(report, "x")
+    assert (len(data["clips"]), data["moreClips"]) == (300, 1)
+    left = set(range(301)) - {one["clip"] for one in data["clips"]}
+    order = [(one.decision == "keep", -one.severity) for one in report.clips]
+    assert [order[k] for k in left] == [max(order)]
+
+
+@pytest.mark.parametrize("most", [20, 45, 75, 90])
+def test_a_page_holds_the_worst_clips_that_have_room(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    motions = [walk(1.0, frames) for frames in (30, 25, 35)]
+    joints = [np.array(motion.joints) for motion in motions]
+    for k, bend in ((0, 0.3), (1, 0.5), (2, 0.1)):
+        joints[k][10, 8] += [0.0, bend, 0.0]
+    motions = [
+        Motion(joints=one, time=motion.time, up="+z") for one, motion in zip(joints, motions, strict=True)
+    ]
+    report = joined([posekit.validate(motion) for motion in motions])
+    monkeypatch.setattr(data_module, "MOST_FRAMES", most)
+    data = page_data(report, "x", view=motions)
+    worst = sorted(range(3), key=lambda k: -report.clips[k].severity)
+    assert worst == [1, 0, 2]
+    shown, room = [], most
+    for k in worst:
+        room -= len(motions[k])
+        shown += [k] * (room >= 0)
+    expected = [(k, frame) for k in sorted(shown) for frame in range(len(motions[k]))]
+    if most < 25:  # the worst clip alone has no room: the first frames
+        expected = [(0, frame) for frame in range(most)]
+    assert [(one["clip"], one["number"]) for one in data["frames"]] == expected
+    assert data["left"] == 90 - len(expected)
+
+
+def test_a_page_holds_the_likeliest_postures_and_all_representatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = posekit.recover(posekit.builtin_view("seq2"), checks=["collision"])
+    monkeypatch.setattr(data_module, "MOST_OF_FRAME", 5)
+    monkeypatch.setattr(data_module, "MOST_REASONS", 2)
+    data = page_data(found, "x")
+    for k, one in enumerate(data["frames"]):
+        rows = found.rows(k)
+        named = {*found.answer.representatives[k].tolist(), int(found.answer.survivor[k])}
+        kept = {*range(rows.start, min(rows.start + 5, rows.stop)), *named}
+        assert (one["held"], one["count"]) == (len(kept), rows.stop - rows.start)
+        rejected = sorted(found.frames.rejected[k].values(), reverse=True)
+        assert [count for _, count in one["rejected"]] == rejected[:2]
+        assert one["rejectedMore"] == sum(rejected[2:])
+    assert {one["unit"]: one["scale"] for one in data["margins"]} == {"mm": 1000.0}
+
+
+def test_margins_of_a_page_are_in_millimetres_or_degrees() -> None:
+    data = page_data(posekit.recover(posekit.builtin_view("seq1")), "x")
+    units = {one["name"]: (one["unit"], one["scale"]) for one in data["margins"]}
+    assert units == {"rigid-parts": ("mm", 1000.0), "joint-range": ("°", 1.0), "collision": ("mm", 1000.0)}
