@@ -79,8 +79,10 @@ def command(name: str, *examples: str) -> Callable[[Callable[..., Any]], click.C
 
 
 def option(*names: str, panel: str = "Options", **kwargs: Any) -> Callable[[Any], Any]:
-    """Declare an option of a panel."""
-    return click.option(*names, cls=Option, panel=panel, **kwargs)
+    """Declare an option of a panel; the help states its default, unless that is empty or a switch."""
+    default = kwargs.get("default")
+    shown_default = default not in (None, "") and not isinstance(default, bool)
+    return click.option(*names, cls=Option, panel=panel, **{"show_default": shown_default, **kwargs})
 
 
 def output(
@@ -114,47 +116,24 @@ def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     )
 
 
+#: Options that control how a file is read: names, default, metavar, help.
+READING: Final = (
+    (LAYOUT, "", "NAME|FILE.toml", "Names of the file's joints or columns. Default: recognised."),
+    (("--unit",), None, "m|cm|mm|in", "Unit of length. Default: the file's."),
+    (("--up",), None, "AXIS", "Axis that points up, as +z. Default: found."),
+    (("--rate", "--fps"), None, "HZ", "Frames a second where the file has no times."),
+    (("--urdf",), "", "NAME|FILE", "Robot whose configurations the file holds."),
+)
+
+
 def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Declare the options that control how a file is read."""
-    panel = "Reading"
-    robot = option(
-        "--urdf",
-        default="",
-        metavar="NAME|FILE",
-        panel=panel,
-        help="Robot whose configurations the file holds.",
-    )
+    rows = READING if urdf else READING[:-1]
     return apply(
-        option(
-            *LAYOUT,
-            default="",
-            metavar="NAME|FILE.toml",
-            panel=panel,
-            help="Names of the file's joints or columns. Default: recognised.",
-        ),
-        option(
-            "--unit",
-            default=None,
-            metavar="m|cm|mm|in",
-            panel=panel,
-            help="Unit of length. Default: the file's.",
-        ),
-        option(
-            "--up",
-            default=None,
-            metavar="AXIS",
-            panel=panel,
-            help="Axis that points up, as +z. Default: found.",
-        ),
-        option(
-            "--rate",
-            "--fps",
-            default=None,
-            metavar="HZ",
-            panel=panel,
-            help="Frames a second where the file has no times.",
-        ),
-        *([robot] if urdf else []),
+        *(
+            option(*names, default=default, metavar=metavar, help=text, panel="Reading")
+            for names, default, metavar, text in rows
+        )
     )
 
 

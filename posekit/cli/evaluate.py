@@ -22,10 +22,8 @@ from posekit.settings import RecoverSettings
     "--truth", default=None, metavar="FILE", help="True joints of a result: a view with truth, or motion."
 )
 @option("--noise", default="0,2", metavar="LIST", help="Standard deviations of the image points, pixels.")
-@option(
-    "--views", default=24, metavar="N", type=click.IntRange(1), help="Views of a motion.", show_default=True
-)
-@option("--seed", default=0, type=click.IntRange(0), help="Seed of the random numbers.", show_default=True)
+@option("--views", default=24, metavar="N", type=click.IntRange(1), help="Views of a motion.")
+@option("--seed", default=0, type=click.IntRange(0), help="Seed of the random numbers.")
 @reading(urdf=False)
 @settings_options(RecoverSettings, {"checks": "LIST", "length_deviation": "SHARE"})
 def evaluate(

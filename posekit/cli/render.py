@@ -31,7 +31,7 @@ from posekit.cli.command import command, option, output, reading, say
     metavar="WHICH",
     help="answer, path, all, first, numbers as 0,4; or angles, timeline for plots.",
 )
-@option("--size", default="1280x720", metavar="WxH", help="Pixels.", show_default=True)
+@option("--size", default="1280x720", metavar="WxH", help="Pixels.")
 @option("--azimuth", type=float, default=None, metavar="DEGREES", help="0 looks from the front.")
 @option("--elevation", type=float, default=None, metavar="DEGREES", help="Above the level.")
 @option("--over", default=None, metavar="PICTURES", help="Picture, folder or film to draw over.")

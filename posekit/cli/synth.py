@@ -24,9 +24,7 @@ def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Calla
     """Declare the options of every kind of view."""
     return apply(
         output("VIEW", "View file to write, .json."),
-        option(
-            "--frames", default=frames, type=click.IntRange(1), metavar="N", help="Frames.", show_default=True
-        ),
+        option("--frames", default=frames, type=click.IntRange(1), metavar="N", help="Frames."),
         option(
             "--noise",
             default=0.0,
@@ -34,28 +32,17 @@ def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Calla
             metavar=noise_unit,
             help="Noise of the image points.",
         ),
-        option(
-            "--seed", default=0, type=click.IntRange(0), help="Seed of the random numbers.", show_default=True
-        ),
+        option("--seed", default=0, type=click.IntRange(0), help="Seed of the random numbers."),
     )
 
 
 @synth.command("walker", cls=Command, examples=["posekit synth walker -o walk.json --camera 400,0,0"])
 @shared(5, "CM")
-@option(
-    "--camera", default="400,0,0", metavar="X,Y,Z", help="Camera in the head's frame, cm.", show_default=True
-)
-@option(
-    "--dt",
-    default=0.2,
-    type=click.FloatRange(0),
-    metavar="S",
-    help="Seconds between frames.",
-    show_default=True,
-)
-@option("--velocity", default=1.0, type=float, help="Leg lengths a second, 0.5 to 1.3.", show_default=True)
-@option("--lean", default=0.0, type=float, metavar="DEGREES", help="Additional forward lean of the back.")
-@option("--phase", default=0.0, type=float, metavar="CYCLES", help="Phase of the first frame.")
+@option("--camera", default="400,0,0", metavar="X,Y,Z", help="Camera in the head's frame, cm.")
+@option("--dt", default=0.2, type=click.FloatRange(0), metavar="S", help="Seconds between frames.")
+@option("--velocity", default=1.0, help="Leg lengths a second, 0.5 to 1.3.")
+@option("--lean", default=0.0, metavar="DEGREES", help="Additional forward lean of the back.")
+@option("--phase", default=0.0, metavar="CYCLES", help="Phase of the first frame.")
 def walker(
     output: Path,
     frames: int,
@@ -80,9 +67,7 @@ def walker(
 
 @synth.command("random", cls=Command, examples=["posekit synth random -o random.json --frames 100"])
 @shared(1, "PX")
-@option(
-    "--distance", default="2.5,6", metavar="MIN,MAX", help="Distances of the cameras, m.", show_default=True
-)
+@option("--distance", default="2.5,6", metavar="MIN,MAX", help="Distances of the cameras, m.")
 @option("--uncalibrated", is_flag=True, help="Write the view without its camera.")
 def random(output: Path, frames: int, noise: float, seed: int, distance: str, uncalibrated: bool) -> None:
     """Draw random legal postures, each seen from anywhere on a sphere."""
