@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -67,7 +68,7 @@ class LengthUncertainty(Record):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the numbers: a read-only mapping cannot be pickled."""
-        return _uncertainty, (self.common, dict(self.own))
+        return partial(LengthUncertainty, common=self.common, own=dict(self.own)), ()
 
     def __hash__(self) -> int:
         """Hash the numbers."""
@@ -107,10 +108,6 @@ class LengthUncertainty(Record):
     def total(self, segment: str) -> float:
         """Return the standard deviation of one length's logarithm."""
         return math.hypot(self.common, self.own[segment])
-
-
-def _uncertainty(common: float, own: Mapping[str, float]) -> LengthUncertainty:
-    return LengthUncertainty(common=common, own=own)
 
 
 def _varying(deviation: float, non_rigid: float) -> dict[str, float]:

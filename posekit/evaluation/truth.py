@@ -10,7 +10,9 @@ import numpy as np
 
 from posekit.cameras import PinholeCamera, View
 from posekit.errors import refusal
-from posekit.geometry import PER_METRE, Array
+from posekit.formats.node import Node
+from posekit.formats.view_file import camera_from
+from posekit.geometry import Array
 from posekit.motion import Motion
 from posekit.recovery import Recovery
 from posekit.skeleton import JOINTS
@@ -70,7 +72,8 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
         If the truth has other frames than the view, or if the motion cannot be placed in front of the camera.
     """
     if isinstance(given, Motion):
-        camera, image = _camera_of(result), np.full((len(result), len(JOINTS), 2), np.nan)
+        camera = camera_from(Node(result.camera, result.source), result.unit) if result.camera else None
+        image = np.full((len(result), len(JOINTS), 2), np.nan)
         if isinstance(camera, PinholeCamera):
             for k in range(len(result)):
                 if len(result[k]):
@@ -85,21 +88,6 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
         expected = f"known joints of shape ({len(result)}, {len(JOINTS)}, 3)"
         raise refusal(result.source, "truth", f"shape {truth.shape}", expected, "give these frames' truth")
     return truth, ""
-
-
-def _camera_of(result: Recovery) -> Any:
-    """Return the pinhole camera of a result with its pose; None if the camera is not a pinhole."""
-    fields = result.camera
-    if fields.get("model") != "opencv":
-        return None
-    t = fields.get("t")
-    return PinholeCamera(
-        K=fields["K"],
-        distortion=fields.get("distortion"),
-        fisheye=bool(fields.get("fisheye", False)),
-        R=fields.get("R"),
-        t=None if t is None else np.asarray(t) / PER_METRE[result.unit],
-    )
 
 
 def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Array, str]:

@@ -292,12 +292,9 @@ def _named(labels: tuple[str, ...], count: int, order: str, options: Options) ->
     return labels
 
 
-def _g1() -> Sequence[str]:
-    return load_layout("g1_29").fields["joints"]  # type: ignore[no-any-return]
-
-
 def _robot_of(labels: Sequence[str]) -> str:
-    return "g1" if labels and set(labels) <= set(_g1()) else ""
+    known = load_layout("g1_29").fields["joints"]
+    return "g1" if labels and set(labels) <= set(known) else ""
 
 
 def _radians(joints: Array, unit: str, options: Options) -> Array:
