@@ -422,9 +422,9 @@ def cloud_of(name: str) -> tuple[Any, Any]:
     return cloud, motion
 
 
-def test_an_error_about_a_shape_names_the_layouts(tmp_path: Path) -> None:
+def test_an_error_about_a_shape_names_the_remedy(tmp_path: Path) -> None:
     np.save(tmp_path / "flat.npy", np.zeros((10, 17, 2)))
-    with pytest.raises(posekit.InputError, match=r"coco_17.*recover them"):
+    with pytest.raises(posekit.InputError, match=r"points in pictures: recover them"):
         posekit.open(tmp_path / "flat.npy")
     np.save(tmp_path / "odd.npy", np.random.default_rng(0).normal(size=(10, 21, 3)))
     with pytest.raises(posekit.InputError, match=r"--layout"):
