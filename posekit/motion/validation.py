@@ -52,7 +52,7 @@ def validate(
     profile: str | None = None,
     ground: str | float | None = None,
 ) -> Report:
-    """Judge postures and motion from files, folders, patterns, arrays, `Motion` or results.
+    """Judge postures and motion: files, folders, patterns, arrays, `Motion` objects or results.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def validate(
     urdf : str, path, Figure or Robot
         Body to judge with, as for `posekit.Validator`. By default the robot that a file names, else the figure.
     layout, unit, up, rate, person
-        Facts that files and arrays do not state: see `posekit.open`. The points of an array (T, J, 3) with a `layout`
-        are in the layout's order.
+        Facts that the files or the array do not state: see `posekit.open`. The points of an array (T, J, 3) with a
+        `layout` are in the layout's order.
     keep : path, optional
         New folder for the clips that pass: see `keep_clips`.
     keep_spans : float or str, optional
@@ -81,7 +81,7 @@ def validate(
     Raises
     ------
     InputError
-        If the only file cannot be read, none of several files can be judged, or a setting is wrong.
+        If a single file cannot be read, if none of several files can be judged, or if a setting is wrong.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def validate(
 
 
 class Judge:
-    """Body and settings for judging, loaded once for all files.
+    """The body and the settings that judge, loaded once for all files.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Judge:
     urdf : str, path, Figure or Robot
         The body that judges; empty for the robot that a file names, else the figure.
     changes : mapping
-        Single fields of the settings.
+        Fields of the settings that replace those of `settings`.
     """
 
     def __init__(self, settings: ValidateSettings | None, urdf: Any, changes: Mapping[str, Any]) -> None:
@@ -123,7 +123,7 @@ class Judge:
 
     @property
     def name(self) -> str:
-        """Name of the robot, for readers of tables; empty for the figure."""
+        """Name of the robot, which readers of tables need; empty for the figure."""
         name = str(getattr(self.urdf, "name", self.urdf) or "")
         return "" if name in ("figure", "stick_figure") else name
 
@@ -211,7 +211,7 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
 
 
 def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Report:
-    """Judge files one after the other; if there are several, the report lists those that cannot be read."""
+    """Judge files one after the other; the report of several files lists the files that cannot be read."""
     import posekit
 
     reports: list[Report] = []
@@ -246,7 +246,7 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
 
 
 def _of_file(report: Report) -> tuple[str, ...]:
-    """Return the notes of a report, each preceded by the name of its file, except notes about the ground."""
+    """Return the notes of a report; each begins with the name of the file, except notes about the ground."""
     name = Path(report.files[0]).name if report.files else ""
     return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
 

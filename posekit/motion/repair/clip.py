@@ -54,7 +54,7 @@ DEPTH_METRES: Final = 5e-5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clip:
-    """One recording of points, with the frames and remedies that changed it.
+    """One recording of points during a repair, with the frames and the remedies that were changed and applied so far.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Clip:
         return len(self.state)
 
     def following(self, first: Clip) -> Self:
-        """Return this clip with the changes of `first` included: this clip was started from the result of `first`."""
+        """Return this clip with the history of `first`, whose result this clip started from."""
         return replace(
             self,
             motion=first.motion,
@@ -119,12 +119,12 @@ class Clip:
 
     @property
     def own_rows(self) -> Ints:
-        """Index in `motion` (T,) of each frame; an inserted frame has the index of the frame before it."""
+        """Index in `motion` of each frame (T,); an inserted frame has the index of the frame before it."""
         return self.rows[np.maximum.accumulate(np.where(self.rows < 0, 0, np.arange(len(self))))]
 
     @property
     def entries(self) -> Sequence[str]:
-        """Names of the points, or of the entries of q, in the state of one frame."""
+        """Names of the columns of `state`: points, or entries of q."""
         return NAMES
 
     def as_motion(self) -> Motion:
@@ -140,13 +140,13 @@ class Clip:
         )
 
     def checks(self, *, over_time: bool) -> list[Check]:
-        """Return the chosen checks over time, or the chosen checks of single postures."""
+        """Return the chosen checks: those over time, or those of single postures."""
         of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
 
     def report(self, *, over_time: bool) -> Report:
-        """Return the report of the checks over time, or of the checks of postures; at least one must be chosen."""
+        """Return the report of the checks over time, or of those of single postures; some must be chosen."""
         validator = copy(self.validator)
         validator.settings = self.validator.settings.changed(checks=self.checks(over_time=over_time))
         return validator.check(self.as_motion())
@@ -181,7 +181,7 @@ class Clip:
         return replace(self, state=out, filled=filled)
 
     def placed(self) -> Flags:
-        """Return whether the joints of the trunk are known in each frame (T,): without them no body can be placed."""
+        """Return whether each frame (T,) knows the joints of the trunk, without which no body can be placed."""
         return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
@@ -199,7 +199,7 @@ class Clip:
         return replace(self, state=self.state + by[:, None])
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
-        """Smooth each point in the frames in which it is loose (T, P); head and feet as neck and ankles."""
+        """Smooth each point in the frames that `loose` (T, P) marks; head and feet follow neck and ankles."""
         loose = loose.copy()
         loose[:, len(JOINTS) :] = loose[:, PIECE_PARENTS[len(JOINTS) :]]
         loose &= np.isfinite(self.state).all(axis=(0, 2))
@@ -261,7 +261,7 @@ class Clip:
         return np.where(np.isnan(every), np.inf, every)
 
     def eased(self, rows: Ints, goal: Array) -> Self:
-        """Move some frames (n,) toward goals (n, …) until they pass; a frame whose goal is rejected stays."""
+        """Move some frames (n,) toward goal states (n, …) until they pass; a frame with a rejected goal stays."""
         start = self.state[rows]
         low, high = np.zeros(len(rows)), np.full(len(rows), np.nan)
         share = np.ones(len(rows))
@@ -296,9 +296,9 @@ class Clip:
         return self.report(over_time=False).invalid[rows]
 
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
-        """Return two good states for some frames (n,): interpolated between frames that pass, and the nearest of them.
+        """Return two valid states for some frames (n,): interpolated between valid frames, and the nearest one.
 
-        If fewer than two frames pass, both are the posture at rest.
+        If fewer than two frames are valid, both states are the posture at rest.
         """
         if not self.motion.in_time or passing.sum() < 2:
             rest = self.laid(np.repeat(self.rest()[None], len(rows), axis=0), rows)
@@ -315,7 +315,7 @@ class Clip:
         return np.concatenate([body.figure.neutral_points, np.full((len(FEET), 3), np.nan)])
 
     def laid(self, state: Array, rows: Ints) -> Array:
-        """Return states (n, …) moved rigidly so that their trunks lie on the trunks of some frames (n,)."""
+        """Return states (n, …), moved rigidly so that their trunks coincide with the trunks of some frames (n,)."""
         found = align(state[:, TRUNK], self.state[rows][:, TRUNK], scale=False)
         turned = np.einsum("nij,npj->npi", found.rotation, state)
         return np.asarray(turned + found.translation[:, None])
@@ -336,7 +336,7 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
 
 
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
-    """Return the n bad frames, the good frames before and after each, and the share (n,) of the way between them.
+    """Return the n bad frames, the good frames before and after each, and its position (n,) between them, 0 to 1.
 
     At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
     frames the result is empty.
@@ -401,7 +401,7 @@ class RobotClip(Clip):
         return self.carried(start, end, share)
 
     def restored(self, rows: Ints, given: Array) -> Self:
-        """Return the clip unchanged: a push moves only the joints that it must."""
+        """Return the clip unchanged, because `pushed` moves no other joints than the rejected ones."""
         return self
 
     def shifted(self, by: Array) -> Self:
@@ -412,7 +412,7 @@ class RobotClip(Clip):
         return replace(self, state=out)
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
-        """Smooth each entry of q in the frames in which it is loose (T, nq)."""
+        """Smooth each entry of q in the frames that the mask `loose` (T, nq) selects."""
         out = self.state.copy()
         # Quaternions whose signs agree can be smoothed component by component.
         if self.validator.robot.free_flyer:
@@ -439,7 +439,7 @@ class RobotClip(Clip):
     def pushed(self, rows: Ints, report: Report) -> Array:
         """Bring joints within the limits of the URDF, and move bodies apart.
 
-        The root stays, and so do joints that do not move in the recording: its file may have no column for them.
+        The root stays. Joints that never move in the recording stay, too, because its file may have no column for them.
         """
         robot, model = self.validator.robot, self.validator.robot.model
         lower, upper = robot.lower + INSIDE_LIMITS, robot.upper - INSIDE_LIMITS

@@ -1,4 +1,4 @@
-"""Write a repaired motion into the user's BVH file: only the channels that must change do."""
+"""Write a repaired motion into the user's BVH file; channels that the repair does not affect stay as they are."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
 
 
 def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
-    """Return the node of the file at each point of the motion.
+    """Return the index of the file's node that each point of the motion comes from.
 
     If several nodes lie at one point, the node nearest to the next joint of the limb is chosen.
     """
@@ -79,7 +79,7 @@ def _above(document: Bvh, node: int) -> list[int]:
 
 
 def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[Ints, int]:
-    """Return the rigid piece of each node (P,), -1 for ancestors of the body, and the node at which the body starts."""
+    """Return the rigid piece of each node (P,), -1 for ancestors of the body, and the first node of the body."""
     limbs = [[nodes.get(JOINTS[joint]) for joint in limb[:2]] for limb in LIMB_JOINTS]
     ways = [set(_above(document, start)[1:]) for start, _ in limbs if start is not None]
     common = set.intersection(*ways) if ways else {0}
@@ -122,7 +122,7 @@ def _with_rotation(document: Bvh, values: Array, node: int, R: Array) -> Array:
     """Return channels (T, C) with new rotations R (T, 3, 3) of a node.
 
     Among equivalent Euler angles the ones nearest to the present angles are chosen. A node with fewer than three
-    rotation channels takes the part of R that its channels can express.
+    rotation channels gets the part of R that these channels can represent.
     """
     at, axes = _channels(document, node, rotations=True)
     order = "".join("XYZ"[axis] for axis in [*axes, *({0, 1, 2} - set(axes))])

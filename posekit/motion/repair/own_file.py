@@ -1,4 +1,4 @@
-"""Write a repaired motion into the user's table or arrays: only numbers that the repair changed are replaced."""
+"""Write a repaired motion into the user's table or arrays; only the numbers that the repair changed are replaced."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def in_own_file(
 ) -> tuple[bytes, list[str]]:
     """Return the user's table or arrays with the numbers that a repair changed.
 
-    Columns are recognised by their numbers: a column, or the mean of two markers' columns, equals an entry of the
-    motion times a factor. Such a column changes as its entry does; all other columns and all names stay. Gaps of a
+    Columns are recognised by their numbers: a column, or the mean of the columns of two markers, equals an entry of the
+    motion times a factor. Such a column gets the change of its entry. All other columns and all names stay. Gaps of a
     column are filled; gaps of the two markers of one joint are not.
 
     Parameters
@@ -109,7 +109,7 @@ def in_own_file(
 
 
 def _groups(before: Motion, after: Motion) -> list[tuple[Array, Array, Any]]:
-    """Return groups of entries of one unit: values before (T, K) and after (T', K) the repair, and factors as above."""
+    """Return groups of entries with one unit: values before (T, K) and after (T', K), and possible factors."""
     counted = (_counted(before), _counted(after), COUNTS)
     if before.q is None:
         old, new = (np.asarray(one.joints).reshape(-1, 3 * len(one.joint_names)) for one in (before, after))
@@ -154,7 +154,7 @@ def _columns_of(
 
 
 def _apart(values: Array, wanted: Array) -> Array:
-    """Return the largest difference in the frames in which `wanted` is known; infinite if it is unknown in all."""
+    """Return the largest difference over the frames in which `wanted` is known; infinite if there is no such frame."""
     known, off = np.isfinite(wanted), np.nan_to_num(np.abs(values - wanted), nan=np.inf)
     off = np.where(known, off, 0.0).max(axis=0, initial=0.0)
     return np.where(known.any(axis=0), off, np.inf)

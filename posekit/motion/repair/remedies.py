@@ -49,9 +49,10 @@ Remedy = Callable[[Clip, Report], Iterator[Clip]]
 def mended(clip: Clip, *, filled: bool = False) -> Clip:
     """Return a clip with fewer findings.
 
-    First the remedies for order, labels and jumps are tried; then rejected postures are replaced; then all remedies
-    are tried, because wrong postures also cause trembling and sliding; then rejected postures are replaced again. If
-    `filled`, all rejected frames, and unknown points of the other frames, are interpolated at the start.
+    There are four steps. Remedies for frame order, exchanged labels and jumps are tried. Rejected postures are
+    replaced. All remedies are tried, because wrong postures also cause trembling and sliding. Rejected postures are
+    replaced again. If `filled`, all rejected frames, and unknown points of the other frames, are interpolated at the
+    start.
     """
     if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
@@ -86,7 +87,7 @@ def _count(report: Report) -> int:
 
 
 def _numbers(report: Report, check: str, place: str, column: str = "value") -> Array:
-    """Return a column of the findings of a check at a place (T,); 0 in frames without a finding."""
+    """Return one column of a check's findings at one place, by frame (T,); 0 in frames without a finding."""
     found, out = report.findings, np.zeros(len(report))
     if check in report.checks and place in report.places:
         mine = (found["check"] == report.checks.index(check)) & (found["place"] == report.places.index(place))
@@ -110,7 +111,7 @@ def _reorder(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _exchange(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Exchange right and left: the rejected pairs in the rejected frames, or all points in all frames."""
+    """Exchange right and left: for the rejected pairs in the rejected frames, or for all points in all frames."""
     pairs = rejected(report, "swap", places=SIDE_PAIRS)
     if not pairs.any():
         return
@@ -144,7 +145,7 @@ def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Undo sudden displacements of the whole body that last, so that interpolation cannot remove them.
+    """Undo sudden lasting displacements of the whole body, which interpolation cannot remove.
 
     The frames before or after the displacement are shifted, such that as many frames as possible stay.
     """
@@ -199,7 +200,7 @@ def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Lift a body that is below the ground and lower one that floats, by one shift a span or frame by frame."""
+    """Lift a body that is below the ground, and lower a floating body: by one shift per span, or frame by frame."""
     up = clip.motion.up_vector
     low, high = (_numbers(report, check, "lowest") for check in ("penetration", "floating"))
     beyond = [_numbers(report, check, "lowest", "margin") for check in ("penetration", "floating")]

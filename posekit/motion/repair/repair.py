@@ -1,4 +1,4 @@
-"""`repair`: find a nearby motion that passes all checks, write it in the user's file, and report invented frames."""
+"""`repair`: find a nearby motion that passes all checks, write it into the user's file, and list invented frames."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Repaired(Record):
     before, report : Report
         Reports about the given motion, and about the repaired motion as it is read from its file.
     notes : tuple of str
-        Changes, invented frames and remaining defects, one sentence each.
+        Sentences about changes, invented frames and remaining defects.
     data : bytes
         Contents of the repaired file, with the user's names and columns; empty if `posekit.save` writes the motion.
     """
@@ -72,7 +72,7 @@ class Repaired(Record):
         return list(self.notes)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the repaired motion; if the format is that of its file, with the names and columns of that file.
+        """Write the repaired motion. In the format of its own file, it keeps the names and columns of that file.
 
         Raises
         ------
