@@ -90,14 +90,37 @@ def test_positions_go_to_q_and_back(figure, outside):
 
 
 @any_figure
-def test_legal_postures_have_legal_configurations(figure):
-    drawn = configurations(figure)
+@pytest.mark.parametrize("abducted", [False, True])
+def test_legal_postures_have_legal_configurations(figure, abducted):
+    """Arms that are abducted by 90 degrees can be turned about their own axis by flexion and by rotation."""
+    drawn = configurations(figure, 4000 if abducted else 200)
+    if abducted:
+        arms = [k for k, dof in enumerate(DOFS) if dof.endswith("shoulder.abduction")]
+        drawn[:, figure.angle_index[arms]] = np.pi / 2
     if figure.pelvis_between_hips:
         drawn[:, figure.angle_index[3:6]] = 0.0  # the joints do not determine the flexion of this pelvis
     angles = figure.configurations(figure.forward_kinematics(drawn)).q[:, figure.angle_index]
     assert (np.maximum(figure.limits.lower - angles, angles - figure.limits.upper) < 1e-9).all()
     hinges = [k for k, dof in enumerate(DOFS) if dof.endswith(("elbow.flexion", "knee.flexion"))]
     np.testing.assert_allclose(angles[:, hinges], drawn[:, figure.angle_index[hinges]], atol=1e-7)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_an_abducted_arm_is_legal_whatever_its_limits_are(sign):
+    """At an abduction of 90 degrees flexion and rotation turn the arm about one axis: their sum alone is seen."""
+    rng = np.random.default_rng(0)
+    arms = np.array([DOFS.index(f"{side}_shoulder.abduction") for side in ("right", "left")])
+    for _ in range(150):
+        lower, upper = FIGURE.limits.lower.copy(), FIGURE.limits.upper.copy()
+        for k in arms:
+            ends = np.sort(rng.uniform(-2.5, 2.5, (2, 2)), axis=0)
+            lower[k - 1 : k + 2 : 2], upper[k - 1 : k + 2 : 2] = ends
+        lower[arms], upper[arms] = sign * np.pi / 2 - 0.3, sign * np.pi / 2 + 0.3
+        q = configurations(FIGURE, 10, seed=int(rng.integers(1000)))
+        q[:, FIGURE.angle_index] = rng.uniform(lower, upper, (10, len(DOFS)))
+        q[:, FIGURE.angle_index[arms]] = sign * np.pi / 2
+        found = FIGURE.ik.with_limits(lower, upper).angles(FIGURE.forward_kinematics(q))
+        assert (np.maximum(lower - found, found - upper)[:, 6:] < 1e-6).all()
 
 
 def test_no_branch_violates_the_limits_less():

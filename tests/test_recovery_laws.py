@@ -16,6 +16,7 @@ import posekit
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
+from posekit.settings import MEASURED
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, other_side
 from posekit.synthesis import forget_camera, random_views
 from tests.test_cli import folder, run
@@ -267,3 +268,30 @@ def test_lengths_grow_with_the_stature_whoever_states_it(view: posekit.View, pro
         assert tall == pytest.approx(posekit.load_figure().scaled(stature=1.95).lengths)
     else:
         assert tall != pytest.approx(posekit.load_figure().scaled(stature=1.95).lengths, rel=0.01)
+
+
+def test_looser_tolerances_keep_every_stricter_survivor_and_have_a_reason_where_none_is() -> None:
+    """Parts of a tolerance that are not given are those for measured people."""
+    seen = posekit.builtin_view("seq1")
+    image = np.array(seen.image)
+    image[2, JOINTS.index("left_knee")] = np.nan
+    seen = replace(seen, image=image)
+    settings = [posekit.RecoverSettings(rigid_tolerance=size) for size in (0.001, 0.01)]
+    strict, loose = (posekit.recover(seen, one) for one in settings)
+    assert set(loose.frames.judged) == {"tolerated"} and len(loose.survivors) > len(strict.survivors)
+    for k in (0, 1, 3, 4):
+        assert len(strict[k]) and {*strict[k].branch} <= {*loose[k].branch}
+    assert not len(loose[2]) and loose.frames.reason[2] == "its neck is not known, or a joint is not seen"
+    whole = posekit.RecoverSettings(
+        rigid_tolerance=0.01, tangent_tolerance=MEASURED.tangent, angle_tolerance=MEASURED.angle
+    )
+    np.testing.assert_array_equal(posekit.recover(seen, whole).survivors.joints, loose.survivors.joints)
+    other = posekit.RecoverSettings(rigid_tolerance=0.01, tangent_tolerance=0.001, angle_tolerance=0.1)
+    assert len(posekit.recover(seen, other).survivors) < len(loose.survivors)
+
+
+def test_a_search_of_depths_is_the_default_and_rules_are_numbers_in_text() -> None:
+    assert posekit.RecoverSettings(root="search") == posekit.RecoverSettings()
+    assert posekit.RecoverSettings(rules="1, 3,5").rules == (1, 3, 5)
+    with pytest.raises(posekit.InputError, match="expected some of 1, 2, 3, 4, 5"):
+        posekit.RecoverSettings(rules=(0, 1))
