@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import pickle
+import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -104,3 +109,61 @@ def test_the_last_clip_and_the_first_are_numbers_of_clips(tmp_path: Path) -> Non
     np.savez(tmp_path / "a.npz", joints=joints, clip=clip + 1, clip_names=np.array(["a", "b"]), fps=RATE)
     with pytest.raises(posekit.InputError, match="below 2"):
         posekit.open(tmp_path / "a.npz")
+
+
+class JoblibPickler(pickle._Pickler):  # type: ignore[name-defined]
+    """Write an array as a wrapper, padding to 16 bytes if aligned, and its bytes (joblib/numpy_pickle.py)."""
+
+    def __init__(self, file: Any, order: Any, aligned: bool) -> None:
+        super().__init__(file, protocol=3)
+        self.file, self.order, self.aligned = file, order, aligned
+
+    def save(self, thing: Any, *options: Any) -> None:
+        if not isinstance(thing, np.ndarray):
+            super().save(thing, *options)  # type: ignore[misc]
+            return
+        wrapper = sys.modules["joblib.numpy_pickle"].NumpyArrayWrapper()
+        vars(wrapper).update(subclass=np.ndarray, shape=thing.shape, order=self.order, dtype=thing.dtype)
+        vars(wrapper).update(numpy_array_alignment_bytes=16 if self.aligned else None)
+        super().save(wrapper)  # type: ignore[misc]
+        if self.aligned:
+            padding = 16 - (self.file.tell() + 1) % 16
+            self.file.write(bytes([padding]) + padding * b"\xff")
+        self.file.write(thing.tobytes(self.order))
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("aligned", [False, True])
+@pytest.mark.parametrize("packed", [False, True])
+def test_arrays_of_joblib_are_read(order: str, aligned: bool, packed: bool, tmp_path: Path) -> None:
+    motion = walking()
+    modules = {name: type(sys)(name) for name in ("joblib", "joblib.numpy_pickle")}
+    wrapper = type("NumpyArrayWrapper", (), {"__module__": "joblib.numpy_pickle"})
+    vars(modules["joblib.numpy_pickle"])["NumpyArrayWrapper"] = wrapper
+    file = io.BytesIO()
+    with mock.patch.dict(sys.modules, modules):
+        clip = {"joint_names": list(POINTS), "joints": motion.points(POINTS), "fps": RATE}
+        JoblibPickler(file, order, aligned).dump(clip)
+    data = zlib.compress(file.getvalue()) if packed else file.getvalue()
+    (tmp_path / "clip.pkl").write_bytes(data)
+    found = posekit.open(tmp_path / "clip.pkl")
+    assert found.rate == pytest.approx(RATE)
+    np.testing.assert_array_equal(found.points(POINTS), motion.points(POINTS))
+
+
+@pytest.mark.parametrize("protocol", [0, 1, 2, 4])
+@pytest.mark.parametrize("wrapped", ["array", "list of one", "object array", "dict of dict"])
+def test_protocols_and_wrappings_of_pickles_read_alike(protocol: int, wrapped: str, tmp_path: Path) -> None:
+    clip: Any = {"joint_names": list(POINTS), "joints": walking().points(POINTS), "fps": RATE}
+    if wrapped == "array":
+        clip = {**clip, "joint_names": np.array(POINTS), "fps": np.array(RATE, dtype=object)}
+    elif wrapped == "list of one":
+        clip = [clip]
+    elif wrapped == "object array":
+        clip = np.array(clip, dtype=object)
+    else:
+        clip = {"a clip": clip}
+    (tmp_path / "clip.pkl").write_bytes(pickle.dumps(clip, protocol=protocol))
+    found = posekit.open(tmp_path / "clip.pkl")
+    assert found.rate == pytest.approx(RATE)
+    np.testing.assert_array_equal(found.points(POINTS), walking().points(POINTS))
