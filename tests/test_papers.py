@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from posekit.body import load_figure
 from posekit.cameras import LeeChenCamera
@@ -179,6 +180,86 @@ def test_remarks_on_the_walks_are_shares_of_their_settings(rows: Rows) -> None:
     for name, joint in (("elbows", 6), ("knees", 10)):
         same = [(one[:, 1, :, joint] == one[:, 1, :, joint + 1]).mean(axis=0) for one in (first, second)]
         assert shares(f"§4.1.B: with Rule 1 the two {name}") == pytest.approx(100 * np.ravel(same), abs=0.6)
+
+
+def few_walks() -> tuple[lee_chen_walks.Walks, lee_chen_walks.Walks]:
+    """Return the counts of both sequences over the settings of `rows`."""
+    with pytest.MonkeyPatch.context() as small:
+        small.setitem(lee_chen_walks.GRIDS, "few", (np.array([0.7, 1.0]), np.array([0.0]), 4))
+        return count_walks("seq1", "few"), count_walks("seq2", "few")
+
+
+def test_counts_are_compared_with_the_print_cell_by_cell(rows: Rows) -> None:
+    """The closest setting has the least sum of |log2| of ratios; 5 to 95 % of the settings have usual counts."""
+    given, walks = printed()["lee_chen"], few_walks()
+    cells, theirs = [], []
+    for one in walks:
+        tables = np.array([given["physical"][one.name], given["motion"][one.name]]).reshape(2, 3, 14)
+        theirs.append([tables, np.array(given["final"][one.name][1:])])
+        cells.append([one.levels, one.final])
+    off = sum(
+        np.abs(np.log2(np.maximum(ours, 0.5) / print_)).reshape(len(ours), -1).sum(axis=1)
+        for mine, printed_ in zip(cells, theirs, strict=True)
+        for ours, print_ in zip(mine, printed_, strict=True)
+    )
+    chosen = int(np.argmin(off))
+
+    def check(one: Row, ours: Array, print_: Array) -> None:
+        """Compare a row with its counts (S, K), K = 1 or 2 x 3, and the printed counts (K,)."""
+
+        def words(values: list[str]) -> str:
+            return "; ".join(" / ".join(values[k : k + 3]) for k in range(0, len(values), 3))
+
+        assert one.here == words([str(count) for count in ours[chosen]])
+        assert one.printed == words([str(count) for count in print_])
+        fewer = words([f"{share:.0%}" for share in (ours < print_).mean(axis=0)])
+        as_many = words([f"{share:.0%}" for share in (ours == print_).mean(axis=0)])
+        assert f"{fewer} have fewer and {as_many} as many" in one.check
+        ordered = np.sort(ours, axis=0)
+        low, high = (
+            ordered[max(int(np.ceil(0.05 * len(ours))) - 1, 0)],
+            ordered[int(np.ceil(0.95 * len(ours))) - 1],
+        )
+        usual = ((low <= print_) & (print_ <= high)).all()
+        same = (ours[chosen] == print_).all()
+        assert one.verdict == ("agrees" if same else "open" if usual else "differs")
+
+    for one, (levels, final), (tables, last) in zip(walks, cells, theirs, strict=True):
+        table = "Table 3 (SEQ1)" if one.name == "seq1" else "Table 4 (SEQ2)"
+        for level, row_ in enumerate(of(rows, table)):
+            mine = levels[..., level].reshape(len(levels), 6)
+            check(row_, mine, tables[..., level].ravel())
+        for step, ours, print_ in (
+            ("Rules 1-2", levels[:, 1, 0, -1], tables[1, 0, -1]),
+            ("grouped", final[:, 0], last[0]),
+            ("Rules 3-5", final[:, 1], last[1]),
+        ):
+            (row_,) = of(rows, f"§4.2, {one.name.upper()}, {step}")
+            check(row_, ours[:, None], np.array([print_]))
+        (row_,) = of(rows, f"§4.2, {one.name.upper()}: the input survives")
+        assert row_.here.startswith("yes" if one.truth[chosen] else "no")
+        assert f"in {one.truth.mean():.0%} of all settings" in row_.check
+        (row_,) = of(rows, f"§4.1.B(i), {one.name.upper()}")
+        alone = one.levels[:, 0, :, 3] == one.levels[:, 0, :, 2]
+        assert row_.here == f"in {alone.mean():.0%} of the frames of all settings"
+    (row_,) = of(rows, "§4.1.B(iii)")
+    means = [one.levels[:, 0, :, 3].mean() for one in walks]
+    assert row_.here == f"{means[1]:.2f} torsos are left in SEQ2, {means[0]:.2f} in SEQ1"
+
+
+def test_the_shoulders_of_table_a1_are_in_front_of_the_spine(rows: Rows) -> None:
+    """Three distances place the middle of the shoulders beside the line from neck to pelvis."""
+    lengths = printed()["lee_chen"]["lengths"]
+    neck, pelvis = np.zeros(3), np.array([0.0, lengths["neck-pelvis"], 0.0])
+
+    def off(at: Array) -> Array:
+        shoulder = np.array([at[0], at[1], lengths["right_shoulder-left_shoulder"] / 2])
+        away = [np.linalg.norm(shoulder - neck), np.linalg.norm(shoulder - pelvis)]
+        return np.array(away) - [lengths["neck-right_shoulder"], lengths["right_shoulder-pelvis"]]
+
+    found = optimize.least_squares(off, [5.0, 5.0], xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    (row_,) = of(rows, "Table A.1, the torso")
+    assert f" {found.x[0]:.3f} cm in front" in row_.here
 
 
 def test_taylors_figure_has_his_proportions_at_any_height() -> None:
