@@ -300,7 +300,7 @@ def test_unseen_people_and_roots_are_told(random_frames):
     image[1], image[2, 1:4] = np.nan, np.nan
     recovery = recover(replace(random_frames.take([0, 1, 2]), image=image))
     assert [bool(reason) for reason in recovery.frames.reason] == [False, True, True]
-    assert "person is not seen" in recovery.frames.reason[1] and "pelvis" in recovery.frames.reason[2]
+    assert "no joint of the person" in recovery.frames.reason[1] and "pelvis" in recovery.frames.reason[2]
     with pytest.raises(posekit.InputError, match="ray"):
         recover(replace(random_frames, root=random_frames.root + np.array([1.0, 0, 0])))
 

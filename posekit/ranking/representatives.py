@@ -1,4 +1,4 @@
-"""Representatives: few postures of a frame that stand for nearly all of its probability."""
+"""Representatives: a few postures of a frame; the postures near them have nearly all of the frame's probability."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.geometry import Array, Ints, norm
 
-#: Distance in every joint up to which a posture is the person's, and one posture stands for another, metres.
+#: Largest distance of any joint, metres, at which an answer counts as right and one posture represents another.
 WITHIN_METRES: Final = 0.05
 
 #: Largest number of postures of a frame that are compared with each other, the likeliest first.
@@ -26,9 +26,9 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
     shape : array (N, 14, 3)
         Postures by frame, the likeliest first, metres.
     frame : int array (N,)
-        Frame of each, 0 to K - 1.
+        Frame of each posture, 0 to K - 1.
     weight : array (N,)
-        Their probabilities; those of a frame sum to one.
+        Probability of each posture; within a frame the sum is one.
     hold : array (K,)
         Total probability to reach in each frame.
 
@@ -50,7 +50,7 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
         most = np.maximum.reduceat(gain, starts)
         each = np.repeat(most, np.diff(starts, append=len(rows)))
         equal = np.flatnonzero(gain > each - ROUNDED_PROBABILITY)
-        best = rows[equal[np.searchsorted(equal, starts)]]  # of equal ones the likeliest
+        best = rows[equal[np.searchsorted(equal, starts)]]  # the likeliest of equal gains
         chosen.append(best)
         held.append(most)
         left[frame[best]] -= most
@@ -63,7 +63,7 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
 
 
 def _near(shape: Array, frame: Ints) -> tuple[Ints, Ints]:
-    """Return the pairs (two arrays of P rows) of postures of a frame within 5 cm of each other in every joint."""
+    """Return the pairs of postures of one frame that are within 5 cm of each other in every joint: two arrays (P,)."""
     rows, start = np.arange(len(frame)), np.searchsorted(frame, frame)
     before = np.where(rows - start < MAX_COMPARED, rows - start, 0)
     one = np.repeat(rows, before)

@@ -12,16 +12,17 @@ from posekit.geometry import Array, Flags, Ints, norm
 from posekit.ranking import WITHIN_METRES, representatives
 from posekit.skeleton import PARENTS, TREE_SEGMENTS
 
-#: Total probability of the postures for which representatives stand.
+#: Total probability of the represented postures.
 REPRESENTED: Final = 0.95
 
-#: Samples of each mode. The standard error of `sure` is 0.06 if one mode has all the probability, less otherwise.
+#: Number of samples of each mode. The standard error of `sure` is 0.06 if one mode has all the probability, less
+#: otherwise.
 N_SAMPLES: Final = 64
 
-#: Modes that are sampled at once: they stay in the processor's cache.
+#: Number of modes sampled in one block, so that they stay in the processor's cache.
 SAMPLED_AT_ONCE: Final = 64
 
-#: Degrees of freedom of the t distribution within a mode: its tails stand for lengths that are far off and bent spines.
+#: Degrees of freedom of the t distribution within a mode: its heavy tails model wrong lengths and bent spines.
 TAIL_DEGREES_OF_FREEDOM: Final = 4
 
 #: Scale of that t distribution relative to the standard deviation: the ratio of the 97.5 % quantiles of the normal and
@@ -60,24 +61,24 @@ def answers_of(
     r"""Return the answers of K frames; the answer of a frame depends on that frame alone.
 
     Under noise, the joints of the answer are the probability-weighted mean of the modes, moved to the nearest posture
-    with the person's lengths. `sure` is :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m,
-    \Sigma_m))`, by samples.
+    with the person's lengths. `sure` is
+    :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m, \Sigma_m))`, estimated from samples.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
         Survivors by frame, the likeliest first, metres, camera frame; NaN where a joint is not known.
     frame : int array (N,)
-        Frame of each, 0 to K - 1.
+        Frame of each survivor, 0 to K - 1.
     probability : array (N,)
-        Within a frame they sum to one minus `unlisted`.
+        Probability of each survivor; within a frame the sum is one minus `unlisted`.
     covariance : array (N, 42, 42), optional
         Covariance of the joints of each posture, square metres; None for exact postures.
     lengths : array (17,)
         The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. An answer has these lengths,
         scaled to the mean size of its survivors.
     relative : bool array (K,)
-        Whether distances are measured relative to the neck, whose depth is not known.
+        Whether distances are measured relative to the neck, because its depth is not known.
     unlisted : array (K,)
         Probability of postures that are not listed.
 
@@ -96,7 +97,7 @@ def answers_of(
     ends = np.searchsorted(frame[rows], np.arange(len(starts) + 1))
     parts = [slice(*pair) for pair in pairwise(ends.tolist())]
     if covariance is None:
-        # A mean of exact postures is no posture: the answer is the first representative.
+        # The mean of exact postures is not a possible posture, so the answer is the first representative.
         survivor = rows[ends[:-1]] - starts
         laid = shape[starts + survivor]
     else:
@@ -113,11 +114,11 @@ def answers_of(
         if covariance is not None:
             draws = draws + _drawn(covariance[own], relative[frame[own]])
         away = norm(draws - laid[frame[own], None])
-        inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not beyond
+        inside[own] = 1.0 - (away > WITHIN_METRES).any(axis=2).mean(axis=1)  # NaN is not outside
         gap = draws[..., 1:, 2] - draws[..., PARENTS[1:], 2]
         sides[own] = np.stack([gap < -WITHIN_METRES, gap > WITHIN_METRES], axis=1).mean(axis=2)
     near, far = np.add.reduceat(weight[:, None, None] * sides, starts).transpose(1, 0, 2)
-    each = np.stack([1.0 - near - far, near, far]).round(9)  # of equal ones the first
+    each = np.stack([1.0 - near - far, near, far]).round(9)  # the first of equal values counts
     known = np.isfinite(laid[:, 1:, 2] - laid[:, PARENTS[1:], 2])
     return {
         "joints": laid + np.add.reduceat(weight[:, None, None] * base, starts),

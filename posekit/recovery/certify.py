@@ -17,15 +17,15 @@ from posekit.validators.check import Check
 from posekit.validators.judge import PostureJudge, judge_postures
 from posekit.validators.ranges import limits_of, load_ranges
 
-#: Standard deviations of lengths and of joint limits that do not contradict a posture.
+#: Number of standard deviations by which a certified posture may violate lengths and joint limits.
 ALLOWED_DEVIATIONS: Final = 3.0
 
-#: Standard deviation with which joint limits pull under noise, degrees.
+#: Standard deviation of the solver's soft joint limits, degrees.
 LIMIT_DEGREES: Final = 2.0
 
-#: Overlap of bodies (metres) that errors of depth explain; the length (metres) of a forearm, which overlaps other parts
-#: most often and whose own error is added; and the overlap (metres) before an uncalibrated camera, where joints are off
-#: by 3 to 5 cm.
+#: Overlap of bodies (metres) that depth errors explain; length (metres) of a forearm, whose length error adds to the
+#: overlap, because forearms overlap other parts most often; and overlap (metres) with an uncalibrated camera, where
+#: joints have errors of 3 to 5 cm.
 CONTACT_METRES, FOREARM_METRES, PHOTOGRAPH_CONTACT_METRES = 0.03, 0.24, 0.06
 
 
@@ -63,9 +63,10 @@ def noisy_judge(
 ) -> PostureJudge:
     """Return a judge of postures whose tolerances allow for noise.
 
-    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. A length may also
-    have an error of three standard deviations. This error includes that of the body size, except in a photograph, where
-    the solver fits the size. Bodies may overlap, and the side on which the shoulders lie may be undetermined.
+    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. A length may have
+    an error of three standard deviations, which include the uncertainty of the body's size, except in a photograph,
+    where the solver estimates the size. Bodies may overlap by the amount that depth errors explain, and the side on
+    which the shoulders lie may be undetermined.
     """
     deviation = {name: lengths.own[name] if photograph else lengths.total(name) for name in figure.lengths}
     off = max(deviation[name] * length for name, length in figure.lengths.items())

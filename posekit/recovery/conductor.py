@@ -31,14 +31,14 @@ from posekit.solver import Modes, Problem, solve
 from posekit.tree import grow
 from posekit.validators.judge import PostureJudge, chosen_checks, early_checks
 
-#: Packages that decide a result.
+#: Packages that influence a result, whose versions it records.
 VERSIONED: Final = {"posekit": posekit, "pin": pinocchio, "numpy": np}
 
-#: Frames whose trees are grown together, and frames that are solved together: enough to spread NumPy's overhead, few
-#: enough to keep memory small. The result does not depend on them.
+#: Number of frames whose trees are grown together, and of frames that are solved together: enough to share NumPy's
+#: overhead, few enough to keep memory small. Results do not depend on these numbers.
 GROWN_AT_ONCE, SOLVED_AT_ONCE = 512, 64
 
-#: Largest number of modes of a frame that are certified and ranked, those of least chi2; few frames have more.
+#: Largest number of modes of a frame that are certified and ranked, by lowest chi2; few frames have more.
 MANY: Final = 3000
 
 #: Largest chi2 of the best mode of exact points under `SHARP_PIXELS`; noise of 1 pixel causes about 30.
@@ -48,7 +48,7 @@ EXACT_CHI2: Final = 0.05
 #: explains why a frame is empty.
 LOOSE_TIMES, LOOSE_LENGTHS, LOOSE_CHI2 = 20.0, 0.1, 1e3
 
-#: Least size (standard deviations) of a residual that explains an empty frame, and largest number of named residuals.
+#: Smallest residual (standard deviations) that is named as a reason for an empty frame, and largest number of them.
 NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
 
 
@@ -62,12 +62,12 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
     view : View
     settings : RecoverSettings, optional
     figure : Figure, optional
-        The built-in one by default; the view's own lengths, stature and head points are applied to it.
+        The figure to which the view's lengths, stature and head points are applied; by default the built-in figure.
 
     Raises
     ------
     InputError
-        If a setting does not apply to such a view, or the view contradicts itself.
+        If a setting does not apply to this kind of view, or the view's data contradict each other.
 
     Examples
     --------
@@ -172,7 +172,7 @@ class _Conductor:
         }
         deviation = deviation_of_tolerance(tolerance.rigid)
         terms = log_terms(joints, deviation=deviation, lengths=lengths, length_residual=short, up=self.up)
-        # The tree has judged checks with parts completely, and other checks only by the points that they name.
+        # The tree has judged checks with `parts` completely. Other checks have judged only the points that they name.
         late = [check for check in self.checks if not hasattr(check, "parts")]
         reason = np.full(len(joints), "")
         if late:
@@ -224,9 +224,10 @@ class _Conductor:
             self._diagnose(sight, problem, [k for k in part.tolist() if k not in lost])
 
     def _covariance(self, modes: Modes, rows: Ints) -> Array:
-        """Return the covariances of the joints of some modes (N, 42, 42), square metres."""
+        """Return the covariances of the joints of selected modes (N, 42, 42), square metres."""
         found = modes.covariance(rows)
-        # In an uncalibrated picture a larger person farther away looks the same: the size adds its own covariance.
+        # In an uncalibrated picture a larger person at a larger distance looks the same, so size adds its own
+        # covariance.
         x = self.lengths.common * modes.x[rows, :-1] if self.photograph else np.zeros((len(rows), 1))
         return found + x[:, :, None] * x[:, None]
 
@@ -305,13 +306,13 @@ def _why(nearest: Modes) -> str:
     size = {name: float(value[0]) for name, value in nearest.residuals().items()}
     named = sorted((name for name in size if size[name] > NAMED_DEVIATIONS), key=lambda name: -size[name])
     if not named:
-        return "every posture is less likely than 1 in 10,000 by chi-square: give a larger --deviation"
+        return "every posture is less likely than 1 in 1,000 by chi-square: give a larger --deviation"
     misses = ", ".join(f"{name} by {size[name]:.1f} deviations" for name in named[:MOST_NAMED])
     return f"no posture fits: the nearest misses {misses}"
 
 
 def _up_of(view: View) -> Up:
-    """Return the direction up: that of the calibration, else that of a level camera."""
+    """Return the up direction of the calibration, or else of a level camera."""
     camera = view.camera
     if isinstance(camera, PinholeCamera) and camera.R is not None and camera.up:
         return Up(direction=camera.R @ up_vector(camera.up), source=f"{camera.up}, as the calibration source")

@@ -1,4 +1,4 @@
-"""From postures to a `Recovery`: list the postures, compute their probabilities, and answer each frame."""
+"""Build a `Recovery` from postures: list the postures, compute their probabilities, and answer each frame."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ LEVEL_METRES: Final = 1e-6
 
 
 class Gathering:
-    """The frames of a view: open ones, whose postures are still to be found, and the results of the others.
+    """The frames of a view: open frames, which have no result yet, and the results of closed frames.
 
     Parameters
     ----------
     view : View
     sight : Sight
-        The view by rows.
+        The facts of the view before the search.
     person : Figure
     settings : RecoverSettings
     nearer : int array (F, 17)
-        Flips given by hand: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer, 0 if
-        nothing is given.
+        Stated depth order of segments: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer,
+        0 if nothing is given.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Gathering:
         self.survivors: list[Survivors] = []
 
     def close(self, *frames: int, **about: Any) -> None:
-        """Set columns of `Frames` for some frames, and remove these frames from the open ones."""
+        """Set columns of `Frames` for given frames, and remove these frames from the open frames."""
         for k in frames:
             for name, value in about.items():
                 self.frames[name][k] = value
@@ -129,7 +129,7 @@ class Gathering:
             self._keep(found, table, None if covariance is None else covariance(rows), improbable[found])
 
     def _keep(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
-        """Store the survivors of frames `found` (K,); noisy frames are answered now, exact ones when read."""
+        """Store the survivors of frames `found` (K,); noisy frames are answered now, exact frames on first access."""
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
@@ -219,7 +219,7 @@ def frozen(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def group_of(joints: Array, within: float) -> Ints:
-    """Return the group of each posture (N, 14, 3): its joints are `within` metres of the group's likeliest."""
+    """Return the group of each posture (N, 14, 3); every joint is `within` metres of the group's likeliest posture."""
     group = np.full(len(joints), -1, dtype=np.intp)
     for k, leader in enumerate(joints):
         if group[k] < 0:

@@ -17,7 +17,7 @@ from posekit.files import DATA
 from posekit.settings import RecoverSettings
 from posekit.skeleton import SEGMENT_NAMES
 
-#: Lengths of segments as shares of the stature, for either side, and their relative deviations between people.
+#: Segment lengths as fractions of stature, without the side, and their relative standard deviations between people.
 PROPORTIONS: Final = tomllib.loads((DATA / "priors" / "proportions.toml").read_text(encoding="utf-8"))
 
 
@@ -28,7 +28,7 @@ def by_segment(table: Mapping[str, float]) -> dict[str, float]:
 
 
 def figure_of_view(view: View, settings: RecoverSettings, figure: Figure | None) -> Figure:
-    """Return the person's figure: the given or built-in one with the view's stature, lengths and head points."""
+    """Return the person's figure: the given or built-in figure with the view's stature, lengths and head points."""
     head = {
         name: tuple(np.asarray(at, dtype=np.float64).tolist())
         for name, at in (view.head_points or {}).items()
@@ -79,7 +79,7 @@ def sided(figure: Figure, lengths: LengthUncertainty) -> Figure:
 
 
 def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -> LengthUncertainty:
-    """Return the uncertainty of lengths: as stated, or usual for their source (view, stature or neither)."""
+    """Return the uncertainty of lengths: stated, or the usual one for their source (view, stature or neither)."""
     stated = view.length_deviation if settings.length_deviation is None else settings.length_deviation
     if stated is not None:
         return LengthUncertainty.uniform(stated)

@@ -35,7 +35,7 @@ def listed(fill: Any) -> Any:
 
 
 class Table(Record):
-    """Base of read-only tables, whose rows are survivors or frames; the first column is always given."""
+    """Base of read-only tables, whose rows are survivors, frames or paths; the first column is required."""
 
     def __post_init__(self) -> None:
         rows = len(self)
@@ -83,7 +83,7 @@ class Derived:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Survivors(Table):
-    """N postures that passed every check, of all frames, in order of frame and then of falling probability.
+    """N postures of all frames that passed every check, sorted by frame and then by decreasing probability.
 
     Parameters
     ----------
@@ -92,25 +92,25 @@ class Survivors(Table):
     joints : array (N, 14, 3)
         Joint positions, metres, camera frame; NaN if a joint is unknown.
     head : array (N, 5, 3), optional
-        Head points, metres, camera frame; NaN if they are not seen.
+        Head points, metres, camera frame; unseen points are NaN.
     q : array (N, nq)
         Configuration of each survivor.
     probability : array (N,), optional
-        Probabilities; those of a frame sum to one minus `Frames.unlisted_probability`.
+        Probability of each survivor; within a frame the sum is one minus `Frames.unlisted_probability`.
     chi2 : array (N,), optional
-        Misfit to the view under noise; 0 in exact frames.
+        Chi-square of the residuals under noise; 0 in exact frames.
     margins : mapping of str to array (N,)
         Worst margin of each survivor by check, in the check's unit; NaN if the check decided nothing.
     branch : str array (N,), optional
         Near-far code of an exact posture: 0 (near) or 1 (far) for each joint from the second; empty under noise.
     group : int array (N,), optional
-        Group of similar postures within the frame; -1 if no groups were asked for.
+        Group of similar postures within the frame; -1 if no groups were requested.
     radius : array (N, 14), optional
         Radius (metres) within which each joint lies with 95 % probability if the posture is right; 0 in exact frames.
     inferred : bool array (N, 14), optional
         True for joints that the image does not show.
     scale : array (N,), optional
-        Scale of a scaled orthographic camera, pixels a metre; NaN for other cameras.
+        Scale of a scaled orthographic camera, pixels per metre; NaN for other cameras.
     """
 
     frame: NDArray[np.intp] = column(fill=0)
@@ -127,11 +127,11 @@ class Survivors(Table):
     scale: Array = column()
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Survivors:
-        """Return some rows."""
+        """Return the selected rows."""
         return Survivors(**self._columns(rows))
 
     def _columns(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> dict[str, Any]:
-        """Return some rows of every column."""
+        """Return the selected rows of every column."""
         return {name: values[rows] for name, values in self.columns().items()} | {
             "q": lambda: self.q[rows],
             "margins": lambda: {name: values[rows] for name, values in self.margins.items()},
@@ -151,15 +151,16 @@ class Frames(Table):
     camera : sequence of F mappings
         Facts about the camera: ``f``, ``rotation``, ``position``, ``residual``, ``scale``.
     rejected : sequence of F mappings
-        Number of rejected branches by reason (``check/place``). In an exact frame they and the survivors sum to 8192.
+        Number of rejected branches by reason (``check/place``). In an exact frame, rejected branches and survivors
+        together are 8192.
     levels : sequence of F sequences
-        Number of branches left after each joint of the tree; empty if no tree was grown.
+        Number of remaining branches after each joint of the tree; empty if no tree was grown.
     unlisted : int array (F,), optional
         Number of postures that are not listed because they are too unlikely (setting `coverage`).
     unlisted_probability : array (F,), optional
         Total probability of the postures that are not listed.
     reason : sequence of F str
-        Reason why a frame has no survivors; empty if it has some.
+        Reason why a frame has no survivors; empty if it has survivors.
     root : sequence of F mappings or None
         How the neck's depth was found: ``method``, ``estimate`` and ``deviation`` (metres).
     judged : sequence of F str
@@ -185,24 +186,25 @@ class Answer(Table):
     Parameters
     ----------
     joints : array (F, 14, 3)
-        Expected posture, laid onto the person's lengths; metres, camera frame; NaN where a frame has no survivor.
+        Expected posture, moved to the nearest posture with the person's lengths; metres, camera frame; NaN if a frame
+        has no survivor.
     sure : array (F,)
         Probability that every joint of the answer is within 5 cm of the person.
     sure_of : sequence of F str
-        ``position``, or ``relative to the neck`` where the depth is not known; empty where there is no answer.
+        ``position``, or ``relative to the neck`` if the depth is not known; empty if there is no answer.
     survivor : int array (F,)
         Row of the survivor nearest to the answer; -1 if the frame has no survivor.
     representatives : sequence of F int arrays
-        Rows of a few survivors: the postures within 5 cm of one of them in every joint have 95 % of the probability.
-        The representative with the largest share of it comes first.
+        Rows of a few survivors. The postures within 5 cm of a representative in every joint have 95 % of the
+        probability. The representative with the largest share of the probability comes first.
     represented : sequence of F arrays
         Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
         earlier representative.
     nearer : int array (F, 13)
-        For each segment of the tree the most probable of three cases: 1 if its outer end is nearer to the camera by
-        more than 5 cm, -1 if it is farther, 0 if neither.
+        For each segment of the tree, the most probable depth order: 1 if its outer end is nearer to the camera by more
+        than 5 cm, -1 if it is farther, 0 if neither.
     nearer_sure : array (F, 13)
-        Probability of `nearer`; NaN where there is no answer.
+        Probability of `nearer`; NaN if there is no answer.
     """
 
     joints: Array = column(len(JOINTS), 3)
@@ -282,7 +284,7 @@ class Recovery(Record):
     frames : Frames
     answer : Answer
     path : Paths, optional
-        Paths through the frames, if these were followed.
+        Paths through the frames, if following was requested.
     settings : mapping
         Settings that decided the result; plain numbers, strings and lists.
     tolerances : mapping
@@ -294,7 +296,7 @@ class Recovery(Record):
     unit : str
         Unit of length in files. All arrays are in metres.
     camera : mapping
-        Fields of the view's camera, as files have them.
+        Fields of the view's camera, as in files.
     source : str
         File of the view; empty if there is none.
 
@@ -368,7 +370,7 @@ class Recovery(Record):
         Raises
         ------
         InputError
-            If ``path`` is asked for and nothing was followed, `which` is none of these, or no frame has a posture.
+            If `which` is unknown, if it is ``path`` and no path was followed, or if no frame has a posture.
         """
         self.refuse_empty()
         table, starts, time = self.survivors, self._starts, self.frames.time
@@ -380,12 +382,12 @@ class Recovery(Record):
         shared: dict[str, Any] = {"up": "-y", "source": self.source, "unit": self.unit}
         if which == "path":
             if self.path is None or not len(self.path):
-                raise refusal(self.source, "", "no followed path", "one", "recover with follow")
+                raise refusal(self.source, "", "no followed path", "a path", "recover with follow")
             return Motion(joints=self.path.joints[0], time=time, **shared)
         if which not in chosen:
             expected = "answer, path, all or first"
             raise refusal(self.source or "result", "which", shown(which), expected, "choose one")
-        # Row -1, the last one, stands for frames without a posture.
+        # Row -1, the appended row of NaN, is used for frames without a posture.
         points, q = (
             np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[chosen[which]]
             for values in (with_head(table.joints, table.head), table.q)

@@ -1,4 +1,4 @@
-"""The scale of an uncalibrated picture: stated, found by constraints, or estimated (Taylor 2000, §2 and §3)."""
+"""The scale of an uncalibrated picture: stated, determined by constraints, or estimated (Taylor 2000, §2 and §3)."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from posekit.recovery.objects import Linkage, LinkageFamily, search
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS
 from posekit.solver import Problem
 
-#: Root of a person's area in a picture: a convex body shows a quarter of its surface on average (Cauchy), an adult's
-#: surface is 1.8 square metres (Du Bois & Du Bois 1916).
+#: Square root of the projected area of a person. The projection of a convex body has on average a quarter of the body's
+#: surface (Cauchy), and an adult's surface is 1.8 square metres (Du Bois & Du Bois 1916).
 ROOT_AREA_METRES: Final = 0.67
 
 #: Root mean square distance of annotators' points, in units of the root of the person's area in the picture: the
@@ -32,10 +32,10 @@ PHOTOGRAPH_OFFSETS: Final = ANNOTATION_SIGMAS * (ROOT_AREA_METRES / math.sqrt(2)
 #: Usual depth (metres) of a joint relative to the middle of the body, and usual distance (metres) of a camera.
 RELIEF_METRES, USUAL_DISTANCE_METRES = 0.25, 4.5
 
-#: Relative deviation of that distance: photographs of a whole person are taken from 3 to 7 m.
+#: Relative standard deviation of the camera's distance: photographs of a whole person are taken from 3 to 7 m.
 DISTANCE_DEVIATION: Final = 0.4
 
-#: Relative deviation of a scale by the way it is found; people do not stand quite straight for their stature.
+#: Relative standard deviation of a scale, by method. For `stature`, it allows for people who do not stand straight.
 SCALE_DEVIATIONS: Final = {"likely": 0.08, "min": 0.08, "stature": 0.03}
 
 #: Shortfall of a segment (metres) that contradicts a stated scale of exact points.
@@ -43,7 +43,7 @@ LONGEST_TOO_SHORT: Final = 0.3
 
 
 def point_offsets(points: Array, scale: Array) -> Array:
-    """Return the deviations (N, 14) of the points (N, 14, 2) of photographs at scales (N,), metres.
+    """Return the standard deviations (N, 14), metres, of the points (N, 14, 2) of photographs at scales (N,).
 
     Parts of the body that are nearer to the camera look larger. The distance of the camera is unknown, so the deviation
     grows with the distance of a point from the middle of the body.
@@ -55,19 +55,19 @@ def point_offsets(points: Array, scale: Array) -> Array:
 
 
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
-    r"""Turn a scaled orthographic problem into that of a perspective camera at the usual distance d from the person.
+    r"""Convert a scaled orthographic problem to a problem of a perspective camera at the usual distance d.
 
-    In every real picture, nearer parts of the body look larger. A posture of depth z about the plane of the scale is
-    seen at :math:`s (x, y) / (1 + z / d)`; the scale's deviation becomes one of the neck's depth.
+    In every real picture, nearer parts of the body look larger. A point at depth z behind the neck has the image
+    :math:`s (x, y) / (1 + z / d)`. The uncertainty of the scale becomes an uncertainty of the neck's depth.
 
     Parameters
     ----------
     problem : Problem
-        Its image points are coordinates on the plane of the scale, metres.
+        A problem whose image points are metres in the plane of the person's middle.
     middle : array (F, 2)
-        Middle of the person, metres.
+        Middle of the person in the image, metres.
     scale_deviation : array (F,)
-        Relative deviation of the scale.
+        Relative standard deviation of the scale.
     """
     d, out = USUAL_DISTANCE_METRES, problem.records.copy()
     out["ray"] = np.where(problem.seen_joints[..., None], (out["ray"] - middle[:, None]) / d, 0.0)
@@ -80,14 +80,14 @@ def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array)
 
 
 def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]:
-    """Move the solutions of a problem of `from_usual_distance` into the frame of the scaled orthographic camera.
+    """Convert solutions of a problem of `from_usual_distance` to the frame of the scaled orthographic camera.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
         Postures in the frame of the perspective camera, metres.
     middle, scale : array (N, 2), (N,)
-        Middle of the person at the nominal scale, metres, and that scale.
+        Middle of the person in the image at the nominal scale, metres, and the nominal scale.
 
     Returns
     -------
@@ -127,11 +127,11 @@ def figure_linkage(person: Figure) -> Linkage:
     return Linkage(name="figure", points=JOINTS, segments=SEGMENTS, lengths=lengths, unit=1.0)
 
 
-#: Standard deviation (metres) of the depth of each dimension's middle relative to the middle of the body: a little less
-#: than among random legal postures.
+#: Standard deviation (metres) of the depth of the middle of each of `DIMENSIONS`, relative to the middle of the body:
+#: slightly less than among random postures within the limits.
 DEPTH_RELIEF: Final = np.array([0.15, 0.15, 0.22, 0.22, 0.15, 0.15, 0.25, 0.25, 0.12, 0.10, 0.05])
 
-#: Relative deviation of each dimension with posture: shoulders move and the back bends.
+#: Relative standard deviation of each of `DIMENSIONS` due to posture: shoulders move and the back bends.
 LOOSENESS: Final = np.array([0.0] * 8 + [0.03, 0.02, 0.05])
 
 #: Joints at the two ends of each dimension: limbs, shoulder width, hip width, and the line between their middles.
@@ -149,7 +149,7 @@ LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
 
 
 def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
-    r"""Find the scale at which a body's segments match their lengths in the image, and its log's deviation.
+    r"""Estimate the scale at which a body's segments best match their image, and the deviation of its logarithm.
 
     Taylor's bound (2000, eq. 3) depends on one segment alone. Here every segment contributes: a segment of length l and
     random direction has an image of length :math:`e = s\,l\,\sqrt{1 - c^2}` with c uniform, blurred by the errors of
@@ -158,13 +158,13 @@ def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
     Parameters
     ----------
     points : array (F, 14, 2)
-        Square pixels; or normalised image points, whose scale is one over the depth. NaN if a point is not seen.
+        Square pixels, or normalised image points, whose scale is one over the depth; unseen points are NaN.
     person : Figure
 
     Returns
     -------
     scale, deviation : array (F,)
-        NaN where no segment is seen.
+        NaN if no segment is seen.
     """
     body = person.neutral_points
     ends = [[list(one) for one in pair] for pair in DIMENSIONS]

@@ -24,8 +24,8 @@ from posekit.skeleton import HEAD_POINTS, JOINTS
 #: Standard deviation (pixels) of image points if none is stated: of a detector's key points, and of other points.
 KEY_POINT_PIXELS, UNSTATED_PIXELS = 3.0, 1.0
 
-#: Standard deviation (pixels) of image points that may be exact, in frames without a tree: a joint or the neck is
-#: unknown.
+#: Standard deviation (pixels) of image points that may be exact, in frames without a tree because a joint or the neck
+#: is unknown.
 SHARP_PIXELS: Final = 0.3
 
 #: Standard deviation (metres) between a detector's key points and the figure's joints at full confidence. It is divided
@@ -39,7 +39,7 @@ UNSTATED_CONFIDENCE, LEAST_OFFSET_CONFIDENCE, LEAST_CONFIDENCE = 0.5, 0.05, 0.25
 #: Largest accepted distance of a given root from the neck's ray, metres.
 ROOT_REFUSED: Final = 0.2
 
-#: Points of the head that determine its camera (Lee & Chen 1985, §2.1).
+#: Number of head points that determine a camera (Lee & Chen 1985, §2.1).
 ENOUGH_HEAD_POINTS: Final = 1 + len(HEAD_POINTS)
 
 
@@ -60,15 +60,16 @@ class Sight(Record):
     root : array (H, 3)
         Position of the neck, metres; NaN if unknown.
     given : bool array (H,)
-        Whether the position of the neck was given, rather than found from the head.
+        Whether the position of the neck was given, not estimated from the head.
     head : array (H, 5, 3)
         Head points, metres; NaN if unknown.
     size_deviation : array (H,)
-        Relative deviation of the person's size, which is common to all lengths.
+        Relative standard deviation of the person's size, which all lengths share.
     may_be_exact : bool
         True if no deviation is stated and the points are not a detector's.
     reasons, cameras, roots
-        One entry a frame: the reason why nothing can be recovered, facts about the camera, and how the neck was found.
+        By frame: the reason why no posture can be recovered, facts about the camera, and the method that located the
+        neck.
     """
 
     camera: PinholeCamera | LeeChenCamera | ScaledOrthographicCamera
@@ -93,7 +94,7 @@ class Sight(Record):
 
     @property
     def scale(self) -> Array:
-        """Scales of a scaled orthographic camera (H,), pixels a metre; NaN before other cameras."""
+        """Scales of a scaled orthographic camera (H,), pixels per metre; NaN for other cameras."""
         return np.broadcast_to(getattr(self.camera, "scale", np.nan), len(self.frame))
 
     @property
@@ -108,7 +109,7 @@ def sight_of(view: View, person: Figure, settings: RecoverSettings, lengths: Len
     Raises
     ------
     InputError
-        If a setting does not apply to such a view, or the view contradicts itself in every frame.
+        If a setting does not apply to this kind of view, or the data of every frame contradict each other.
     """
     if isinstance(view.camera, ScaledOrthographicCamera):
         if settings.root != "auto":
@@ -132,14 +133,14 @@ def _unseen(view: View) -> list[str]:
     seen = np.isfinite(view.image[:, :, 0])
     trunk = seen[:, 1:4].any(axis=1)
     reasons = {
-        "the person is not seen: none of the joints is": ~seen.any(axis=1),
-        "none of right_shoulder, left_shoulder, pelvis is seen: there is no posture to recover": ~trunk,
+        "no joint of the person is seen": ~seen.any(axis=1),
+        "no posture can be recovered: neither right_shoulder nor left_shoulder nor pelvis is seen": ~trunk,
     }
     return [str(reason) for reason in np.select(list(reasons.values()), list(reasons), "")]
 
 
 def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Return the sight of a calibrated view; the neck is given, or found from six head points."""
+    """Return the `Sight` of a calibrated view; the neck is given, or computed from six head points."""
     count, model, reasons = len(view), view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert not isinstance(model, ScaledOrthographicCamera)
@@ -162,13 +163,13 @@ def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: 
             roots[k] = {"method": "head", "estimate": float(neck[k, 2]), "deviation": None}
         if isinstance(model, LeeChenCamera) and model.f is None:
             reasons = [own or of_head for own, of_head in zip(reasons, pose.reasons, strict=True)]
-    # Offsets in metres become pixels by the depth of the neck, or by the person's size in the image if it is unknown.
+    # Offsets in metres are converted to pixels by the neck's depth or, if it is unknown, by the person's image size.
     depth, unplaced = root[:, 2].copy(), np.flatnonzero(~np.isfinite(root[:, 2]))
     if len(unplaced):
         depth[unplaced] = 1 / likely_scale(camera.normalize(view.image)[unplaced], person)[0]
     middle = np.nan_to_num(camera.normalize(view.image[:, 0]))
     focal = np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle))))
-    # On a metric image plane a pixel is as large as that of a camera with a focal length of 1,000 pixels.
+    # On a metric image plane, a pixel is assumed to be a thousandth of the focal length.
     pixel = 1e-3 * focal if isinstance(model, LeeChenCamera) else np.ones(count)
     per_metre = focal / np.where(depth > 0, depth, 3.0)
     own = JOINT_OFFSET if view.derived else 0.0
@@ -241,7 +242,7 @@ def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
 
 
 def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Return the sight of uncalibrated pictures: one row a frame, or one for each scale that satisfies constraints."""
+    """Return the `Sight` of uncalibrated pictures: one row per frame, or one per scale that satisfies constraints."""
     model, reasons = view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert isinstance(model, ScaledOrthographicCamera)

@@ -1,4 +1,4 @@
-"""Configurations of a robot, within its limits, whose points lie where a posture has them."""
+"""Configurations of a robot, within its limits, whose points coincide with the points of a posture."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from posekit.recovery.objects.linkage import Linkage
 #: Largest number of postures of a frame for which configurations are computed.
 MAX_CERTIFIED: Final = 64
 
-#: Number of random configurations, and of the nearest ones to a posture, which are the starting points of the search.
+#: Number of random configurations, and number of those nearest to a posture from which the search starts.
 N_SHAPES, N_STARTS = 512, 4
 
 
 def configurations_of(
     robot: Any, linkage: Linkage, points: Array, frame: NDArray[np.intp], allowed: Array
 ) -> dict[str, Any]:
-    """Find a configuration for each posture by least squares, from the nearest of many random configurations.
+    """Find a configuration for each posture by least squares, starting from the nearest of many random configurations.
 
-    The base follows from the joints by the best rotation and translation, so that the joints are the only unknowns
-    (variable projection, Golub & Pereyra 1973).
+    The best rotation and translation of the base are computed from the joint values, so that the joint values are the
+    only unknowns (variable projection, Golub & Pereyra 1973).
     """
     import pinocchio as pin
     from scipy.optimize import least_squares
@@ -53,7 +53,7 @@ def configurations_of(
         return laid(placed(x)[known], target[known])[0].ravel()
 
     def slope(x: Array, target: Array, known: NDArray[np.bool_]) -> Array:
-        """Return the derivative of `off`, without the part that a rotation of the base cancels (Kaufman 1975)."""
+        """Return the derivative of `off` minus its component that a rotation of the base cancels (Kaufman 1975)."""
         pin.computeJointJacobians(model, data, configuration(x))
         left, R = laid(placed(x)[known], target[known])
         every = [pin.getFrameJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED)[:3, base:] for k in ids]

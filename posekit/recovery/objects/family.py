@@ -14,16 +14,16 @@ from posekit.errors import CameraError, refusal
 from posekit.geometry import FARTHEST_COORDINATE, Array, Record, read_only
 from posekit.recovery.objects.linkage import Linkage
 
-#: Relative distance of a scale from a segment's bound below which the segment has no depth.
+#: Relative difference between a scale and a segment's bound, below which the segment has no depth.
 AT_BOUND: Final = 1e-12
 
-#: Coefficients of the incidence matrices below this are rounding errors; the others are sums of halves.
+#: Coefficients of incidence matrices below this value are rounding errors; exact coefficients are sums of halves.
 ZERO_COEFFICIENT: Final = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class LinkageFamily(Record):
-    r"""All postures of a linkage that give one image under a scaled orthographic camera.
+    r"""All postures of a linkage that have the same image in a scaled orthographic camera.
 
     At a scale s each segment is foreshortened by :math:`dZ = \sqrt{l^2 - (\Delta u^2 + \Delta v^2)/s^2}` (Taylor 2000,
     eq. 2), toward the camera or away from it: 2^S flips. The root stays real for
@@ -33,9 +33,9 @@ class LinkageFamily(Record):
     ----------
     linkage : Linkage
     image : array (P, 2)
-        Image points, pixels; NaN where one is not seen.
+        Image points, pixels; unseen points are NaN.
     aspect : float
-        Width of a pixel over its height: u is multiplied by it, and s refers to v.
+        Ratio of a pixel's width to its height: u is multiplied by it, and s is the scale of v.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class LinkageFamily(Record):
 
     @cached_property
     def extent(self) -> Array:
-        """Length of each segment's image (S,), pixels; NaN where an end is not seen."""
+        """Length of each segment's image (S,), pixels; NaN if an end is not seen."""
         ends = np.array(self.linkage.segments)
         return np.asarray(np.linalg.norm(self.place[ends[:, 1]] - self.place[ends[:, 0]], axis=1))
 
@@ -76,12 +76,12 @@ class LinkageFamily(Record):
 
     @property
     def bounds(self) -> Array:
-        """Least scale that each segment allows (S,), pixels a unit of length."""
+        """Smallest scale that each segment allows (S,), pixels per unit of length."""
         return np.asarray(self.extent / self.linkage.lengths)
 
     @property
     def minimum_scale(self) -> float:
-        """Least scale that all segments allow; the paper's default (§3.1)."""
+        """Smallest scale that all segments allow; the paper's default (§3.1)."""
         return float(np.nanmax(self.bounds))
 
     @property
@@ -95,7 +95,7 @@ class LinkageFamily(Record):
         Raises
         ------
         CameraError
-            If a scale is below its lower bound; the message names the segment that sets the bound, and the bound.
+            If a scale is below its lower bound; the message names the bound and the segment that determines it.
         """
         scale = np.asarray(s, dtype=np.float64)
         bound = self.minimum_scale
@@ -114,9 +114,9 @@ class LinkageFamily(Record):
         Parameters
         ----------
         s : float or array (...)
-            Scales, pixels a unit of length.
+            Scales, pixels per unit of length.
         flips : array (..., S)
-            1 where the first end of a segment is nearer, -1 where its second is, 0 where it has no depth.
+            1 if the first end of a segment is nearer, -1 if the second end is nearer, 0 if the segment has no depth.
 
         Notes
         -----
@@ -154,22 +154,24 @@ class LinkageFamily(Record):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Incidence(Record):
-    r"""Incidence matrices of a linkage, or of the part of it that is seen.
+    r"""Incidence matrices of a linkage, or of its seen segments.
 
     The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
-    where a row of A has -1 and 1 at a segment's ends (halves for a midpoint). Then :math:`Z = B (\sigma dZ)`, and loops
-    close where :math:`C (\sigma dZ) = 0`. The segments of a basis determine all depths: :math:`Z = T (\sigma dZ)`.
+    where a row of A has -1 and 1 in the columns of a segment's ends (halves for a midpoint). Then
+    :math:`Z = B (\sigma dZ)`, and loops close if :math:`C (\sigma dZ) = 0`. The segments of a basis determine all
+    depths: :math:`Z = T (\sigma dZ)`.
 
     Parameters
     ----------
     depth : array (N, S)
-        Rows of B: the depth of each node relative to the first node of its piece; loops that do not close are averaged.
+        Rows of B: the depth of each node relative to the first node of its piece; depths around loops that do not close
+        are averaged.
     tree : array (N, S)
         Rows of T: the depth of each node, computed from the segments of the basis alone.
     basis : int array (K,)
         Segments that span the object; each of the other segments closes a loop.
     loops : array (L, S)
-        C: one row for each loop, whose largest coefficient is 1.
+        C, with one row for each loop; the largest coefficient of a row is 1.
     part : int array (N,)
         Piece of each node; nodes of different pieces have no relative depth.
     placed : bool array (N,)

@@ -16,7 +16,7 @@ from posekit.recovery.objects.family import LinkageFamily, off_flat, with_depth
 
 
 class Tolerance(NamedTuple):
-    """Allowed errors, units of length: of lengths that close a loop, shortfall of segments, and of image points."""
+    """Allowed errors, units of length: of lengths that close a loop, of too short segments, of image points."""
 
     rigid: float
     tangent: float
@@ -27,10 +27,10 @@ class Tolerance(NamedTuple):
 EXACT: Final = Tolerance(1e-6, 1e-9, 0.0)
 MEASURED: Final = Tolerance(0.01, 0.02, 0.01)
 
-#: Depth of a segment, relative to the longest one, below which both flips are the same posture.
+#: Depth of a segment, relative to the longest segment, below which both flips are the same posture.
 LEVEL: Final = 1e-6
 
-#: Largest residual of a minimum that satisfies the constraints exactly; other minima are used only without such ones.
+#: Largest residual of a minimum that satisfies the constraints exactly; other minima are used only if none does.
 CLOSED_RESIDUAL: Final = 1e-16
 
 #: Largest number of postures during the growth of a tree.
@@ -133,9 +133,9 @@ def grow(
 
 
 def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance) -> Iterator[Check]:
-    r"""Yield the tests of one frame: loops, flips given by hand, and shape.
+    r"""Yield the tests of one frame: closure of loops, stated flips, and shape.
 
-    If image points are off by at most p, a segment of length l whose image is e long has a depth between
+    If image points have errors of at most p, a segment of length l with an image of length e has a depth between
     :math:`\sqrt{l^2 - (e + 2p)^2}` and :math:`\sqrt{l^2 - (e - 2p)^2}`. The error of the depth between two points is at
     most the sum over the segments between them.
     """

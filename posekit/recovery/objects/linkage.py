@@ -19,7 +19,7 @@ from posekit.geometry import Array, Record, read_only
 #: Largest number of segments of one object.
 MAX_SEGMENTS: Final = 2000
 
-#: Relative violation of the triangle inequality that is taken as rounding of lengths: the loop is then flat.
+#: Relative violation of the triangle inequality that counts as rounding of lengths; the loop is then straight.
 LOOP_ROUNDING: Final = 1e-9
 
 
@@ -40,7 +40,7 @@ class Linkage(Record):
     lengths : array (S,)
         Lengths of the segments, in any unit: the scale s absorbs a common factor (Taylor 2000, §2).
     midpoints : sequence of (str, (int, int))
-        Names of further nodes P, P + 1, …, and the two points in the middle of whose segment each lies.
+        Names of further nodes P, P + 1, …; each is the midpoint of the segment between two points.
     coplanar : sequence of sequence of int
         Sets of four or more nodes that lie in a plane.
     perpendicular : sequence of (int, int)
@@ -206,7 +206,7 @@ class Linkage(Record):
         Raises
         ------
         InputError
-            If a name is unknown; and as `Linkage` does.
+            If a name is unknown, or for the reasons of `Linkage`.
 
         Examples
         --------
@@ -313,7 +313,7 @@ def linkage_of_robot(robot: Any) -> Linkage:
     from posekit.synthesis.objects import random_configurations
 
     model = robot.model
-    # Points beyond a sliding joint keep no distance to the others.
+    # Points after a sliding joint have no constant distance to other points.
     kinds = [joint.shortname().removeprefix("JointModel") for joint in model.joints]
     sliding = {k for k, kind in enumerate(kinds) if kind.startswith(("P", "T"))}
     turning = [k for k in range(1, model.njoints) if not sliding.intersection(model.supports[k])]
@@ -324,7 +324,7 @@ def linkage_of_robot(robot: Any) -> Linkage:
     ids = [*bodies[:1], *joints, *last]
     shapes = random_configurations(robot, 6, np.random.default_rng(0))
     places, ends = frame_places(model, shapes, ids), [0, *range(1 + len(joints), len(ids))]
-    # Joints come first; a base or an end near a joint is left out, and coincident joints are one point.
+    # Joints come first; a base or an end near a joint is omitted, and coincident joints are one point.
     kept: list[int] = []
     for k in [*range(1, 1 + len(joints)), *ends]:
         apart = MIN_POINT_DISTANCE_METRES if k in ends else 1e-9
@@ -351,20 +351,20 @@ def linkage_of_robot(robot: Any) -> Linkage:
 def read_nearer(
     linkage: Linkage, nearer: Mapping[str, str] | Sequence[Mapping[str, str]] | None, count: int
 ) -> NDArray[np.int8]:
-    """Return the flips (F, S) given by hand for F = `count` frames: 1, -1, or 0 if none is given.
+    """Return the stated flips (F, S) of F = `count` frames: 1, -1, or 0 if the flip is not stated.
 
     Parameters
     ----------
     linkage : Linkage
     nearer : mapping or sequence of mappings, optional
-        Segment to the name of its nearer end: one mapping for all frames, or one a frame.
+        Name of the nearer end by segment: one mapping for all frames, or one per frame.
     count : int
         Number of frames.
 
     Raises
     ------
     InputError
-        If a segment or its end is not known, or there are more or fewer mappings than frames.
+        If a segment or an end is unknown, or the number of mappings is not the number of frames.
     """
     hands = [nearer] if isinstance(nearer, Mapping) else list(nearer or [{}])
     if len(hands) not in (1, count):

@@ -18,17 +18,17 @@ from posekit.recovery.objects.growth import CLOSED_RESIDUAL, EXACT, MEASURED, To
 from posekit.recovery.objects.linkage import Linkage, name_nearer, read_nearer
 from posekit.recovery.objects.scale import CONSTRAINT_KINDS, search
 
-#: Largest number of scales of a frame; those of least residual are used.
+#: Largest number of scales of a frame; the scales with the smallest residuals are used.
 MAX_SCALES: Final = 128
 
 
 def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
-    """Parse the way in which the scale is fixed: return its kind, number, and weights of constraints.
+    """Parse the setting of the scale: return its kind, its number, and the weights of constraints.
 
     Parameters
     ----------
     text : str
-        ``min``, ``likely``, a number in pixels a unit of length, ``stature:PX``, or constraints with optional weights
+        ``min``, ``likely``, a number in pixels per unit of length, ``stature:PX``, or constraints with optional weights
         as ``closure:1,coplanar:0.5``.
 
     Raises
@@ -70,9 +70,10 @@ class ObjectRecovery(Record):
     points : array (N, P, 3)
         Positions, camera frame, in the linkage's unit; NaN if a point is not seen.
     flips : int array (N, S)
-        1 if the first end of a segment is nearer, -1 if its second is, 0 if neither is or the segment is not seen.
+        1 if the first end of a segment is nearer, -1 if the second end is nearer, 0 if both have the same depth or the
+        segment is not seen.
     scale : array (N,)
-        Pixels a unit of length.
+        Pixels per unit of length.
     q : array (N, nq), optional
         Configurations of the robot; NaN if none was computed.
     distance : array (N,), optional
@@ -151,25 +152,26 @@ def recover_object(
     ----------
     linkage : Linkage
     image : array (F, P, 2)
-        Pixels, y down; NaN where a point is not seen.
+        Pixels, y down; unseen points are NaN.
     scale : str or float, optional
-        ``min`` (default), pixels a unit of length, ``stature:PX``, or constraints (`parse_scale`).
+        ``min`` (default), pixels per unit of length, ``stature:PX``, or constraints (`parse_scale`).
     aspect : float
-        Width of a pixel over its height.
+        Ratio of a pixel's width to its height.
     time : array (F,), optional
         Seconds.
     nearer : mapping or sequence of F mappings
-        Flips given by hand: segment to its nearer end.
+        Stated flips: the nearer end by segment.
     tolerance : (float, float), optional
-        Allowed error of closing lengths and shortfall of segments, in the linkage's unit. By default exact if some
-        independent loop or shape of the frame is exact, otherwise 1 and 2 % of the longest segment.
+        Allowed error of lengths that close a loop, and allowed shortfall of segments, in the linkage's unit. By default
+        zero up to rounding if a loop or shape shows that the frame's points are exact, otherwise 1 and 2 % of the
+        longest segment.
     robot : Robot, optional
-        `posekit.robots.Robot` with the linkage's points as frames, whose configurations within limits are computed.
+        `posekit.robots.Robot` whose frames include the linkage's points; configurations within its limits are computed.
 
     Raises
     ------
     InputError
-        If a name is unknown, or every frame contradicts itself; the message is the first frame's reason.
+        If a name is unknown, or the data of every frame contradict each other; the message is the first frame's reason.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 r"""The scales that satisfy constraints: a search over the scale and all relevant flips (Taylor 2000, §2.1).
 
 The scale is parametrised by an angle, :math:`s = s_{min} / \cos\psi`. As a function of s, dZ has a vertical tangent at
-the bound; as a function of :math:`\psi` it is smooth, :math:`dZ = l \sin\psi` for the segment that sets the bound.
-Residuals are dimensionless: lengths are in units of the mean segment. A minimum is found as a root of the exact
+the bound. As a function of :math:`\psi` it is smooth: :math:`dZ = l \sin\psi` for the segment that determines the
+bound. Residuals are dimensionless: lengths are in units of the mean segment. A minimum is found as a root of the exact
 derivative, which determines the angle to full precision. The residual is a sum of squares and would determine it to
 half the digits. The derivative is the imaginary part of the residual after an imaginary step of the angle (Squire &
 Trapp 1998).
@@ -26,33 +26,34 @@ from posekit.recovery.objects.family import AT_BOUND, ZERO_COEFFICIENT, LinkageF
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
 
 #: Largest number of assignments of flips that are tried. If constraints form independent blocks, the smallest blocks
-#: determine the scale, up to this number together; a single block may have more assignments.
+#: determine the scale, as many as have at most this number of assignments together. A single block may have more
+#: assignments, up to the second number.
 MAX_FLIPS, MAX_BLOCK_FLIPS = 1 << 15, 1 << 20
 
-#: Distance (rad) from the right angle at which the search ends, at a thousand times the least scale.
+#: Angle (rad) below a right angle at which the search ends: there the scale is a thousand times the smallest scale.
 RIGHT_ANGLE: Final = 1e-3
 
-#: Angles (rad) at which residuals are sampled; small ones resolve segments whose own bound is near the largest one.
+#: Angles (rad) at which residuals are sampled; small angles resolve segments whose bounds are near the largest bound.
 GRID: Final = np.sort(
     np.concatenate([np.linspace(0.0, math.pi / 2 - RIGHT_ANGLE, 240), np.geomspace(1e-5, 0.03, 36)])
 )
 
-#: Largest residual, times the squared sine and cosine of the angle, that is taken as zero.
+#: Largest residual, times the squared sine and cosine of the angle, that counts as zero.
 FLAT_RESIDUAL: Final = 1e-23
 
-#: Angle (rad) below which the scale is at the bound: the segment that sets the bound has no depth.
+#: Angle (rad) below which the scale is at the bound, where the segment that determines the bound has no depth.
 VANISHED_ANGLE: Final = 2e-6
 
-#: Largest derivative and residual that are taken as zero; difference of angles (rad) within one minimum.
+#: Largest derivative and largest residual that count as zero; largest difference of angles (rad) within one minimum.
 ZERO_SLOPE, ZERO_RESIDUAL, SAME_ANGLE = 1e-12, 1e-24, 1e-9
 
-#: Residuals that are evaluated at once.
+#: Number of residuals that are evaluated in one block.
 CHUNK: Final = 1 << 20
 
-#: Imaginary step of the angle: its square vanishes beside any real part.
+#: Imaginary step of the angle: its square is negligible relative to any real part.
 STEP: Final = 1e-30
 
-#: Signed foreshortenings (..., S) and the size of the image relative to that at the bound (...), complex, to a residual
+#: Function from signed foreshortenings (..., S) and the ratio of the bound to the scale (...), complex, to a residual
 #: (...).
 Residual = Callable[[Array, Array], Array]
 
@@ -61,16 +62,17 @@ Residual = Callable[[Array, Array], Array]
 class Minima(Record):
     """Local minima of the constraints' residual over scale and flips, best first.
 
-    Each minimum stands for its mirror image in depth, too, unless flips were given by hand.
+    Each minimum also represents its mirror image in depth, unless flips are stated.
 
     Parameters
     ----------
     s : array (M,)
-        Scales, pixels a unit of length.
+        Scales, pixels per unit of length.
     residual : array (M,)
-        Weighted sum of squares that the constraints leave (dimensionless).
+        Weighted sum of squared residuals of the constraints (dimensionless).
     flips : int array (M, S)
-        1 if the first end of a segment is nearer, -1 if its second is, 0 if the residual does not depend on it.
+        1 if the first end of a segment is nearer, -1 if the second end is nearer, 0 if the residual does not depend on
+        it.
     curve_s, curve_residual : array (G,)
         Scales from the bound upward, and the least residual over all flips at each scale (Taylor 2000, Figs. 7b and
         8b).
@@ -94,16 +96,16 @@ class Constraints:
     ----------
     family : LinkageFamily
     weights : mapping
-        ``closure``, ``coplanar``, ``perpendicular``, ``collinear`` to a weight.
+        Weight by kind of constraint: ``closure``, ``coplanar``, ``perpendicular``, ``collinear``.
     given : int array (S,)
-        Flips given by hand; 0 for a segment without one.
+        Stated flips; 0 for a segment without a stated flip.
 
     Attributes
     ----------
     bounding : bool array (S,)
-        Segments that set the bound of the scale.
+        Segments that determine the bound of the scale.
     matter : list of int
-        Segments on whose flips the residual depends.
+        Segments whose flips influence the residual.
     signs : array (K, S)
         Assignments of flips; of two mirror images only one is listed.
     """
@@ -129,8 +131,8 @@ class Constraints:
         self.signs = np.where(self.given == 0, 1.0, self.given)[None]
         for block in sorted(_blocks([segments for _, segments, _ in every], len(lengths)), key=len):
             free = [k for k in block if self.given[k] == 0]
-            # The opposite signs of a block mirror the posture in depth and have the same residual: one sign is fixed,
-            # that of a segment that does not set the bound.
+            # The opposite signs of a block mirror the posture in depth and have the same residual. So the sign of one
+            # segment is fixed, of a segment that does not determine the bound.
             if len(free) == len(block):
                 free.remove(next((k for k in free if not self.bounding[k]), free[0]))
             if self.matter and len(self.signs) << len(free) > MAX_FLIPS:
@@ -167,7 +169,7 @@ class Constraints:
         return found
 
     def evaluate(self, signs: Array, psi: Array) -> tuple[Array, Array]:
-        """Return residual and derivative of flips (..., S) at angles that broadcast to (...)."""
+        """Return residuals and their derivatives for flips (..., S) at angles that broadcast to (...)."""
         turned = psi + 1j * STEP
         reach = self.at_scale * np.sin(turned)[..., None]
         dZ = np.where(self.bounding, reach, np.sqrt(self.rest + reach**2))
@@ -186,9 +188,9 @@ def search(
     family : LinkageFamily
         The linkage in its image.
     weights : mapping
-        ``closure``, ``coplanar``, ``perpendicular``, ``collinear`` to a positive weight.
+        Positive weight by kind of constraint: ``closure``, ``coplanar``, ``perpendicular``, ``collinear``.
     given : int array (S,), optional
-        Flips given by hand: 1 if the first end of a segment is nearer, -1 if its second is, 0 if none is given.
+        Stated flips: 1 if the first end of a segment is nearer, -1 if the second end is nearer, 0 if no flip is stated.
 
     Raises
     ------
@@ -267,7 +269,7 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
     if len(row):
         bracket = (GRID[cell], GRID[cell + 1])
         psi = elementwise.find_root(slope_at, bracket, args=(np.arange(len(row)),)).x
-    # At the bound both flips of a segment without depth are one posture: a minimum if the residual of both increases.
+    # At the bound both flips of a segment without depth are one posture. It is a minimum if both residuals increase.
     grows = np.concatenate(starts)
     closed = np.where(constraints.bounding & (constraints.given == 0), 0.0, signs)
     _, same = np.unique(closed, axis=0, return_inverse=True)
