@@ -11,11 +11,12 @@ from posekit.errors import refusal
 from posekit.geometry import Array, unit, up_vector
 from posekit.skeleton import POINTS
 
-#: Share of points outside the picture from which the calibration's picture size is wrong.
+#: Fraction of points outside the picture above which the calibration's picture size counts as wrong.
 OUTSIDE_SHARE: Final = 0.5
-#: Shortest and longest focal length, of the picture's longer side: views of 170 degrees and of half a degree.
+#: Shortest and longest accepted focal length, in units of the picture's longer side: angles of view of 170 degrees and
+#: of half a degree.
 SHORTEST_FOCAL, LONGEST_FOCAL = 0.05, 100.0
-#: Angle between the person's and the world's upward direction in the picture up to which there is no warning.
+#: Largest angle between the upward directions of person and world in the picture for which there is no warning.
 UPRIGHT_DEGREES: Final = 45.0
 #: Length of the projected unit vector of the world's up axis below which the camera looks up or down.
 SEEN_ACROSS: Final = 0.5
@@ -81,11 +82,11 @@ def contradictions(camera: CameraModel, points: Array) -> list[str]:
         up = camera.R @ up_vector(camera.up)
         calibrated, axis = f"the calibration of {camera.name or 'the camera'}", f"its up axis {camera.up}"
     world = up[:2]
-    if np.linalg.norm(world) < SEEN_ACROSS:  # the camera looks down: upright people are seen short
+    if np.linalg.norm(world) < SEEN_ACROSS:  # the camera looks down, so that upright people appear short
         long = sum(float(np.median(np.linalg.norm(way, axis=1))) for way in (trunk, legs) if len(way))
         if not len(across) or long < SEEN_LONG * float(np.median(np.linalg.norm(across, axis=1))):
             return []
-        world = np.array([person[1], -person[0]])  # at a right angle to the person, who lies
+        world = np.array([person[1], -person[0]])  # perpendicular to the person, who appears to lie
     angle = float(np.degrees(np.arccos(np.clip(unit(person) @ unit(world), -1, 1))))
     if calibrated and angle > UPRIGHT_DEGREES:
         stands = "stands on the head" if angle > 180 - UPRIGHT_DEGREES else "lies"

@@ -18,11 +18,11 @@ from posekit.skeleton import FEET_POINTS, HEAD, JOINT, JOINTS, POINTS
 
 #: Largest accepted coordinate of a key point, pixels.
 FARTHEST_PIXEL: Final = 1e6
-#: Frames a second of a film if neither the file nor the user gives them.
+#: Frames per second of a film if neither the file nor the user states them.
 ASSUMED_RATE: Final = 30.0
-#: Median coordinate up to which points are fractions of the picture.
+#: Largest median coordinate of points that are fractions of the picture instead of pixels.
 FRACTIONS_UP_TO: Final = 3.0
-#: Confidence below which a point outside the picture is a tracker's invention (MediaPipe places all 33 landmarks).
+#: Confidence below which a point outside the picture counts as unseen: MediaPipe reports all 33 landmarks, seen or not.
 INVENTED_BELOW: Final = 0.3
 
 
@@ -35,7 +35,7 @@ class Detections(Record):
     points : array (N, P, 2)
         Pixels, x right, y down, the centre of the first pixel at (0, 0); NaN if unseen.
     confidence : array (N, P), optional
-        Confidence as the detector gives it, mostly 0 to 1; NaN if unknown.
+        Confidence as reported by the detector, usually 0 to 1; NaN if unknown.
     names : tuple of P str
         Names of the points: `posekit.skeleton.JOINTS`, `HEAD_POINTS`, `FEET_POINTS`.
     frame : int array (N,)
@@ -43,7 +43,7 @@ class Detections(Record):
     person : int array (N,), optional
         Track of the person, from 0; -1 if unknown.
     pictures : tuple of str
-        Names of the pictures by frame number; empty if they have none.
+        Names of the pictures by frame number; empty if they have no names.
     size : (int, int), optional
         Width and height of the pictures, pixels.
     time : array (pictures,), optional
@@ -66,8 +66,8 @@ class Detections(Record):
     Raises
     ------
     InputError
-        If shapes do not fit, a name is unknown, rows are not in order, or a coordinate is infinite, too large or
-        known in part.
+        If shapes do not fit, a name is unknown, rows are not in order, or a coordinate is infinite or too large, or
+        only one coordinate of a point is known.
 
     Examples
     --------
@@ -145,14 +145,14 @@ class Detections(Record):
         return person
 
     def person_rows(self, which: int | str = "", camera: str = "") -> Ints:
-        """Return the rows of one person, at most one a picture.
+        """Return the rows of one person, at most one per picture.
 
         Parameters
         ----------
         which : int or str
             Number of a person, see `people`. Or ``largest``, the default: the person with the largest share of the
             pictures, summed over them; ``surest``: with the largest sum of confidences; ``first``: the first in the
-            first picture. In unrelated photographs a rule chooses in each picture.
+            first picture. In unrelated photographs, the rule is applied to each picture.
         camera : str
             Name of the camera; the number in it selects the camera in a file of several cameras.
 
@@ -210,7 +210,7 @@ class Detections(Record):
         Parameters
         ----------
         camera : PinholeCamera or ScaledOrthographicCamera, optional
-            The camera; scaled orthographic of unknown scale by default.
+            The camera; by default a scaled orthographic camera of unknown scale.
         person : int or str
             See `person_rows`.
         rate : float, optional
@@ -228,13 +228,14 @@ class Detections(Record):
         -------
         View
             For a film it has a frame for every picture, also for pictures without the person, so that numbers and times
-            are the film's. For unrelated photographs it has a frame for each that shows any joint of the person.
+            are the film's. For unrelated photographs it has a frame for each photograph that shows any joint of the
+            person.
 
         Raises
         ------
         InputError
-            If no picture shows the person, or none the neck with a calibrated camera; if points are fractions of a
-            picture of unknown size, or the calibration is that of other pictures.
+            If no picture shows the person or, with a calibrated camera, the neck; if points are fractions of a picture
+            of unknown size; or if the calibration belongs to other pictures.
         """
         camera = camera or ScaledOrthographicCamera(scale=None)
         pinhole = camera if isinstance(camera, PinholeCamera) else None
@@ -287,7 +288,7 @@ class Detections(Record):
         )
 
     def _in_order(self, values: Array) -> Array:
-        """Return values (N, P, ...) by joints and head points (N, 19, ...); NaN for points that the layout lacks."""
+        """Reorder values (N, P, ...) to joints and head points (N, 19, ...); NaN for points that the layout lacks."""
         found = np.full((len(values), len(POINTS), *values.shape[2:]), np.nan)
         place = {name: k for k, name in enumerate(self.names)}
         have = [k for k, name in enumerate(POINTS) if name in place]

@@ -60,7 +60,7 @@ class Moving(NamedTuple):
         return Moving(np.zeros((*shape, 6)), spreads, known, np.zeros(shape))
 
     def take(self, rows: NDArray[np.intp]) -> Moving:
-        """Return some bodies."""
+        """Return the selected bodies."""
         return Moving(self.mean[rows], self.spread[rows], self.known[rows], self.since[rows])
 
     def after(self, seconds: float) -> Moving:
@@ -88,7 +88,7 @@ class Moving(NamedTuple):
 
 
 def steps(seconds: float) -> tuple[Array, Array]:
-    """Return the transition matrix over a time in seconds, and the covariance that a unit density adds."""
+    """Return the transition matrix over a time in seconds, and the covariance that noise of unit density adds."""
     one, t = np.eye(3), seconds
     noise = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
     return np.kron(np.array([[1.0, t], [0.0, 1.0]]), one), np.kron(noise, one)
@@ -102,7 +102,7 @@ def smooth(time: Array, joints: Array, covariance: Array) -> Array:
     time : array (T,)
         Seconds, ascending.
     joints : array (T, 14, 3)
-        Metres; NaN where a joint is not known: it is interpolated.
+        Metres; unknown joints (NaN) are interpolated.
     covariance : array (T, 14, 3, 3)
         Square metres.
     """

@@ -71,7 +71,7 @@ def _picture(where: str, line: bytes, names: tuple[str, ...]) -> tuple[float, Ar
 
 
 def _document(posture: TrackedPosture) -> dict[str, Any]:
-    """Return an answer as JSON values: metres, joints by name, unknown ones left out."""
+    """Return an answer as JSON values: metres, joints by name, without unknown joints."""
     found: dict[str, Any] = {
         "frame": posture.frame,
         "time": posture.time,

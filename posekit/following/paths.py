@@ -27,7 +27,8 @@ from posekit.recovery.recovery import Paths, Recovery
 from posekit.skeleton import SEGMENT_NAMES
 
 #: Speeds that no joint exceeds, m/s. The trunk of the fastest sprinter passes 20 m at 12.1 m/s (Čoh et al. 2018,
-#: Kinesiology 50:172); the fastest balls leave hand and foot at 47 and 37 m/s, faster than wrist and ankle are.
+#: Kinesiology 50:172); the fastest balls leave hand and foot at 47 and 37 m/s, which is faster than wrists and ankles
+#: move.
 MAX_SPEED: Final = np.array([15.0] * 6 + [25.0, 25.0, 35.0, 35.0, 25.0, 25.0, 35.0, 35.0])
 
 #: Degrees of freedom of the t distribution of steps: a sudden move is improbable, not impossible.
@@ -39,17 +40,18 @@ NOISY_WEIGHT: Final = 0.25
 #: Cost of skipping a frame, in addition to the cost of a usual step.
 SKIP: Final = 100.0
 
-#: Cost of each joint that a survivor lacks and another of its frame has: unknown joints make no steps.
+#: Cost of each unknown joint of a survivor that another survivor of the frame has, because unknown joints have no cost
+#: of a step.
 MISSING_JOINT: Final = 5.0
 
 #: Tolerance of `MAX_SPEED`, in standard deviations of both positions.
 WALL_DEVIATIONS: Final = 3.0
 
-#: Share of the probability held by the survivors that are considered, and their largest number; largest number of
-#: separate paths; cost above the cheapest end from which an end is dropped.
+#: Total probability, and largest number, of the survivors considered in a frame; largest number of separate paths;
+#: largest cost, relative to the cheapest end, of an end that is kept.
 COVERAGE, MAX_SURVIVORS, WIDTH, SLACK = 0.95, 128, 64, 60.0
 
-#: Least distance of a joint, in some frame, between two different paths, metres.
+#: Two paths are different if a joint differs by more than this in some frame, metres.
 APART_METRES: Final = 0.25
 
 #: Least probability of a further path in the frame where it differs most.
@@ -189,8 +191,8 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
     .. math:: \sum_j \tfrac{\nu + 3}{2} \log\left(1 + \tfrac{1}{\nu} x_j^T S_j^{-1} x_j\right)
               + \tfrac12 \log\frac{|S_j|}{\sigma_j^6}, \qquad S_j = P_j + R_j,
 
-    with the filter's covariance P, the survivor's R, and :math:`\sigma_j^2` the random acceleration's part of P. A
-    joint at its predicted position costs nothing if its previous position was exact.
+    with the filter's covariance P, the survivor's covariance R, and :math:`\sigma_j^2` the variance that random
+    acceleration adds to P. A joint at its predicted position costs nothing if its previous position was exact.
 
     Parameters
     ----------
@@ -222,9 +224,9 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
 def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
-    The first path is the expected posture of each frame given all frames, smoothed and laid onto the person's lengths.
-    Each further path is the most probable one that passes, in one frame, through a survivor with a joint at least 25 cm
-    from all earlier paths. In an uncalibrated view, positions are relative to the neck.
+    The first path is the expected posture of each frame given all frames, smoothed and moved to the nearest posture
+    with the person's lengths. Each further path is the most probable one that passes, in one frame, through a survivor
+    with a joint at least 25 cm from all earlier paths. In an uncalibrated view, positions are relative to the neck.
 
     Parameters
     ----------
@@ -350,7 +352,7 @@ def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.
 def _usual_step(covariance: Array, known: NDArray[np.bool_]) -> float:
     """Return the average cost of a step between two survivors that have the covariance (14, 3, 3)."""
     scale = DENSITY * USUAL_INTERVAL**3 / 3
-    # The variance of a predicted place is about twice the acceleration's own where points are exact.
+    # For exact points, the variance of a predicted position is about twice the variance that acceleration adds.
     wide = np.log(np.linalg.det(2.0 * (np.eye(3) + covariance / scale[:, None, None])))
     typical = (NU + 3) / 2 * float(digamma((NU + 3) / 2) - digamma(NU / 2))
     return float((typical + 0.5 * wide)[known].sum())

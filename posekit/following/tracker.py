@@ -29,7 +29,7 @@ WEBCAM_DEGREES: Final = 78.0
 #: Default standard deviation of a live detector's points, pixels.
 DETECTED_DEVIATION: Final = 5.0
 
-#: Pictures that a path looks ahead: a sixth of a second at 30 a second.
+#: Number of pictures that a path looks ahead: a sixth of a second at 30 pictures per second.
 DEFAULT_LAG: Final = 5
 
 
@@ -88,7 +88,7 @@ class TrackedPosture(Record):
 
 
 class Tracker:
-    """Recovers one picture a call, and follows the person.
+    """Recovers one picture per call, and follows the person.
 
     `posekit.recover` finds the postures of each picture alone; only the path uses earlier pictures.
 
@@ -97,7 +97,7 @@ class Tracker:
     settings : RecoverSettings, optional
         Settings for each picture.
     camera : PinholeCamera, optional
-        By default a usual webcam's, from `size`.
+        By default a usual webcam with pictures of `size`.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels; also as ``"1280x720"``.
     lengths : mapping of str to float, optional
@@ -110,7 +110,7 @@ class Tracker:
         Meaning of the points: name or file of a layout, as ``coco_17``. By default the 14 joints in tree order,
         or these and the head's five points.
     lag : int
-        Pictures that the path looks ahead.
+        Number of pictures that the path looks ahead.
 
     Raises
     ------
@@ -138,7 +138,7 @@ class Tracker:
         lag: int = DEFAULT_LAG,
     ) -> None:
         if isinstance(layout, str) and layout:
-            # Layouts belong to the files, above this room; only a name given here needs them.
+            # Layouts are in a layer above this one; they are loaded only if a layout is given by name.
             layout = import_module("posekit.formats.layout").load_layout(layout)
         if layout and not layout.points:
             raise refusal("Tracker", "layout", layout.name, "points in an order, as in coco_17")
@@ -173,7 +173,7 @@ class Tracker:
         Raises
         ------
         InputError
-            If the number of points is wrong or the time does not ascend: the picture then does not count.
+            If the number of points is wrong or the time does not ascend; the picture is then ignored.
         """
         time = number(time, "time", "seconds")
         if time <= self._last + 1e-6:
@@ -209,7 +209,7 @@ class Tracker:
         return posture
 
     def finish(self) -> list[PathPosture]:
-        """Return the path of the last `lag` pictures; further pictures may follow."""
+        """Return the path of the last `lag` pictures; `update` may be called again."""
         return [self._oldest() for _ in range(len(self._waiting))]
 
     def _oldest(self) -> PathPosture:

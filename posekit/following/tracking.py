@@ -6,8 +6,9 @@ Detections are compared by COCO's object keypoint similarity with a larger devia
 
 over the n points that both have, with d_i their distance in the picture, A the person's area, k_i twice COCO's standard
 deviation of the point (cocodataset.org, "Keypoint Evaluation", 1.2; numbers as in pycocotools,
-``cocoeval.Params.setKpParams``), and m the allowed motion a picture, g pictures apart. Xiao, Wu & Wei 2018 (Simple
-baselines for human pose estimation and tracking, §3) match the poses of successive pictures by this similarity.
+``cocoeval.Params.setKpParams``), and m the allowed motion per picture for detections g pictures apart. Xiao, Wu & Wei
+2018 (Simple baselines for human pose estimation and tracking, §3) match the poses of successive pictures by this
+similarity.
 """
 
 from __future__ import annotations
@@ -30,35 +31,35 @@ POINT_SIGMA: Final = {
 COMPARED: Final = [k for k, name in enumerate(POINTS) if name.rpartition("_")[2] in POINT_SIGMA]
 FALLOFF: Final = np.array([2 * POINT_SIGMA[POINTS[k].rpartition("_")[2]] for k in COMPARED])
 
-#: Largest number of people in a picture: the work grows with its square.
+#: Largest number of people in a picture: the number of comparisons grows with its square.
 MAX_PEOPLE: Final = 1000
 
-#: Standard deviation of the predicted place a picture ahead, in units of the square root of the area.
+#: Standard deviation of a position predicted for the next picture, in units of the square root of the area.
 MOTION_SIGMA: Final = 0.12
 
-#: A person's area as a fraction of the box around the key points, as usual without an outline (MMPose).
+#: A person's area as a fraction of the box around the key points, as MMPose uses it without an outline.
 AREA_OVER_BOX: Final = 0.53
 
-#: Smallest width of a box over its height: a person seen from the side has hardly any.
+#: Smallest ratio of a box's width to its height: the key points of a person seen from the side have hardly any width.
 MIN_WIDTH_OVER_HEIGHT: Final = 0.25
 
 #: Similarity of detections without a common point.
 UNSEEN_SIMILARITY: Final = 1e-3
 
-#: Similarity below which two detections are not one person.
+#: Smallest similarity of two detections of one person.
 MIN_SIMILARITY: Final = 0.15
 
-#: Pictures for which an unseen person is kept: a second of video.
+#: Number of pictures for which an unseen person is remembered: a second of video.
 PATIENCE_PICTURES: Final = 30
 
-#: Factor of the allowed motion of a person who was seen once, so that the velocity is unknown.
+#: Factor on the allowed motion of a person who was seen once and whose velocity is unknown.
 FRESH_MOTION_FACTOR: Final = 3.0
 
-#: Pictures over which a velocity is extrapolated.
+#: Largest number of pictures over which a velocity is extrapolated.
 TRUSTED_VELOCITY_PICTURES: Final = 8
 
-#: Share of a video's steps in which people move less than `MOTION_SIGMA`; another person may enter in the remaining
-#: steps.
+#: Fraction of a video's steps in which people move less than `MOTION_SIGMA`; in the other steps another person may
+#: enter.
 VIDEO_SHARE: Final = 0.75
 
 #: Pictures per second of usual video; a longer step counts as several pictures.
@@ -79,14 +80,14 @@ def track(points: Array, frame: Ints, source: str = "", times: Array | None = No
     frame : int array (N,)
         Number of the picture, ascending.
     source : str
-        File of the detections, for errors.
+        File of the detections, for error messages.
     times : array, optional
         Seconds of each picture, by number.
 
     Returns
     -------
     int array (N,)
-        Numbers from 0, by appearance.
+        Number of the person in each row, from 0, in order of appearance.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def track(points: Array, frame: Ints, source: str = "", times: Array | None = No
     place, velocity = (
         points.copy(),
         np.full((len(points), 2), np.nan),
-    )  # points unseen are moved along with the others
+    )  # unseen points move with the seen points
     for number in np.unique(frame):
         rows = np.flatnonzero(frame == number)
         last = last[number - frame[last] <= PATIENCE_PICTURES + 1]
