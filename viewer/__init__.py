@@ -1,4 +1,4 @@
-"""Pictures, animations, pages, overlays and plots of bodies: `draw` makes each of them."""
+"""Draw bodies as pictures, animations, HTML pages, overlays on photographs, and plots."""
 
 from __future__ import annotations
 
@@ -38,25 +38,25 @@ def draw(
     Parameters
     ----------
     source : Motion, Recovery, Report, View with truth, or Robot
-        The bodies to draw; a robot is drawn at its neutral configuration.
+        Bodies to draw. A robot is drawn in its neutral configuration.
     target : path
-        ``.png`` (frames or alternative postures side by side), ``.gif`` and ``.mp4`` (one frame after the other),
-        ``.html`` (a page that needs nothing else), ``.svg`` and ``.pdf`` (plots).
+        Output file: ``.png`` (frames or alternative postures side by side), ``.gif`` or ``.mp4`` (animation),
+        ``.html`` (interactive page that works offline), ``.svg`` or ``.pdf`` (plot).
     view : View or Motion, optional
-        The view of a result: its image and its camera are drawn, too. For a report, the motion that it judges, or
-        several: the page then shows the body in each frame.
+        View of a result; its image points and its camera are drawn too. For a report: its motion or motions, so that
+        the page shows the body in each frame.
     frame : int or (int, int), optional
-        Frame, or first and last, from 0. By default a few frames of a motion, or all in an animation.
+        Frame, or first and last frame, numbered from 0. Default: a few frames of a motion; all frames of an animation.
     which : str
-        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers as ``0,4``. ``angles`` draws a plot
-        of joint angles over time, ``timeline`` one of a report's findings.
+        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers such as ``0,4``. ``angles`` plots
+        joint angles over time, ``timeline`` plots the findings of a report.
     size : (int, int)
-        Pixels.
+        Width and height, pixels.
     azimuth, elevation : float, optional
-        Direction of the eye, degrees: to the person's left, from the front or from a result's camera; and above the
-        horizontal. 35 and 8 by default.
+        Position of the virtual camera, degrees. The azimuth is measured from the person's front, or from the camera of
+        a result, to the person's left; the elevation from the horizontal plane. Default: 35 and 8.
     over : path, optional
-        Picture, folder of pictures or film that is drawn over, through the view's camera.
+        Picture, folder of pictures or film; bodies are drawn over it with the camera of the view.
     urdf : str
         Robot of configurations whose robot is not known.
 
@@ -65,7 +65,7 @@ def draw(
     InputError
         If there is nothing to draw, or if the target has another suffix.
     ViewerError
-        If a picture needs a browser, and no browser is installed or it fails.
+        If a picture needs a browser, and no browser is installed or the browser fails.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def draw(
 
 
 def _place_of_eye(azimuth: float | None, of_camera: bool) -> str:
-    """Describe the direction of view in words; the person's left is on the right of the camera that faces them."""
+    """Describe the viewing direction. The person's left is on the right-hand side of a camera that faces the person."""
     degrees = USUAL_AZIMUTH if azimuth is None else azimuth
     origin = "the camera" if of_camera else "the person's front"
     side = "right" if (degrees > 0) == of_camera else "left"

@@ -1,7 +1,7 @@
-"""A headless Chromium or Chrome that is installed on this machine, driven over two pipes.
+"""Control an installed Chromium or Chrome without a window, through two pipes.
 
-Chromium's DevTools protocol goes over pipes (``--remote-debugging-pipe``): no port is opened, and when this process is
-gone, the browser sees its pipe closed and ends, too.
+Messages of Chromium's DevTools protocol pass through pipes (``--remote-debugging-pipe``), so no network port is opened.
+If this process ends, the pipes close and the browser ends too.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REMEDY: Final = (
     f"install one (Debian, Ubuntu: apt-get install chromium) or name its program in {VARIABLE}; "
     "pages (.html) and plots need none"
 )
-# Pages load nothing from outside (the resolver's rule), and WebGL is drawn by the processor.
+# The host resolver rule blocks all network access of the page. SwiftShader renders WebGL without a graphics card.
 FLAGS: Final = """
 --headless --remote-debugging-pipe --force-device-scale-factor=1 --hide-scrollbars --mute-audio
 --no-first-run --no-default-browser-check --disable-background-networking --disable-breakpad
@@ -41,12 +41,12 @@ FLAGS: Final = """
 READ_FD, WRITE_FD = 3, 4
 
 CHUNK: Final = 1 << 20
-#: Time that a browser is given to end by itself, seconds.
+#: Waiting time for the browser to end without a signal, seconds.
 EXIT_SECONDS: Final = 3.0
 
 
 def find_browser() -> str:
-    """Return the path of the browser: from ``POSEKIT_BROWSER``, else the first of `NAMES` on PATH.
+    """Return the path of the browser: ``POSEKIT_BROWSER`` if set, otherwise the first of `NAMES` on PATH.
 
     Raises
     ------
@@ -64,19 +64,19 @@ def find_browser() -> str:
 
 
 class Browser:
-    """A browser with one page. It is a context manager: at its end all processes are stopped.
+    """A browser with one page. As a context manager, it stops all browser processes on exit.
 
     Parameters
     ----------
     size : (int, int)
         Width and height of the page, pixels.
     timeout : float
-        Time that one step may take, seconds; after it the browser is ended.
+        Largest duration of one step, seconds; after this time the browser is stopped.
 
     Raises
     ------
     ViewerError
-        If no browser is found, or if it does not start.
+        If no browser is found, or if the browser does not start.
     """
 
     def __init__(self, *, size: tuple[int, int] = (1280, 720), timeout: float = 60.0) -> None:
@@ -111,7 +111,7 @@ class Browser:
         self.close()
 
     def close(self) -> None:
-        """End the browser and remove its files; closing it again does nothing."""
+        """Stop the browser and remove its files. A second call does nothing."""
         if self._end.alive:
             self._session = None
             with contextlib.suppress(ViewerError):
@@ -126,7 +126,7 @@ class Browser:
         self._ask("Emulation.setDeviceMetricsOverride", **metrics)
 
     def open(self, page: Path) -> None:
-        """Load an HTML file and wait until it is loaded."""
+        """Load an HTML file and wait until loading is complete."""
         self.requests.clear()
         refused = self._ask("Page.navigate", url=page.resolve().as_uri()).get("errorText")
         if refused:
@@ -136,12 +136,12 @@ class Browser:
         )
 
     def evaluate(self, expression: str) -> Any:
-        """Run JavaScript in the page and return its value; a promise is awaited.
+        """Run JavaScript in the page and return its value, or the result of its promise.
 
         Raises
         ------
         ViewerError
-            If the page throws an error; its text is the page's.
+            If the script throws an error; the message is the script's.
         """
         answer = self._ask("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in answer:
@@ -151,13 +151,13 @@ class Browser:
         return answer["result"].get("value")
 
     def screenshot(self) -> bytes:
-        """Return the page as PNG."""
+        """Return a picture of the page as PNG."""
         import base64
 
         return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
 
     def _ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """Send a command and wait for its result; events on the way are kept if they are requests."""
+        """Send a command and wait for its result; keep the request events that arrive before it."""
         self._count += 1
         message: dict[str, Any] = {"id": self._count, "method": method, "params": params}
         if self._session is not None:
@@ -210,7 +210,7 @@ class Browser:
 
 
 def _start(program: str, folder: Path) -> tuple[int, int, int]:
-    """Start the browser in its own process group; return its id and this process's ends of the pipes."""
+    """Start the browser in its own process group; return the process id and our file descriptors of the pipes."""
     flags = [*FLAGS, "--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={folder / 'profile'}"]
     if os.geteuid() == 0:
         flags.append("--no-sandbox")  # Chromium refuses to run as root with it
@@ -239,21 +239,21 @@ def _start(program: str, folder: Path) -> tuple[int, int, int]:
 
 
 def _high(fd: int) -> int:
-    """Move a file descriptor away from the numbers that the browser's pipes will have."""
+    """Move a file descriptor to a number that the browser's pipes do not use."""
     moved = fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10)
     os.close(fd)
     return moved
 
 
 def _ready(fd: int, event: int, deadline: float) -> bool:
-    """Wait until a pipe can be used or is closed at the other end; False after the deadline."""
+    """Wait until a pipe is ready or closed by the browser; return False after the deadline."""
     waiting = select.poll()
     waiting.register(fd, event)
     return bool(waiting.poll(max(deadline - time.monotonic(), 0) * 1000))
 
 
 def _finish(pid: int, write: int, read: int, folder: Path) -> None:
-    """Let the browser end, or end it with all processes of its group, and remove its folder."""
+    """Wait until the browser ends, or stop its process group; then remove its folder."""
     for fd in (write, read):
         os.close(fd)
     deadline = time.monotonic() + EXIT_SECONDS

@@ -1,4 +1,4 @@
-"""Files of pictures: PNG, GIF and MP4 as bytes."""
+"""Encode pictures as PNG, GIF and MP4."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from posekit.errors import InputError
 
 Pixels = NDArray[np.uint8]
 
-#: Largest number of pictures per second; a faster recording is thinned out and keeps its speed.
+#: Largest number of pictures per second. Faster recordings are subsampled and keep their speed.
 FASTEST: Final = {".gif": 20.0, ".mp4": 60.0}
 
-#: Pictures a second of an animation whose rate is not known.
+#: Pictures per second of an animation with unknown rate.
 USUAL_RATE: Final = 10.0
 
 
 def stride(suffix: str, rate: float | None) -> int:
-    """Return the step between the frames of a recording that an animation shows."""
+    """Return N so that an animation shows every Nth frame of a recording."""
     return max(1, int(np.ceil((rate or USUAL_RATE) / FASTEST[suffix] - 1e-6))) if suffix in FASTEST else 1
 
 
 def encoded(frames: Iterable[Pixels], suffix: str, rate: float | None) -> bytes:
-    """Return the first picture as PNG, or all as an animation.
+    """Return the first picture as PNG, or all pictures as an animation.
 
     Parameters
     ----------
     frames : iterable of uint8 array (height, width, 3)
     suffix : {".png", ".gif", ".mp4"}
     rate : float or None
-        Pictures a second; 10 if it is not known.
+        Pictures per second; 10 if None.
 
     Raises
     ------
@@ -60,12 +60,12 @@ def encoded(frames: Iterable[Pixels], suffix: str, rate: float | None) -> bytes:
 
 
 def library(name: str, package: str, extra: str) -> Any:
-    """Import a module that is not always installed.
+    """Import a module of an optional package.
 
     Raises
     ------
     InputError
-        If its package is missing; with the extra of posekit that brings it.
+        If the package is not installed; the message names posekit's extra to install.
     """
     try:
         return import_module(name)
@@ -86,7 +86,7 @@ def av_library() -> Any:
 
 
 def _encode_mp4(buffer: io.BytesIO, frames: Iterator[Pixels], rate: float) -> None:
-    """Write H.264, or MPEG-4 where the encoder is not built in."""
+    """Write H.264, or MPEG-4 if no H.264 encoder is available."""
     av = av_library()
     encoder = next(name for name in ("libx264", "libopenh264", "mpeg4") if name in av.codecs_available)
     first = next(frames)

@@ -1,4 +1,4 @@
-"""Bodies over photographs and films, through the camera that took them: capsules by depth, bones, image points."""
+"""Draw bodies over photographs and films with the camera of the view: capsules by depth, bones, image points."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ BODY_OPACITY: Final = 0.5
 #: Opacity of the body, and of the bones of alternative postures.
 OTHER_OPACITY: Final = 0.45
 
-#: Factor by which a picture is painted larger, for smooth edges.
+#: Supersampling factor, for smooth edges.
 FINER: Final = 2
 
-#: Number of points around each end of a capsule, and number of corners of its outline.
+#: Number of points on the rim of a sphere, and number of corners of a capsule's outline.
 RIM_POINTS, CORNERS = 24, 48
 
 #: Points (19, 3) in the camera frame, metres, and the scale of a scaled orthographic camera.
@@ -46,26 +46,26 @@ def overlaid(
     which: str,
     moving: bool,
 ) -> tuple[Iterator[Pixels], float | None]:
-    """Return pictures with bodies over them, and the pictures a second.
+    """Return pictures with bodies drawn over them, and the number of pictures per second.
 
     Parameters
     ----------
     source : Recovery, View with truth, or Motion in the world of the view's camera
     pictures : Path
-        Picture, folder of pictures or film; matched with the frames by name, else by number or by time.
+        Picture, folder of pictures or film. Pictures correspond to frames by name, otherwise by number or by time.
     view : View
-        Camera and image points; for a view with truth that view itself.
+        Camera and image points. If the source is a view, the same view.
     frame : int or (int, int), optional
-        Frames that are drawn.
+        Frames to draw.
     which : str
-        ``all`` draws the alternative postures of a result, too.
+        ``all`` also draws the alternative postures of a result.
     moving : bool
-        Draw all frames instead of the first.
+        Draw all frames instead of only the first.
 
     Raises
     ------
     InputError
-        If the view or its pictures are missing or do not fit.
+        If the view or its pictures are missing, or if their numbers differ.
     """
     view = source if isinstance(source, View) else view
     if isinstance(source, Report):
@@ -94,7 +94,7 @@ def overlaid(
 
 
 def _of_recovery(recovery: Recovery, which: str) -> list[list[Posture]]:
-    """Return the postures of each frame, the one that is drawn as a body first."""
+    """Return the postures of each frame; the first is drawn as a body."""
     table, answer, found = recovery.survivors, recovery.answer, []
     scale, head = np.asarray(table.scale), np.asarray(table.head)
     for k, best in enumerate(np.asarray(answer.survivor).tolist()):
@@ -107,7 +107,7 @@ def _of_recovery(recovery: Recovery, which: str) -> list[list[Posture]]:
 
 
 def _of_joints(source: Any, view: View) -> tuple[Figure, list[list[Posture]]]:
-    """Return the truth of a view, or a motion moved into the camera frame."""
+    """Return the true joints of a view, or a motion in the camera frame."""
     camera, joints = view.camera, source.truth if isinstance(source, View) else source.figure_joints
     if not isinstance(source, View) and isinstance(camera, PinholeCamera) and camera.R is not None:
         joints = joints @ camera.R.T + (0.0 if camera.t is None else camera.t)
@@ -116,7 +116,7 @@ def _of_joints(source: Any, view: View) -> tuple[Figure, list[list[Posture]]]:
 
 
 def _painted(image: Any, postures: list[Posture], figure: Figure, view: View, row: int) -> Any:
-    """Paint the first posture as a body, the others as bones, and ring the image points."""
+    """Paint the first posture as a body, the other postures as bones, and the image points as rings."""
     from PIL import Image, ImageDraw
 
     zoom = FINER
@@ -161,9 +161,9 @@ def _outlines(
 ) -> list[tuple[str, Array]]:
     """Return the name and outline (48, 2) of each capsule of a posture, the farthest first.
 
-    An outline is the convex hull of the images of the capsule's two spheres, from its support in 48 directions. From
-    the centre of projection a sphere of radius r at c shows the circle about c (1 - r^2 / c^2), across c, of radius r
-    sqrt(1 - r^2 / c^2); in parallel rays the circle about c itself.
+    An outline is the convex hull of the images of the capsule's two spheres, computed in 48 directions. For a camera at
+    the origin, the visible rim of a sphere with radius r and centre c is a circle normal to c with centre
+    c (1 - r^2 / |c|^2) and radius r sqrt(1 - r^2 / |c|^2). For parallel rays, the circle has centre c and radius r.
     """
     turns = 2 * np.pi * np.arange(CORNERS) / CORNERS
     directions, found = np.stack([np.cos(turns), np.sin(turns)]), []
@@ -179,7 +179,7 @@ def _outlines(
 
 
 def _rim(middle: Array, radius: float, perspective: bool) -> Array:
-    """Return the visible outline of a sphere, a circle (24, 3); NaN if the eye is inside."""
+    """Return points (24, 3) on the visible rim of a sphere; NaN if the camera is inside the sphere."""
     away = float(np.linalg.norm(middle))
     forward, shrunk = np.array([0.0, 0.0, 1.0]), 1.0
     if perspective:
@@ -192,7 +192,7 @@ def _rim(middle: Array, radius: float, perspective: bool) -> Array:
 
 
 def _matched(path: Path, view: View) -> tuple[list[int], Any]:
-    """Return the number of each frame's picture, and a function that reads pictures by their ascending numbers."""
+    """Return the picture number of each frame, and a function that reads pictures with given ascending numbers."""
     if path.suffix.lower() in FILMS and path.is_file():
         count, rate = _film_facts(path)
         numbers = list(range(len(view)))
@@ -217,19 +217,19 @@ def _matched(path: Path, view: View) -> tuple[list[int], Any]:
 
 
 def _by_name(files: list[Path], names: tuple[str, ...]) -> list[int] | None:
-    """Find files by the names that a detector gave, with an ending or without."""
+    """Find files by the picture names in a detector's file, with or without suffix."""
     places = {one.stem: k for k, one in enumerate(files)} | {one.name: k for k, one in enumerate(files)}
     found = [places.get(PurePath(name).name, places.get(PurePath(name).stem, -1)) for name in names]
     return found if found and min(found) >= 0 else None
 
 
 def _order(path: Path) -> list[tuple[int, int | str]]:
-    """Sort names so that numbers in them count as numbers."""
+    """Return a sorting key that compares the numbers in names by value."""
     return [(0, int(word)) if word.isdecimal() else (1, word) for word in re.split(r"(\d+)", path.name)]
 
 
 def _photograph(path: Path) -> Any:
-    """Read a picture in RGB, upright by its orientation tag, as detectors read it."""
+    """Read a picture as RGB, rotated by its orientation tag, as detectors do."""
     from PIL import ImageOps
 
     try:
@@ -251,7 +251,7 @@ def _film_facts(path: Path) -> tuple[int, float]:
 
 
 def _film(path: Path, wanted: list[int]) -> Iterator[Any]:
-    """Read pictures of a film by their ascending numbers."""
+    """Read the pictures of a film with given ascending numbers."""
     with av_library().open(str(path)) as film:
         left = list(wanted)
         for number, picture in enumerate(film.decode(video=0)):

@@ -1,11 +1,11 @@
-// Hands recorded commands on to meshcat's viewer, and takes pictures of what it shows.
+// Sends recorded commands to meshcat's viewer and renders pictures.
 "use strict";
 const posekit = (() => {
   function apply(commands) {
-    viewer.renderer.shadowMap.enabled = false; // shadows cost more than all the rest
+    viewer.renderer.shadowMap.enabled = false; // shadows take most of the rendering time
     const parts = path => path.split("/").filter(Boolean);
     for (const text of commands) {
-      if (Array.isArray(text)) { // an object that is there already, once more
+      if (Array.isArray(text)) { // a copy of an existing object
         const [from, to] = text.map(parts);
         viewer.set_object(to, viewer.scene_tree.find(from.concat(["<object>"])).object.clone());
         continue;
@@ -15,8 +15,8 @@ const posekit = (() => {
     }
   }
 
-  // Draws one picture: a data URL of a PNG. `world` is the camera's pose in the z-up world and `projection` its
-  // clip matrix, both 16 numbers, column by column.
+  // Return one picture as the data URL of a PNG. `world` is the camera's pose in the z-up world and `projection` its
+  // projection matrix; both have 16 numbers in column-major order.
   function picture(shot) {
     const camera = new MeshCat.THREE.PerspectiveCamera();
     camera.matrixAutoUpdate = false;
@@ -30,7 +30,7 @@ const posekit = (() => {
       renderer.setSize(w, h, false);
     }
     const background = viewer.scene.background;
-    viewer.scene.background = new MeshCat.THREE.Color(1, 1, 1); // a colour is drawn faster than meshcat's gradient
+    viewer.scene.background = new MeshCat.THREE.Color(1, 1, 1); // a uniform background renders faster than meshcat's gradient
     renderer.render(viewer.scene, camera);
     viewer.scene.background = background;
     if (renderer.getContext().isContextLost()) throw new Error("the WebGL context is lost");

@@ -1,4 +1,4 @@
-"""Plots: joint angles over time with their limits, and the findings of a report on a timeline."""
+"""Plot joint angles over time with their limits, and the findings of a report on a timeline."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ STYLE: Final[Any] = {
     "legend.frameon": False,
     "svg.hashsalt": "posekit",  # the same drawing gives the same file
 }
-#: Frames below which each is a point on the line, too.
+#: Number of frames below which the curve has a marker for each frame.
 MARKED_FRAMES: Final = 40
 
-#: Clips in one timeline, the worst first.
+#: Largest number of clips in a timeline, the worst first.
 MOST_CLIPS: Final = 12
 
 
@@ -59,13 +59,13 @@ def plotted(
     Parameters
     ----------
     source : Motion, Recovery or Report
-        A motion is judged by the usual checks for its timeline.
+        For a timeline, a motion is checked with the default checks.
     kind : {"angles", "timeline"}
     suffix : {".png", ".svg", ".pdf"}
     frame : int or (int, int), optional
-        Frames whose angles are drawn.
+        Frames to draw.
     view : View, optional
-        View of a result: the angles of its truth are drawn, too.
+        View of a result. If it has true joints, their angles are drawn too.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def plotted(
 
 
 def angles(source: Motion | Recovery, frame: int | tuple[int, int] | None, view: View | None) -> Figure:
-    """Plot joint angles over time: a panel an angle, grey outside its limits; survivors of a result as a band."""
+    """Plot joint angles over time, one panel per angle. Grey marks angles beyond limits; a band shows all survivors."""
     from matplotlib.figure import Figure
 
     limits = np.degrees(np.array([load_figure().limits.lower, load_figure().limits.upper]))
@@ -117,7 +117,7 @@ def angles(source: Motion | Recovery, frame: int | tuple[int, int] | None, view:
     lines = -(-len(names) // columns)
     width, height = 2.6 * columns, 1.5 * lines + 0.6
     figure = Figure(figsize=(width, height))
-    # By hand: a layout engine takes seconds for so many panels.
+    # Margins are set here because a layout engine takes seconds for so many panels.
     edges = {"left": 0.7 / width, "right": 1 - 0.1 / width, "bottom": 0.5 / height, "top": 1 - 0.3 / height}
     figure.subplots_adjust(**edges, hspace=0.35, wspace=0.22)
     panels = figure.subplots(lines, columns, sharex=True, squeeze=False).ravel()
@@ -140,14 +140,14 @@ def angles(source: Motion | Recovery, frame: int | tuple[int, int] | None, view:
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     figure.supxlabel("seconds" if seconds else "frame", fontsize=9, y=0.1 / height)
-    parts = ["degrees; grey: outside the URDF's limits"]
-    parts += ["band: all survivors"] * (bands is not None) + ["dashed: truth"] * (true is not None)
+    parts = ["degrees; grey: beyond the URDF's limits"]
+    parts += ["band: all survivors"] * (bands is not None) + ["dashed: true posture"] * (true is not None)
     figure.supylabel("; ".join(parts), fontsize=9, x=0.1 / width)
     return figure
 
 
 def _bands(recovery: Recovery, rows: Any) -> Array:
-    """Return the least and the largest angle of the survivors of each frame (2, F, 22), degrees."""
+    """Return the minimum and maximum angle of the survivors of each frame (2, F, 22), degrees."""
     every = np.degrees(recovery.survivors.q[:, load_figure().angle_index])
     found = np.full((2, len(rows), every.shape[1]), np.nan)
     for k, row in enumerate(rows.tolist()):
@@ -158,7 +158,7 @@ def _bands(recovery: Recovery, rows: Any) -> Array:
 
 
 def timeline(report: Report) -> Figure:
-    """Plot the worst clips of a report: a row a check that finds something, a bar a span of frames."""
+    """Plot the worst clips of a report: one row per check with findings, one bar per span of frames."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
@@ -185,6 +185,6 @@ def timeline(report: Report) -> Figure:
         panel.set_title(title, loc="left")
     panels[-1].set_xlabel("frame")
     keys = [Patch(color=COLOURS["right"], label="invalid"), Patch(**UNDECIDED, label="undecided")]
-    keys.append(Patch(color=GOOD, label="longest valid run"))
+    keys.append(Patch(color=GOOD, label="longest valid span"))
     figure.legend(handles=keys, loc="outside lower right", ncols=3)
     return figure

@@ -1,4 +1,4 @@
-"""Pictures of bodies: Pinocchio's MeshcatVisualizer, recorded without a server and drawn in a headless browser."""
+"""Draw pictures of bodies: Pinocchio's MeshcatVisualizer without its server, rendered in a headless browser."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from posekit.viewer.browser import Browser
 from posekit.viewer.files import Pixels, pillow
 from posekit.viewer.subjects import COLOURS, Subject, side
 
-#: Factor, in both directions, by which a picture is drawn larger before it is scaled down.
+#: Supersampling factor along both axes.
 SUPERSAMPLE: Final = 2
 
-#: Side of a picture with supersampling, pixels: the limit of WebGL.
+#: Largest width and height of a supersampled picture, pixels: the limit of WebGL.
 MOST_PIXELS: Final = 8192
 
 FOV_DEGREES: Final = 20.0
 USUAL_ELEVATION: Final = 8.0
-#: Room around the bodies, as a factor.
+#: Ratio of the shown extent to the extent of the bodies.
 FRAME_MARGIN: Final = 1.03
 
 #: Distance that bodies extend beyond the origins of their links, metres.
 BODY_RADIUS: Final = 0.12
 
-#: Frames over which the eye's way is smoothed when it follows a body.
+#: Number of frames over which the path of the virtual camera is smoothed.
 SMOOTH_FRAMES: Final = 31
 
 GRID_METRES: Final = 0.5
@@ -50,7 +50,7 @@ MOST_GRID_LINES: Final = 120
 #: Height of the strip with captions under a picture, pixels.
 STRIP: Final = 44
 
-#: Commands that are sent to the browser at once; meshes are large.
+#: Number of commands in one message to the browser.
 BATCH: Final = 40
 
 #: Distance of the drawn image plane from the camera, metres.
@@ -61,12 +61,12 @@ LEAST_DRAWN: Final = 2e-4
 
 
 class Recorder:
-    """A replacement for meshcat's window: it keeps the commands that it is sent, packed as meshcat's pages read them.
+    """Record meshcat commands instead of sending them to a server, in the encoding that meshcat's page reads.
 
     Attributes
     ----------
     twin : (str, str) or None
-        Node whose objects are copied, and the node that gets the copies: a mesh is sent once.
+        Source node and target node of copied objects, so that each mesh is sent only once.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class Recorder:
         self.twin: tuple[str, str] | None = None
 
     def send(self, command: Any) -> None:
-        """Keep a command."""
+        """Record a command."""
         lowered = command.lower()
         if self.twin is not None and lowered["type"] == "set_object":
             path = str(lowered["path"])
@@ -83,20 +83,20 @@ class Recorder:
             self.commands.append(base64.b64encode(umsgpack.packb(lowered)).decode())
 
     def taken(self) -> list[str | tuple[str, str]]:
-        """Return the commands since the last call: as base64, or as the paths of an object and of its copy."""
+        """Return the commands since the last call: each as base64, or as the paths of an object and of its copy."""
         taken, self.commands = self.commands, []
         return taken
 
 
 class Stage:
-    """Bodies that Pinocchio's visualizer draws into a recorder, frame by frame.
+    """Draw bodies frame by frame with Pinocchio's visualizer into a `Recorder`.
 
     Parameters
     ----------
     subjects : sequence of Subject
-        Bodies; all have the same number of frames.
+        Bodies with equal numbers of frames.
     camera : (array (K, 2, 3), array (K, 3)), optional
-        Lines of a camera and its image, world, metres, and their colours; see `camera_lines`.
+        Lines of a camera and its image, world frame, metres, and their colours; see `camera_lines`.
     """
 
     def __init__(self, subjects: Sequence[Subject], camera: tuple[Array, Array] | None = None) -> None:
@@ -121,7 +121,7 @@ class Stage:
             self._draw_lines("camera", *camera)
 
     def _follow(self, points: Array) -> Array:
-        """Return the middle that the eye looks at in each frame (T, 3): the bodies' way, smoothed."""
+        """Return the point (T, 3) at which the camera looks in each frame: the smoothed centre of the bodies."""
         known = np.asarray(np.isfinite(points).all(axis=2))
         whole = np.asarray(known.any(axis=1))
         middles = (np.nanmin(points[whole], axis=1) + np.nanmax(points[whole], axis=1)) / 2
@@ -132,7 +132,7 @@ class Stage:
         return np.asarray(windows.mean(axis=-1))
 
     def _loaded(self, k: int, subject: Subject) -> MeshcatVisualizer:
-        """Load the bodies of one subject under a node of its own."""
+        """Load the bodies of one subject under a separate node."""
         robot = subject.robot
         bodies = robot.visuals if robot.visuals.ngeoms else robot.geometry
         coloured = _coloured(robot) if isinstance(robot, Figure) else pin.GeometryModel(bodies)
@@ -149,7 +149,7 @@ class Stage:
         return visualizer
 
     def _draw_ground(self, low: Array, high: Array) -> None:
-        """Draw a grid of 0.5 m under the lowest link; a longer way has a wider grid."""
+        """Draw a ground grid with a spacing of 0.5 m under the lowest link; a longer path has a wider spacing."""
         wide = GRID_METRES * max(1, np.ceil(((high - low)[:2].max() + 4) / MOST_GRID_LINES / GRID_METRES))
         self.grid = float(wide)
         first, last = np.floor(low[:2] / wide - 2) * wide, np.ceil(high[:2] / wide + 2) * wide
@@ -170,7 +170,7 @@ class Stage:
         self._viewer[name].set_object(made)
 
     def show(self, frame: int) -> list[str | tuple[str, str]]:
-        """Pose all bodies as in one frame and return the recorded commands."""
+        """Set all bodies to their posture in one frame and return the recorded commands."""
         for k, (subject, visualizer) in enumerate(zip(self.subjects, self._bodies, strict=True)):
             q = subject.q[frame]
             known = bool(np.isfinite(q).all())
@@ -180,7 +180,7 @@ class Stage:
         return self.recorder.taken()
 
     def eyes(self, size: tuple[int, int], elevation: float | None) -> tuple[Array, Array]:
-        """Return the poses (T, 4, 4) of an eye at -y that sees all bodies, and its projection (4, 4)."""
+        """Return poses (T, 4, 4) of a camera at -y that shows all bodies, and its projection matrix (4, 4)."""
         e = np.radians(USUAL_ELEVATION if elevation is None else elevation)
         back, right = np.array([0.0, -np.cos(e), np.sin(e)]), np.array([1.0, 0.0, 0.0])
         up = np.cross(back, right)
@@ -205,7 +205,7 @@ class Stage:
 
 
 def _coloured(figure: Figure) -> pin.GeometryModel:
-    """Return the figure's capsules, coloured by side, with a girdle and a neck, which have no collision bodies."""
+    """Return the figure's capsules, coloured by side, with additional capsules of shoulders, hips and neck."""
     bodies = pin.GeometryModel(figure.geometry)
     points, data = figure.neutral_points, figure.model.createData()
     pin.forwardKinematics(figure.model, data, figure.neutral)
@@ -233,15 +233,15 @@ def _coloured(figure: Figure) -> pin.GeometryModel:
 def camera_lines(
     view: View, frame: int, joints: Array, R_world_cam: Array, offset: Array
 ) -> tuple[Array, Array]:
-    """Return the lines (K, 2, 3) of a camera, its rays and its image, world, metres, and their colours (K, 3).
+    """Return the lines (K, 2, 3) of a camera, its rays and its image, world frame, metres; and their colours (K, 3).
 
     Parameters
     ----------
     view : View
     frame : int
-        Frame whose image is drawn.
+        Frame to draw.
     joints : array (14, 3)
-        Posture that the rays lead to, camera frame, metres.
+        Joints at the ends of the rays, camera frame, metres.
     R_world_cam : array (3, 3)
     offset : array (3,)
         From the camera frame to the world.
@@ -283,19 +283,19 @@ def pictures(
     ----------
     subjects : sequence of Subject
     captions : sequence of str
-        Line under each picture; the labels of the bodies stand under the bodies.
+        Text under each picture. The labels of the bodies are printed under the bodies.
     size : (int, int)
-        Pixels.
+        Width and height, pixels.
     elevation : float, optional
-        Degrees above the level from which the eye looks.
+        Elevation of the virtual camera above the horizontal plane, degrees.
     camera : (array (K, 2, 3), array (K, 3)), optional
         Lines and colours of a camera, see `camera_lines`.
     image : array (P, 2), optional
-        Image points that stand in the upper left corner: what the camera saw.
+        Image points, drawn in the upper left corner.
     seen_from : str
-        Description of the eye's position, for the last line under the picture.
+        Description of the viewing direction, for the last line under the picture.
     step : int
-        Draw each frame whose number is a multiple of it.
+        Draw every frame whose number is a multiple of `step`.
 
     Yields
     ------
@@ -342,7 +342,7 @@ def pictures(
 def _captioned(
     picture: Any, stage: Stage, projection: Array, line: str, seen_from: str, image: Array | None, inset: int
 ) -> Pixels:
-    """Add a strip with the caption or the label of each body under its place, and a column with the image."""
+    """Add the caption and the labels of the bodies below the picture, and the image points in a column."""
     from PIL import Image, ImageDraw, ImageFont
 
     width, height = picture.size
@@ -369,7 +369,7 @@ def _captioned(
 
 
 def _draw_image(pen: Any, image: Array, box: tuple[int, int, int, int], font: Any) -> None:
-    """Draw image points (P, 2) as a stick figure into a box: what the camera saw."""
+    """Draw image points (P, 2) as a stick figure into a box."""
     known = np.asarray(np.isfinite(image).all(axis=1))
     low, high = image[known].min(axis=0), image[known].max(axis=0)
     extent = np.array([box[2] - box[0] - 16, box[3] - box[1] - 36])
@@ -379,9 +379,7 @@ def _draw_image(pen: Any, image: Array, box: tuple[int, int, int, int], font: An
     for a, b in TREE_SEGMENTS:
         if known[a] and known[b]:
             pen.line([tuple(places[a]), tuple(places[b])], fill=COLOURS[side(POINTS[b])], width=3)
-    pen.text(
-        ((box[0] + box[2]) / 2, box[3] - 10), "what the camera saw", fill=(90, 90, 90), font=font, anchor="mm"
-    )
+    pen.text(((box[0] + box[2]) / 2, box[3] - 10), "image points", fill=(90, 90, 90), font=font, anchor="mm")
 
 
 def meshcat_script() -> str:
@@ -390,7 +388,7 @@ def meshcat_script() -> str:
 
 
 def _check_drawn(pixels: Pixels) -> None:
-    """Refuse a picture of one colour."""
+    """Raise an error if a picture has a single colour."""
     background = pixels[0, 0].astype(int)
     share = float((np.abs(pixels.astype(int) - background).max(axis=-1) > 8).mean())
     if share < LEAST_DRAWN:

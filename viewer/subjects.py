@@ -1,6 +1,6 @@
-"""Subjects of a picture: bodies over time as configurations of robots.
+"""Convert motion and results to subjects of a picture: configurations of robots over time.
 
-The world's z points up; the eye looks along +y.
+In the world frame, z points up and the virtual camera looks along +y.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ from posekit.skeleton import JOINT
 #: Colours (red, green, blue) of right limbs, left limbs and the trunk, 0 to 255.
 COLOURS: Final = {"right": (230, 115, 26), "left": (38, 102, 204), "middle": (140, 148, 158)}
 
-#: Bodies that one picture shows side by side.
+#: Largest number of bodies side by side in a picture.
 MOST_BODIES: Final = 12
 
-#: Frames of a motion that one picture shows, unless a frame or a range is given.
+#: Number of frames of a motion in a picture, if no frames are requested.
 USUAL_BODIES: Final = 6
 
-#: Representatives of a frame that one picture shows.
+#: Largest number of representatives in a picture.
 USUAL_POSTURES: Final = 4
 
 #: Free space between two bodies side by side, metres.
 GAP: Final = 0.2
 
-#: Default angle of the eye from the front, or from the view's camera, degrees; it shows depth.
+#: Default azimuth of the virtual camera from the front, or from the view's camera, degrees.
 USUAL_AZIMUTH: Final = 35.0
 
-#: Postures per second of an animation of postures without times.
+#: Pictures per second in an animation of postures without times.
 POSTURES_PER_SECOND: Final = 2.0
 
 
@@ -60,15 +60,15 @@ class Subject(Record):
     Parameters
     ----------
     robot : Robot
-        Model whose bodies are drawn.
+        Robot to draw.
     q : array (T, nq)
         Configurations; a row with NaN is not drawn.
     R_world_data : array (3, 3)
-        Rotation from the data's frame to the world, z up.
+        Rotation from the frame of the data to the world frame.
     offset : array (3,)
-        Added to the world position, metres.
+        Displacement in the world frame, metres.
     label : str
-        Line under the body.
+        Text under the body.
     """
 
     robot: Robot
@@ -79,19 +79,19 @@ class Subject(Record):
 
     @cached_property
     def points(self) -> Array:
-        """Places of the robot's links (T, P, 3), world, metres; NaN where the configuration is not known."""
+        """Positions of the robot's links (T, P, 3), world frame, metres; NaN if the configuration is unknown."""
         return np.asarray(link_places(self.robot, self.q) @ self.R_world_data.T + self.offset)
 
 
 def link_frames(robot: Robot) -> list[int]:
-    """Return the indices of the frames of a model that are links."""
+    """Return the indices of a model's frames that belong to links."""
     import pinocchio as pin
 
     return [k for k, one in enumerate(robot.model.frames) if one.type == pin.FrameType.BODY]
 
 
 def link_places(robot: Robot, q: Array) -> Array:
-    """Return the origins (N, L, 3) of all links at configurations (N, nq), metres; NaN for incomplete ones."""
+    """Return the origins (N, L, 3) of all links at configurations (N, nq), metres; NaN if a configuration has NaN."""
     places = frame_places(robot.model, q, link_frames(robot))
     places[~np.isfinite(q).all(axis=1)] = np.nan
     return places
@@ -113,24 +113,24 @@ def subjects_of(
     azimuth: float | None = None,
     moving: bool = False,
 ) -> tuple[list[Subject], list[str], float | None]:
-    """Return the bodies to draw, a caption for each picture, and the pictures a second (None: not known).
+    """Return the bodies to draw, a caption for each picture, and the pictures per second (None if unknown).
 
     Parameters
     ----------
     source : Motion or Recovery
     which : str
-        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers as ``0,4``. By default a still picture
-        shows the frame's representatives, and a moving one the followed path or the answers.
+        Postures of a result: ``answer``, ``path``, ``all``, ``first`` or numbers such as ``0,4``. Default:
+        representatives for a picture; the path, or else the answers, for an animation.
     frame : int or (int, int), optional
-        Frame, or first and last, from 0.
+        Frame, or first and last frame, numbered from 0.
     urdf : str
         Robot of configurations whose robot is not known.
     view : View, optional
         View of the result, for the tilt of its camera.
     azimuth : float, optional
-        Degrees by which the eye is turned from the front of a motion, or from the camera of a result.
+        Azimuth of the virtual camera, degrees, from the front of a motion or from the camera of a result.
     moving : bool
-        Draw one frame a picture; otherwise frames and alternative postures stand side by side in one picture.
+        Draw one frame per picture; otherwise draw frames and alternative postures side by side in one picture.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def subjects_of(
 
 
 def caption(motion: Motion, row: int) -> str:
-    """Return the number and the time of a frame in words."""
+    """Return a text with the number and the time of a frame."""
     time = float(motion.time[row])  # type: ignore[index]
     text = f"frame {motion.frame[row]}" + (f", {time:.2f} s" if np.isfinite(time) else "")  # type: ignore[index]
     clips = [name for name in motion.clips if name]
@@ -171,7 +171,7 @@ def caption(motion: Motion, row: int) -> str:
 
 
 def configured(motion: Motion, urdf: str = "") -> tuple[Robot, Array]:
-    """Return the robot of a motion and its configurations (T, nq): the motion's own, or the figure laid onto it."""
+    """Return the robot of a motion and its configurations (T, nq); for joint positions, the figure fitted to them."""
     name = urdf or motion.robot
     if motion.q is not None and name and name != "figure":
         robot = load_robot(name)
@@ -190,7 +190,7 @@ def configured(motion: Motion, urdf: str = "") -> tuple[Robot, Array]:
 
 
 def upright(motion: Motion) -> Array:
-    """Return the rotation (3, 3) that turns a motion's up axis into z; an unknown axis is taken from the trunks."""
+    """Return the rotation (3, 3) from a motion's up axis to z; an unknown up axis is estimated from the trunks."""
     up = motion.up
     if not up and motion.joints is not None:
         joints = motion.figure_joints
@@ -204,9 +204,9 @@ def upright(motion: Motion) -> Array:
 
 
 def upright_camera(view: View | None) -> Array:
-    """Return the rotation (3, 3) from the camera frame to a world, z up, whose y is the camera's level direction.
+    """Return the rotation (3, 3) from the camera frame to a world: z up, y the horizontal camera direction.
 
-    A camera whose pose is not known is taken as level.
+    A camera of unknown pose is assumed to be level.
     """
     z, ahead = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     camera = None if view is None else view.camera
@@ -219,7 +219,7 @@ def upright_camera(view: View | None) -> Array:
 
 
 def facing(robot: Robot, q: Array, R: Array) -> Array:
-    """Turn an upright rotation about z so that the front of the first known frame looks at the eye (-y)."""
+    """Rotate about z so that the body in the first known frame faces the virtual camera (-y)."""
     known = q[np.isfinite(q).all(axis=1)]
     if not len(known):
         return R
@@ -247,7 +247,7 @@ def frame_rows(count: int, frame: int | tuple[int, int] | None, source: str) -> 
 
 
 def spread(count: int, most: int) -> NDArray[np.intp]:
-    """Return up to `most` numbers, evenly from the first to the last of `count`."""
+    """Return up to `most` evenly spaced numbers from 0 to `count` - 1."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round()).astype(np.intp)
 
 
@@ -257,7 +257,7 @@ def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None)
     Raises
     ------
     InputError
-        If the source has no body to draw.
+        If no frame, or not the requested frame, has a posture.
     """
     counts, source = (
         np.bincount(recovery.survivors.frame, minlength=len(recovery)),
@@ -273,7 +273,7 @@ def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None)
 
 
 def chosen_rows(recovery: Recovery, number: int, which: str) -> NDArray[np.intp]:
-    """Return the rows of the survivors of one frame that `which` names; by default its representatives.
+    """Return the rows of the survivors of one frame that `which` selects; by default the representatives.
 
     Raises
     ------
@@ -309,7 +309,7 @@ def _alternatives(
 
 
 def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subject]:
-    """Place configurations (N, nq) side by side along the world's x, at their own heights."""
+    """Move configurations (N, nq) side by side along the x axis; their heights do not change."""
     made = [
         Subject(robot=robot, q=row[None], R_world_data=R, offset=np.zeros(3), label=label)
         for row, label in zip(q, labels, strict=True)
@@ -327,7 +327,7 @@ def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subj
 
 
 def as_motion(source: Any) -> Any:
-    """Return the truth of a view, or a robot at neutral, as a motion; other objects as they are."""
+    """Return the true joints of a view, or a robot's neutral configuration, as a motion; other objects unchanged."""
     if isinstance(source, Robot):
         return Motion(q=source.neutral[None], q_names=source.configuration_names, robot=source.source)
     if isinstance(source, View):

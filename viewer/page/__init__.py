@@ -1,4 +1,4 @@
-"""The page of a result, a motion or a report: one HTML file that loads nothing and works offline."""
+"""Write interactive pages of results, motions and reports: single HTML files that work offline."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any, Final
 from posekit.files import write_bytes
 from posekit.viewer.page.data import page_data
 
-#: Scripts of a page; each uses those before it.
+#: Scripts of a page; each script uses the scripts before it.
 SCRIPTS: Final = ("sight.js", "panel.js", "tables.js", "scene.js", "play.js")
 
-#: Content security policy of a page: nothing is loaded.
+#: Content security policy: the page loads no other files.
 POLICY: Final = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -33,13 +33,13 @@ def write_page(
     Parameters
     ----------
     source : Recovery, Motion or Report
-        A motion is judged by the usual checks; its page shows the findings beside the body.
+        A motion is checked with the default checks, and its page shows the findings.
     path : path
-        The HTML file.
+        HTML file to write.
     view : View, Motion or sequence of Motion, optional
-        The view of a result; or the motions that a report judges, in its order.
+        View of a result; or the motions of a report, in the same order.
     frame : int or (int, int), optional
-        Frame, or first and last, from 0; all by default.
+        Frame, or first and last frame, numbered from 0. Default: all frames.
     urdf : str
         Robot of configurations whose robot is not known.
 
@@ -54,7 +54,7 @@ def write_page(
 
 def page_html(data: Mapping[str, Any]) -> str:
     """Return the page of `posekit.viewer.page.data.page_data` as text."""
-    # No text of a file may end the script element or start a comment.
+    # Text from files must not end the script element or start a comment.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for letter in "<>&\u2028\u2029":
         text = text.replace(letter, f"\\u{ord(letter):04x}")

@@ -1,4 +1,4 @@
-"""Data of a page: the bodies of each frame in a world whose z points up, with their findings and probabilities."""
+"""Collect the data of a page: bodies of each frame in a world frame with z up, findings and probabilities."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from posekit.viewer import subjects as drawn
 
 Json = dict[str, Any]
 
-#: Largest number of frames of motion in a page; the worst clips are shown.
+#: Largest number of frames of motion in a page; beyond it, the page has only the worst clips.
 MOST_FRAMES: Final = 20_000
 
 MOST_POSTURES: Final = 60_000
-#: Most survivors in a page, and in one frame: the likeliest, and the representatives of the others.
+#: Largest numbers of survivors in a page and in one frame: the most probable survivors, and further representatives.
 MOST_OF_FRAME: Final = 400
 
 MOST_CLIPS: Final = 300
 MOST_SPANS: Final = 40
-#: Clips of a report, spans of a clip and reasons of rejection in a frame that a page lists.
+#: Largest numbers of listed clips of a report, spans of a clip, and reasons of rejection in a frame.
 MOST_REASONS: Final = 60
 
-#: Points are stored as whole steps from their frame's origin: the code of an unknown point, the largest number of
-#: steps, and the least step, metres.
+#: Points are stored as integers relative to the origin of their frame: code of an unknown point, largest integer, and
+#: smallest step, metres.
 UNKNOWN, LARGEST, FINEST = -32_768, 32_767, 1e-4
 
 #: Radius of the lines that represent a robot's links, metres.
@@ -49,16 +49,16 @@ LINK_RADIUS: Final = 0.025
 #: Height of the lowest joint above the ground, metres.
 SOLE: Final = 0.03
 
-#: Share of frames that may lie below the drawn ground: a single wrong frame does not move it.
+#: Share of frames that may lie below the drawn ground, so that single wrong frames do not lower it.
 LOW_SHARE: Final = 0.05
 
 #: Unit and factor in which the margins of these checks are shown.
 MARGIN_UNITS: Final = {"joint-range": ("°", 1.0), "rigid-parts": ("mm", 1e3), "collision": ("mm", 1e3)}
 
-#: Okabe & Ito's palette, one colour a group.
+#: Palette of Okabe & Ito, one colour per group.
 GROUP_COLOURS: Final = (0x009E73, 0xCC79A7, 0x56B4E9, 0xD55E00, 0xF0E442, 0x0072B2, 0xE69F00, 0x505050)
 
-#: Minimum difference in depth of a joint that is described as nearer or farther, metres.
+#: Minimum depth difference at which a joint is described as nearer or farther, metres.
 CLEARLY_NEARER: Final = 0.05
 
 
@@ -70,13 +70,13 @@ def page_data(
     frame: int | tuple[int, int] | None = None,
     urdf: str = "",
 ) -> Json:
-    """Gather what the page shows; see `posekit.viewer.page.write_page`.
+    """Collect the data of a page; see `posekit.viewer.page.write_page`.
 
     Returns
     -------
     dict
-        Plain lists, numbers and text. ``packed`` holds arrays as base64; points are whole steps of ``step`` metres
-        from the ``origin`` of their frame.
+        Lists, numbers and text. ``packed`` holds arrays as base64; points are integer multiples of ``step`` metres,
+        relative to the ``origin`` of their frame.
     """
     if isinstance(source, Recovery):
         return _of_result(source, title, view if isinstance(view, View) else None, frame)
@@ -95,7 +95,7 @@ def page_data(
 
 
 def _judged(motion: Motion, urdf: str) -> Report:
-    """Judge a motion by the default checks; without a joint map, each configuration of the robot by itself."""
+    """Check a motion with the default checks. Without a joint map, check each configuration of the robot separately."""
     robot, q = drawn.configured(motion, urdf)
     if isinstance(robot, Figure):
         return Validator().check(motion)
@@ -103,7 +103,7 @@ def _judged(motion: Motion, urdf: str) -> Report:
 
 
 def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str) -> Json:
-    """Gather motions and the report about them: its rows are the motions' frames, clip by clip."""
+    """Collect motions and their report; its rows are the frames of the motions, clip by clip."""
     summary = _summary(report)
     if not motions:
         return {"kind": "report", "title": title, "frames": [], **summary}
@@ -114,11 +114,11 @@ def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str
     for motion, (one, q) in zip(motions, bodies, strict=True):
         R = drawn.facing(one, q, drawn.upright(motion))
         order = np.argsort(np.asarray(motion.clip), kind="stable")
-        # Bodies of several kinds have the 14 joints in common.
+        # The 14 joints are common to people and all robots.
         parts.append((_points(motion, one, q) if alike else _joints(one, q))[order] @ R.T)
     points, skeleton = np.concatenate(parts), _skeleton(robot if alike else load_figure())
     rows = _kept(report)
-    # Alternative postures of a frame follow each other.
+    # Alternative postures of a frame are consecutive rows.
     changes = (np.diff(report.clip[rows]) != 0) | (np.diff(report.frame[rows]) != 0)
     groups = np.split(rows, np.flatnonzero(changes) + 1)
     frames: list[Json] = []
@@ -147,7 +147,7 @@ def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str
 
 
 def _kept(report: Report) -> NDArray[np.intp]:
-    """Return the rows that the page holds: all rows, or the rows of the worst clips."""
+    """Return the rows to store in the page: all rows, or the rows of the worst clips."""
     if len(report) <= MOST_FRAMES:
         return np.arange(len(report))
     order = np.argsort([-one.severity for one in report.clips], kind="stable")
@@ -157,7 +157,7 @@ def _kept(report: Report) -> NDArray[np.intp]:
 
 
 def _points(motion: Motion, robot: Robot, q: Array) -> Array:
-    """Return the points (T, P, 3) that are drawn: joints and head of a figure, or a robot's links."""
+    """Return the points (T, P, 3) to draw: joints and head points of a figure, or links of a robot."""
     if isinstance(robot, Figure):
         if motion.joints is None:
             return robot.forward_kinematics(q)
@@ -174,7 +174,7 @@ def _joints(robot: Robot, q: Array) -> Array:
 
 
 def _skeleton(robot: Robot) -> Json:
-    """Describe the segments between points, and the bodies relative to the length of their segment."""
+    """Return the segments between points, and the sizes of bodies relative to the lengths of their segments."""
     colours = {name: red << 16 | green << 8 | blue for name, (red, green, blue) in drawn.COLOURS.items()}
     shared: Json = {"colours": {**colours, "alarm": 0xD4006A}, "groupColours": GROUP_COLOURS}
     if isinstance(robot, Figure):
@@ -226,7 +226,7 @@ def _skeleton(robot: Robot) -> Json:
 
 
 def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
-    """Stand bodies on z = 0 with the first known point over x = y = 0; return them and the displacement (3,)."""
+    """Move bodies onto z = 0 with the first known point above x = y = 0; return them and the displacement (3,)."""
     low = [float(np.nanmin(one[:1, :, 2])) for one in bodies if np.isfinite(one[:1, :, 2]).any()]
     if not low:
         raise refusal("render", "", "no known joint in any frame", "at least one", "give a known posture")
@@ -238,7 +238,7 @@ def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
 def _packed(
     bodies: Sequence[Array], frames: Sequence[Json], extra: Mapping[str, Sequence[Array]] | None = None
 ) -> Json:
-    """Pack the points (H, P, 3) of each frame, and further points, as whole steps from the frame's origin."""
+    """Pack points (H, P, 3) of each frame, and further points, as integers relative to the origin of the frame."""
     origins, widest, first = [], 0.0, 0
     for k, body in enumerate(bodies):
         both = np.concatenate([body, *(one[k] for one in (extra or {}).values())]).reshape(-1, 3)
@@ -262,13 +262,13 @@ def _packed(
 
 
 def packed(values: NDArray[Any]) -> Json:
-    """Pack an array, little-endian, as base64 and the name of its type."""
+    """Pack an array as little-endian base64 and the name of its type."""
     plain = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
     return {"type": values.dtype.name, "base64": b64encode(plain.tobytes()).decode("ascii")}
 
 
 def _summary(report: Report) -> Json:
-    """Gather the decision, the counts of each check, and the clips, the worst first."""
+    """Collect the decision, the counts of each check, and the clips, the worst first."""
     checks = []
     for name, one in report.by_check().items():
         checks.append({"name": name, **one, "message": str(report.messages.get(name, ""))})
@@ -307,14 +307,14 @@ def _summary(report: Report) -> Json:
 
 
 def _short(file: str) -> str:
-    """Return the last two parts of a path: enough to tell clips apart in a list."""
+    """Return the last two parts of a path, which distinguish clips in a list."""
     return "/".join(file.replace("\\", "/").split("/")[-2:])
 
 
 def _add_findings(
     frames: Sequence[Json], rows: Sequence[NDArray[np.intp]], report: Report, names: Sequence[str]
 ) -> list[Json]:
-    """Add the findings of each posture, as number of the place, value and bound; return the places."""
+    """Add the findings of each posture as (place number, value, bound); return the list of places."""
     found = report.findings
     places: dict[tuple[int, str], tuple[int, Json]] = {}
     starts = np.searchsorted(found["row"], np.arange(len(report) + 1))
@@ -334,7 +334,7 @@ def _add_findings(
 
 
 def joints_of(place: str, names: Sequence[str]) -> list[int]:
-    """Return the points that a finding is about: joints, the ends of bodies, or a robot's links, by their names.
+    """Return the numbers of the points at the place of a finding: joints, segment ends, or links of a robot.
 
     Examples
     --------
@@ -443,12 +443,12 @@ def _margin(name: str) -> Json:
 
 
 def _with_head(joints: Array) -> Array:
-    """Append unknown head points to joints (H, 14, 3)."""
+    """Append NaN head points to joints (H, 14, 3)."""
     return np.concatenate([joints, np.full((len(joints), len(POINTS) - len(JOINTS), 3), np.nan)], axis=1)
 
 
 def _frame(recovery: Recovery, k: int, rows: NDArray[np.intp], reasons: dict[str, int]) -> Json:
-    """Gather the facts of one frame; `rows` are the survivors that the page holds."""
+    """Collect the data of one frame; `rows` are the survivors that the page stores."""
     seen, answer, one = recovery.frames, recovery.answer, recovery[k]
     place = {row: number for number, row in enumerate(rows.tolist())}
     rejected = sorted(seen.rejected[k].items(), key=lambda item: (-item[1], item[0]))
@@ -490,7 +490,7 @@ def _frame(recovery: Recovery, k: int, rows: NDArray[np.intp], reasons: dict[str
 
 
 def _difference(first: Array, other: Array) -> str:
-    """Describe which joints of a posture (14, 3) are nearer to the camera, or farther, than in the first."""
+    """Describe which joints of a posture (14, 3) are nearer to the camera, or farther, than in the first posture."""
     depths = [np.array([one[b, 2] - one[a, 2] for a, b in TREE_SEGMENTS]) for one in (first, other)]
     change = np.nan_to_num(depths[1] - depths[0])
     order = [int(k) for k in np.argsort(-np.abs(change)) if abs(change[k]) > CLEARLY_NEARER][:2]
@@ -499,7 +499,7 @@ def _difference(first: Array, other: Array) -> str:
 
 
 def _image(view: View, k: int) -> list[list[float] | None]:
-    """Return the image points of a frame, as wide as the picture's pixels."""
+    """Return the image points of a frame, scaled to square pixels."""
     aspect = view.camera.aspect if isinstance(view.camera, ScaledOrthographicCamera) else 1.0
     points = np.concatenate([view.image[k], view.head_image[k]]) * [aspect, 1.0]
     return [None if np.isnan(one).any() else [float(f"{value:.6g}") for value in one] for one in points]

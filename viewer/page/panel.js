@@ -1,5 +1,5 @@
-// The page's panel: frames, paths, survivors and what is known of them. DATA comes from data.py; all text that a file
-// gave is set as text, never as HTML. scene.js draws what is chosen here; tables.js has the tabs.
+// Side panel of the page: frames, paths, survivors and their properties. DATA comes from data.py. Text from files is
+// always inserted as text, never as HTML. scene.js draws the selected posture; tables.js fills the tabs.
 "use strict";
 const page = (() => {
   const state = { frame: 0, survivor: 0, path: DATA.paths ? 0 : null, sort: { key: "likeliest", down: false }, listed: 50, playing: false };
@@ -39,7 +39,7 @@ const page = (() => {
     return scaled.toFixed(size !== 0 && size < 0.1 ? 3 : size < 100 ? 1 : 0);
   }
 
-  // Certain and impossible are written of nothing else.
+  // 0 % and 100 % are shown for exact values only, not for rounded ones.
   function percent(share) {
     if (share === undefined || Number.isNaN(share)) return "–";
     if (share > 0 && share < 0.0005) return "< 0.1 %";
@@ -47,7 +47,7 @@ const page = (() => {
     return `${(100 * share).toFixed((share > 0 && share < 0.0995) || (share > 0.99 && share < 1) ? 1 : 0)} %`;
   }
 
-  // The posture that is shown where nobody chose one: the survivor nearest to the answer.
+  // Default posture of a frame: the survivor nearest to the answer.
   const usual = () => frame().best ?? 0;
 
   function chooseFrame(index) {
@@ -71,14 +71,14 @@ const page = (() => {
     changed();
   }
 
-  // Follows a path through all frames, or takes the answer of each frame (null).
+  // Show a path through all frames, or the answer of each frame (null).
   function choosePath(path) {
     state.path = state.left = path;
     byId("path").value = path ?? "";
     chooseFrame(state.frame);
   }
 
-  // While it plays, words and tables follow a few times a second.
+  // While the motion plays, text and tables are updated a few times per second.
   function refresh() {
     showTime();
     if (state.playing && performance.now() - told < 700) return listeners.forEach((listener) => listener());
@@ -103,9 +103,9 @@ const page = (() => {
 
   function showCaption() {
     const here = frame(), { survivor, path } = state;
-    let text = here.held ? "" : "no posture in this frame";
-    if (path !== null) text = `path ${path}, ${percent(DATA.paths.probability[path])} of all` + (DATA.paths.survivor[state.frame][path] < 0 ? ", bridged in this frame" : "");
-    else if (DATA.kind === "result" && here.held) text = `posture ${pack.number(here, survivor)}, ${percent(pack.probability(here, survivor))}` + (survivor === here.best ? ": nearest to the answer" : "");
+    let text = here.held ? "" : "This frame has no posture.";
+    if (path !== null) text = `path ${path}, probability ${percent(DATA.paths.probability[path])}` + (DATA.paths.survivor[state.frame][path] < 0 ? ", interpolated in this frame" : "");
+    else if (DATA.kind === "result" && here.held) text = `posture ${pack.number(here, survivor)}, probability ${percent(pack.probability(here, survivor))}` + (survivor === here.best ? "; nearest to the answer" : "");
     else if (here.held) text = [clipOf(here)?.name, here.held > 1 ? `posture ${survivor}` : ""].filter((part) => part).join(": ");
     byId("caption").textContent = text;
   }
@@ -118,18 +118,18 @@ const page = (() => {
     if (DATA.judged) return showVerdict(box, here);
     if (here.sure === undefined) return;
     const line = element("p");
-    line.append(element("strong", percent(here.sure), "sure"), ` sure that every joint of the answer is within 5 cm${here.sureOf === "position" ? "" : `, ${here.sureOf}`}.`);
-    if (here.sure < 0.5 && here.representatives?.length > 1) line.append(" The image leaves several postures open.");
+    line.append(element("strong", percent(here.sure), "sure"), ` probability that every joint of the answer is within 5 cm of the true joint${here.sureOf === "position" ? "" : `, ${here.sureOf}`}.`);
+    if (here.sure < 0.5 && here.representatives?.length > 1) line.append(" Several postures fit the image.");
     box.replaceChildren(line);
     if (here.representatives?.length > 1) {
-      box.append(element("p", "Each of these stands for all that is within 5 cm of it:"));
+      box.append(element("p", "Each of these postures represents all postures within 5 cm:"));
       const list = element("div", undefined, "others");
       list.setAttribute("role", "group");
-      list.setAttribute("aria-label", "the likeliest posture and its alternatives");
+      list.setAttribute("aria-label", "the most probable posture and its alternatives");
       here.representatives.forEach(({ at, p, how }, k) => {
         const made = button(undefined, () => chooseSurvivor(at));
         made.dataset.at = at;
-        made.append(element("b", percent(p)), ` ${how || (k ? "similar" : "the likeliest")}`);
+        made.append(element("b", percent(p)), ` ${how || (k ? "similar" : "most probable")}`);
         list.append(made);
       });
       if (here.moreRepresentatives) list.append(element("span", `and ${plural(here.moreRepresentatives, "other")}`, "soft"));
@@ -141,11 +141,11 @@ const page = (() => {
     const all = findings(), clip = clipOf(here);
     const list = element("ul");
     for (const one of all) list.append(element("li", one.text));
-    box.replaceChildren(element("p", all.length ? `${plural(all.length, "finding")} in this posture:` : "No check finds anything in this posture."), list);
-    if (clip && clip.frames > 1) box.append(element("p", clip.bad ? `${clip.bad.toLocaleString("en")} of ${plural(clip.frames, "frame")} of this clip are not valid: red marks above the time line.` : `Nor in any of the clip's ${plural(clip.frames, "frame")}.`, "soft"));
+    box.replaceChildren(element("p", all.length ? `${plural(all.length, "finding")} in this posture:` : "All checks accept this posture."), list);
+    if (clip && clip.frames > 1) box.append(element("p", clip.bad ? `${clip.bad.toLocaleString("en")} of ${plural(clip.frames, "frame")} of this clip are not valid; they have red marks above the time line.` : `All ${plural(clip.frames, "frame")} of this clip are valid.`, "soft"));
   }
 
-  // What the checks find in the posture that is drawn.
+  // Findings of the checks in the displayed posture.
   function findings() {
     return (frame().findings?.[state.survivor] ?? []).map(([place, value, bound]) => {
       const { check, where, joints } = DATA.places[place];
@@ -153,7 +153,7 @@ const page = (() => {
     });
   }
 
-  // Which end of the segment that ends at a joint is nearer, and how sure that is.
+  // Whether a joint is nearer to the camera than its parent, and the probability.
   function depth(joint) {
     const here = frame(), k = DATA.treeSegments?.findIndex((pair) => pair[1] === joint) ?? -1;
     if (k < 0 || !here.nearer || here.nearerSure[k] === null) return null;
@@ -164,12 +164,12 @@ const page = (() => {
   const unseen = (joint) => state.path === null && joint < DATA.joints && pack.inferred(frame(), state.survivor, joint);
   const radius = (joint) => (state.path === null && DATA.kind === "result" && frame().held ? pack.radius(frame(), state.survivor, joint) : NaN);
 
-  // The lines about a joint under the pointer; the first is its name.
+  // Lines of the tooltip of a joint; the first line is its name.
   function about(joint) {
     const lines = [words(DATA.points[joint])], side = depth(joint);
     if (side) lines.push(`${side.way}: ${percent(side.sure)}`);
-    if (radius(joint) > DOUBT) lines.push(`± ${shown(radius(joint), 100)} cm with 95 %, if the posture is right`);
-    if (unseen(joint)) lines.push("not seen: inferred");
+    if (radius(joint) > DOUBT) lines.push(`± ${shown(radius(joint), 100)} cm with 95 % probability, if the posture is right`);
+    if (unseen(joint)) lines.push("not seen; position inferred");
     return [...lines, ...findings().filter((one) => one.joints.includes(joint)).map((one) => `! ${one.text}`)];
   }
 
@@ -206,7 +206,7 @@ const page = (() => {
     byId("survivors-title").textContent = here.count === 0
       ? `No posture in this frame${here.reason ? `: ${here.reason}` : ""}`
       : `${plural(here.count, DATA.kind === "result" ? "posture passes" : "posture", DATA.kind === "result" ? "postures pass" : "postures")}${groups > 1 ? `, in ${groups} groups` : ""}`;
-    if (DATA.margins?.length) byId("survivors-title").append(element("span", " – with the room left to each check's bound", "soft"));
+    if (DATA.margins?.length) byId("survivors-title").append(element("span", " – with the margin of each check", "soft"));
     row(head, all.map((column) => {
       const on = state.sort.key === column.key, made = element("th");
       made.setAttribute("aria-sort", on ? (state.sort.down ? "descending" : "ascending") : "none");
@@ -237,13 +237,13 @@ const page = (() => {
     showRest(here, order.length);
   }
 
-  // What is not in the table, and what is not in the page.
+  // Number of postures that are not in the table, and not in the page.
   function showRest(here, held) {
     const rest = byId("rest"), lines = [];
     rest.replaceChildren();
     if (held > state.listed) rest.append(button(`show ${Math.min(200, held - state.listed)} more`, () => { state.listed += 200; showSurvivors(); }), " ");
     if (here.count > held) lines.push(`${plural(here.count - held, "posture is", "postures are")} in the result but not in this page.`);
-    if (here.unlistedCount) lines.push(`${plural(here.unlistedCount, "further posture")} of ${percent(here.unlisted)} together ${here.unlistedCount === 1 ? "is" : "are"} not listed.`);
+    if (here.unlistedCount) lines.push(`${plural(here.unlistedCount, "further posture")} with a total probability of ${percent(here.unlisted)} ${here.unlistedCount === 1 ? "is" : "are"} not listed.`);
     rest.append(lines.join(" "));
     rest.hidden = !rest.textContent;
   }
@@ -252,7 +252,7 @@ const page = (() => {
     const here = frame(), { image } = here, known = (image ?? []).filter((point) => point);
     byId("seen").hidden = !known.length;
     if (!known.length) return;
-    byId("seen-name").textContent = here.picture ?? "what the camera saw";
+    byId("seen-name").textContent = here.picture ?? "image points";
     const svg = byId("seen-image"), ends = [0, 1].map((axis) => [Math.min(...known.map((point) => point[axis])), Math.max(...known.map((point) => point[axis]))]);
     const wide = Math.max(...ends.map(([low, high]) => high - low), 1e-9), border = 0.08 * wide;
     svg.setAttribute("viewBox", [ends[0][0] - border, ends[1][0] - border, ends[0][1] - ends[0][0] + 2 * border, ends[1][1] - ends[1][0] + 2 * border].join(" "));
@@ -269,7 +269,7 @@ const page = (() => {
   function showLead() {
     const counts = DATA.frames.map((one) => one.count), total = counts.reduce((sum, one) => sum + one, 0), parts = [];
     if (DATA.judged) parts.push(`${DATA.decision}. ${DATA.valid.toLocaleString("en")} of ${plural(DATA.asked, "frame")} valid.`);
-    else if (DATA.kind === "result") parts.push(`Every posture behind ${plural(counts.length, "frame")} that passes the checks: ${total.toLocaleString("en")}.`);
+    else if (DATA.kind === "result") parts.push(`${plural(total, "posture")} in ${plural(counts.length, "frame")}: all that fit the image and pass the checks.`);
     else parts.push(`${plural(counts.length, "frame")}, ${plural(total, "posture")}.`);
     if (DATA.left) parts.push(`${plural(DATA.left, "posture is", "postures are")} not in this page.`);
     byId("lead").textContent = parts.join(" ");

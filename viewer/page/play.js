@@ -1,4 +1,4 @@
-// Time: the line with how sure each frame is, play and pause, speed; and the keys of the whole page.
+// Time line with the certainty of each frame; play, pause and speed; keys of the whole page.
 "use strict";
 const play = (() => {
   const { byId } = page.tools, { state } = page, last = DATA.frames.length - 1;
@@ -6,7 +6,7 @@ const play = (() => {
   const gap = (k) => (DATA.frames[k + 1].clip === DATA.frames[k].clip ? DATA.frames[k + 1].time - DATA.frames[k].time : NaN);
   const gaps = DATA.frames.slice(1).map((_, k) => gap(k)).filter((one) => one > 0).sort((a, b) => a - b);
   const usual = gaps.length ? Math.min(gaps[gaps.length >> 1], LONGEST_STEP) : 1 / USUAL_RATE;
-  // When each frame is shown: as it was recorded, but for gaps, which are no longer than a second.
+  // Time at which each frame is shown: the recorded time, with gaps shortened to one second.
   const starts = [0];
   for (let k = 0; k < last; k++) starts.push(starts[k] + (gap(k) > 0 ? Math.min(gap(k), LONGEST_STEP) : usual));
   const whole = starts[Math.max(last, 0)] + usual;
@@ -40,7 +40,7 @@ const play = (() => {
     clock = starts[state.frame];
   }
 
-  // Each bar is as high as its frame is sure; frames without a posture are empty, findings are marks on top.
+  // The height of a bar is the certainty of its frame. Frames without a posture have no bar; marks on top are findings.
   function drawStrip() {
     const strip = byId("strip"), pen = strip.getContext("2d"), wide = strip.clientWidth, high = strip.clientHeight;
     strip.width = wide;

@@ -1,9 +1,9 @@
-// The page's picture, drawn on a plain canvas: the chosen posture as a body, and what else is asked for. A figure of
-// a dozen capsules needs no WebGL, and is quick where there is no graphics card.
+// 3D view of the page, drawn on a 2D canvas: the selected posture as a body, and other selected objects. A figure of a
+// dozen capsules needs no WebGL; a 2D canvas is fast even without a graphics card.
 "use strict";
 const scene = (() => {
   const canvas = document.getElementById("picture");
-  // Kept in the processor's memory, and opaque: without a graphics card that is several times as quick.
+  // An opaque canvas in main memory is several times faster without a graphics card.
   const pen = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
   const { dot, minus, along, cross, unit } = sight.vectors;
   const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16, camera = DATA.camera;
@@ -25,7 +25,7 @@ const scene = (() => {
     return some.some((point) => !point) ? null : [0, 1, 2].map((axis) => some.reduce((sum, point) => sum + point[axis], 0) / some.length);
   }
 
-  // The outline of two circles and what is between them.
+  // Outline of a capsule: the convex hull of two circles.
   function outline([ax, ay, , , ra], [bx, by, , , rb]) {
     const length = Math.hypot(bx - ax, by - ay), path = new Path2D();
     if (length <= Math.abs(ra - rb) + 1e-6) {
@@ -63,7 +63,7 @@ const scene = (() => {
     pen.setLineDash([]);
   }
 
-  // A head that is not known is drawn hollow over the neck: a figure without one is hard to read.
+  // If the head is unknown, an outline is drawn above the neck, because a figure without a head is hard to recognise.
   function withHead(all) {
     const [neck, pelvis] = [all[0], all[3]], head = all.slice(DATA.joints);
     if (!DATA.figure || !neck || !pelvis || head.every((point) => point)) return { all, made: false };
@@ -165,7 +165,7 @@ const scene = (() => {
     for (const joint of new Set(page.findings().flatMap((one) => one.joints))) ring(places[joint]);
   }
 
-  // A finding is ringed and has a mark: colour alone does not say it.
+  // A finding is marked by a ring and a sign, not only by colour.
   function ring(place) {
     if (!place) return;
     const radius = Math.max(9, 0.045 * place[3]);
@@ -179,7 +179,7 @@ const scene = (() => {
     pen.fillText("!", place[0] + radius + 5, place[1] - radius + 6);
   }
 
-  // The likelier, the stronger: the other postures as lines, those of a group in its colour.
+  // Other postures as lines in the colour of their group; more probable postures are more opaque.
   function drawOthers() {
     const frame = page.frame(), most = Math.min(frame.held, MOST_OTHERS), best = pack.probability(frame, 0);
     for (let index = most - 1; index >= 0; index--) {
@@ -189,7 +189,7 @@ const scene = (() => {
     }
   }
 
-  // The camera's pyramid, the rays to the joints, and the image that they make on a plane in front of it.
+  // View frustum of the camera, rays to the joints, and image points on a plane in front of the camera.
   function drawRays(every) {
     const { position: eye, forward, right, down, parallel } = camera, seen = page.frame().image;
     const all = every.slice(0, DATA.joints).map((point, k) => (seen && !seen[k] ? null : point)), known = all.filter((point) => point);
@@ -238,7 +238,7 @@ const scene = (() => {
     scene.pictures += 1;
   }
 
-  // Draws once before the browser shows its next picture, however much changes until then.
+  // Draw once per screen refresh, after all changes.
   let waiting = false;
   function soon() {
     if (waiting) return;
@@ -343,7 +343,7 @@ const scene = (() => {
 
   return {
     look, show, draw, pictures: 0,
-    // Where the joints of the drawn posture are in the picture, pixels; for tests and for the console.
+    // Positions of the displayed joints on the canvas, pixels; for tests and for the console.
     places: () => { draw(); return places.slice(0, DATA.joints).map((place) => place && place.slice(0, 2)); },
     points: () => chosen(),
   };

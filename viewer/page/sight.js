@@ -1,4 +1,4 @@
-// The page's numbers, and where one looks from: a point of the world falls at x, y, depth, and pixels a metre there.
+// Unpacked arrays of the page, and its virtual camera: projects world points to x, y, depth, and pixels per metre.
 "use strict";
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const FIGURED = DATA.frames.length > 0;
@@ -11,7 +11,7 @@ const pack = (() => {
     arrays[name] = new KINDS[type](bytes.buffer);
   }
 
-  // The points of a row of an array, metres in the world; null where unknown.
+  // Points of a row of an array, world frame, metres; null if unknown.
   function row(name, index, { origin }) {
     const values = arrays[name], found = [];
     for (let k = 0, at = 3 * count * index; k < count; k++, at += 3) {
@@ -45,7 +45,7 @@ const sight = (() => {
   const NEAR = 0.05, ANGLE = (28 * Math.PI) / 180, camera = DATA.camera;
   const known = (points) => points.slice(0, DATA.joints).filter((point) => point);
 
-  // One posture of each frame says where the body is; its place is smoothed, so that the eye is calm.
+  // The camera follows the smoothed position of one posture per frame.
   const first = DATA.frames.map((frame, index) => (DATA.paths ? pack.path(index, 0) : frame.held ? pack.points(frame, frame.best ?? 0) : []));
   const bounds = first.map((points) => {
     const all = known(points);
@@ -69,7 +69,7 @@ const sight = (() => {
     });
   }
 
-  // Where the images of all frames are, on a plane at depth one.
+  // Bounds of the image points of all frames, on the plane at depth 1.
   const images = (() => {
     if (!camera || camera.parallel) return null;
     const flat = first.flatMap((points) => known(points).map((point) => minus(point, camera.position)).filter((from) => dot(from, camera.forward) > NEAR));
@@ -91,7 +91,7 @@ const sight = (() => {
     state.elevation = { free: 0.26, camera: 0, side: 0.06, above: 1.5 }[name];
   }
 
-  // The axes of the picture, for this frame.
+  // Axes of the virtual camera for this frame.
   function prepare(index) {
     const { width, height } = size(), x = width / 2, y = height / 2 + Math.min(0.06 * height, 34); // buttons are above
     if (state.look === "camera" && camera) {
@@ -113,7 +113,7 @@ const sight = (() => {
     return [shown.x + each * dot(from, shown.right), shown.y - each * dot(from, shown.up), depth, each];
   }
 
-  // The ends of a segment in the picture, cut where it goes behind the eye.
+  // End points of a segment on the canvas, clipped at the camera plane.
   function segment(a, b) {
     const [da, db] = [a, b].map((point) => dot(minus(point, shown.eye), shown.forward)), least = NEAR * 1.01;
     if (da < least && db < least) return null;
