@@ -124,7 +124,7 @@ def beside(share: float) -> Callable[[dict[str, Any]], None]:
         (heading, 124.9, 125.1),  # 114.9 degrees off ahead, 55.1 off backward
         (lambda pitch: said(rows(about("y", -pitch)), "lying"), 59.9, 60.1),
         (lambda pitch: said(rows(about("y", -pitch)), "upside down"), 119.9, 120.1),
-        (lambda scale: said(rows(about("z", 0.0), scale=scale), "off length 1"), 1.009, 1.011),
+        (lambda scale: said(rows(about("z", 0.0), scale=scale), "differ from 1 by"), 1.009, 1.011),
         (lambda scale: refused(lambda: rows(about("z", 0.0), scale=scale)), 1.24, 1.26),
         (one_length, 0.9e-6, 1.1e-6),
         (lambda height: rows(about("z", 0.0), height=height).q[0, 2] < height / 2, 9.9, 10.1),

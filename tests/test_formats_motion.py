@@ -880,9 +880,9 @@ def crawling(forward: float, rises: tuple[float, float] = (0.0, 0.0)) -> Any:
 @pytest.mark.parametrize(
     ("forward", "rises", "stated", "up", "said"),
     [
-        (0.0, (0.0, 0.0), "", "+x", "+x is up by how bodies stand"),
-        (0.59, (0.0, 0.0), "", "+x", "+x is up by how bodies stand"),
-        (1.0, (0.16, 0.17), "", "+x", "+x is up by how bodies stand"),
+        (0.0, (0.0, 0.0), "", "+x", "+x is up, because bodies stand along it"),
+        (0.59, (0.0, 0.0), "", "+x", "+x is up, because bodies stand along it"),
+        (1.0, (0.16, 0.17), "", "+x", "+x is up, because bodies stand along it"),
         (0.61, (0.3, 0.0), "", "+z", "+z is up by the ground: the lowest joint stays level along it"),
         (1.0, (0.04, 0.5), "", "+y", "+y is up by the ground"),
         (1.0, (0.21, 0.1), "", "+z", "+z is up by the ground"),

@@ -160,7 +160,7 @@ def test_the_unit_and_the_up_axis_are_given(
 
 def test_millimetres_are_told_by_their_size(tmp_path: Path) -> None:
     (tmp_path / "mm.toml").write_text(TOML.replace(str(T), str([1000 * one for one in T])))
-    with pytest.warns(UserWarning, match="translations are taken as millimetres"):
+    with pytest.warns(UserWarning, match="translations are read as millimetres"):
         assert posekit.open(tmp_path / "mm.toml")["left"].t == pytest.approx(T)
     (tmp_path / "cm.toml").write_text(TOML.replace(str(T), str([100 * one for one in T])))
     with pytest.raises(InputError, match=r"a camera 351 from the origin.*--unit cm or mm"):

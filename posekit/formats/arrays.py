@@ -1,4 +1,4 @@
-"""Arrays in memory, understood as files are: joints in space as motion, points in pictures as key points."""
+"""Arrays in memory, read like files: points in 3D become a motion, points in pictures become key points."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def has_layout(given: Any, layout: str | None) -> bool:
 
 
 def motion_of(values: Any, options: Options) -> Motion:
-    """Read joints in space (T, J, 3), or configurations of a robot (T, nq), in the order of a layout."""
+    """Read 3D joint positions (T, J, 3) in the order of a layout, or configurations of a robot (T, nq)."""
     values = numbers(values, "array")
     layout = load_layout(options.layout) if options.layout else None
     if values.ndim == 2 and values.shape[1] == 3 and layout is not None and layout.points:
@@ -50,12 +50,12 @@ def key_points_of(values: Any, options: Options) -> Detections:
     Parameters
     ----------
     values : array (T, P, 2) or (T, P, 3), or (T, N, P, 2) or (T, N, P, 3) of N people
-        Pixels, and the confidence of each point. NaN, and a confidence of 0, is an unseen point.
+        Pixels, and the confidence of each point. An unseen point is NaN or has a confidence of 0.
 
     Raises
     ------
     InputError
-        If the array has another shape, or it is not clear which points the points are.
+        If the array has another shape, or the layout of the points is unknown.
     """
     points = numbers(values, "array")
     several = points[:, None] if points.ndim == 3 else points

@@ -1,4 +1,4 @@
-"""From named points to a motion: missing values, layout, unit, up axis and times, each checked against the body."""
+"""Conversion of named points to a motion, with checks of missing values, layout, unit, up axis and times."""
 
 from __future__ import annotations
 
@@ -17,32 +17,33 @@ from posekit.skeleton import JOINT, JOINTS, LIMB_SHARES, SIDES
 #: Metres in each unit of length that a user or a file can state.
 METRES: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
-#: Statures of most recorded people: a body 67 units tall is in inches, not a toddler of 67 cm.
+#: Range of statures of most recorded people: a body that is 67 units tall is in inches, not a toddler of 67 cm.
 USUAL_METRES: Final = (1.2, 2.2)
-#: Smallest and largest stature by which a unit is recognised: a toddler or a small robot, and a giant.
+#: Smallest stature (toddler, small robot) and largest stature (giant) by which a unit is recognised.
 BODY_METRES: Final = (0.4, 2.5)
-#: Smallest and largest stature that is read as metres; in any other unit the body would be further from a person.
+#: Smallest and largest stature that is still read as metres, because other units fit a person even less.
 POSSIBLE_METRES: Final = (0.2, 5.0)
 
 #: Minimum cosine between the mean direction from ankles to shoulders and the axis along which a body stands.
 CLEAR_UP_SHARE: Final = 0.7
-#: Rise of the lowest joint along an axis: below the first the ground is level (an ankle's rise in a step), above the
-#: second it is not (more than from a crouch to the tips of the toes).
+#: Bounds of the lowest joint's range along an axis. Below the first bound the axis may be vertical (an ankle rises as
+#: much in a step). Above the second it is not (the range is larger than from a crouch to tiptoe).
 FLAT_METRES, STEEP_METRES = 0.15, 0.6
-#: Minimum ratio of the rise along another axis to the rise along the axis of a level ground.
+#: Minimum ratio of the height range along another axis to the range along the up axis of a level ground.
 CLEAR_RATIO: Final = 2.0
-#: Rigid neighbours of a point: share by which their distance may leave its range in other frames; largest sum of this
-#: share and of the range itself (a torso's distances vary by 7 %, distances along limbs by more); their number.
+#: Rigid neighbours of a point, whose distance from it is nearly constant: allowed excess of the distance over its range
+#: in other frames, as a share; largest sum of excess and range (distances in a torso vary by 7 %, along limbs by more);
+#: number of neighbours.
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
-#: Relative difference between a stated rate and the rate of the times above which they contradict each other.
+#: Relative difference between a stated rate and the rate of the time stamps, above which they contradict each other.
 RATE_DISAGREES: Final = 0.1
 #: Distance from the origin below which a root is at the origin: float32 and rounding leave 0.1 mm.
 ROUNDING_METRES: Final = 1e-4
-#: Smallest rounding error of times, in seconds, that a note mentions.
+#: Smallest rounding error of time stamps that is reported in a note, seconds.
 NOTED_SECONDS: Final = 1e-4
-#: Largest relative difference between the lengths of right and left limbs in the right order of points.
+#: Largest relative difference between the lengths of right and left limbs if the order of points is correct.
 SIDES_SHARE: Final = 0.25
-#: Largest distance of a middle point from the middle of its two joints, as a share of the leg, in the right order.
+#: Largest distance of a midpoint from the mean of its two joints, as a share of the leg, if the order is correct.
 MIDDLE_SHARE: Final = 0.25
 
 
@@ -62,33 +63,32 @@ def points_motion(
     partial: bool = False,
     **fields: Any,
 ) -> Motion:
-    """Make a motion of a file's points in space.
+    """Convert 3D points of a file to a motion.
 
     Parameters
     ----------
     points : array (T, P, 3)
-        In the file's unit.
+        Positions in the file's unit.
     names : sequence of str (P,)
-        The file's names of the points; empty if it has none.
+        Names of the points in the file; empty for points without names.
     source : str
-        The file.
+        Path of the file.
     options : Options
-        Facts that the user states, which win over the file's; remarks are added to it.
+        Facts stated by the user, which override the file's; notes and warnings are added to it.
     layout : Layout, optional
-        Meaning of the names, if the reader knows it.
+        Layout of the names, if the reader knows it.
     time : array (T,), optional
-        Seconds, as the file has them; they go before any rate.
+        Time stamps of the file, seconds; they take precedence over rates.
     rate : float, optional
-        Frames a second, as the file says.
+        Frames per second, as stated by the file.
     unit, up : str
-        Stated by the file; empty if it does not.
+        Unit and up axis, as stated by the file; empty if it does not state them.
     metres : float, optional
-        Metres in the file's unit, if the reader has found it.
+        Metres per unit of the file, if the reader knows it.
     up_by_custom : str
-        Axis that points up by the format's custom.
+        Axis that points up by the format's convention.
     partial : bool
-        Whether files of this format can hold markers without joints. Such a file is read without joints, with a
-        warning.
+        Whether files of this format may contain markers only. Such a file is read without joints, with a warning.
     **fields
         Further fields of `Motion`.
 
@@ -125,7 +125,7 @@ def points_motion(
     time = times(len(points), time, rate, options, clip, frame)
     fields.setdefault("in_world", not _is_rooted(body))
     if not fields["in_world"]:
-        options.note("every frame is relative to its own hips: ground and travel are not known")
+        options.note("every frame is relative to its own hips: ground and travel are unknown")
     fields |= {"source": source, "layout": layout.name, "notes": options.notes, "warnings": options.warnings}
     return Motion(joints=joints, joint_names=placed, time=time, up=up, unit=unit, **fields)
 
@@ -133,7 +133,7 @@ def points_motion(
 def _layout_of(
     points: Array, names: Sequence[str], source: str, options: Options, layout: Layout | None, partial: bool
 ) -> Layout:
-    """Return the stated layout, or the layout that the names or the points fit; an empty layout for markers alone."""
+    """Return the stated layout, or a layout that fits the names or the points; an empty layout for markers only."""
     if options.layout:
         layout = load_layout(options.layout)
         if layout.kind != "points":
@@ -157,12 +157,12 @@ def _layout_of(
 
 
 def unnamed(points: Array, source: str, options: Options) -> Layout:
-    """Find the layout of points (T, P, 3) without names, by their number and by whether they form a body.
+    """Find the layout of points (T, P, 3) without names, by their number and the shape of a body.
 
     Raises
     ------
     InputError
-        If no layout has P points, or the points form a body in none of those that have.
+        If no layout has P points, or the points form a body in no layout with P points.
     """
     candidates = by_order(points.shape[1])
     fits = [one for one in candidates if _misfit(one, points) < 1.0]
@@ -183,7 +183,7 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
 
 
 def _misfit(layout: Layout, points: Array) -> float:
-    """Return the largest of a layout's errors (unequal limbs, misplaced middle points), each divided by its bound."""
+    """Return the largest error of a layout (unequal limbs, misplaced midpoints), divided by its bound."""
     found = layout.gather(points[:, : len(layout.points)])
     if not set(LIMBS) <= set(found):
         return np.inf
@@ -211,11 +211,11 @@ def _apart(a: Array, b: Array) -> float:
 
 
 def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: Options) -> None:
-    """Set points (T, P, 3) to NaN where the file writes a constant in place of a missing point.
+    """Set points (T, P, 3) to NaN if the file writes a constant in place of a missing point.
 
-    A point whose three coordinates are the same number in some frames and others in the rest is missing there (zeros,
-    -1, 999), unless it keeps its distances from its neighbours: it is a root at the origin. One that is zero in all
-    frames is a root where it is the pelvis or the middle of the hips, else missing.
+    A point is missing in frames in which its three coordinates equal one number, such as 0, -1 or 999, if they vary in
+    other frames. The exception is a root at the origin: it keeps its distances from its neighbours. A point that is
+    zero in all frames is a root if it is the pelvis or the midpoint of the hips; otherwise it is missing.
     """
     points[~(np.abs(points) <= FARTHEST_COORDINATE).all(axis=-1)] = np.nan
     alike = (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
@@ -225,7 +225,7 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
         known = np.isfinite(points[:, k, 0])
         always = alike[known, k].all()
         if always and (len(points) == 1 or points[:, k].any() or plain(names[k]) in roots):
-            continue  # one posture, a point that lies on the diagonal in every frame, or a root
+            continue  # one posture, a point with equal coordinates in every frame, or a root
         values, counts = np.unique(points[alike[:, k], k, 0], return_counts=True)
         sentinels = values[(values == 0) | (counts > 1)]
         gone = alike[:, k] & np.isin(points[:, k, 0], sentinels)
@@ -243,10 +243,10 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
     ----------
     points : array (T, P, 3)
     k : int
-        The point. A point of a limb has too few rigid neighbours; the result is False in every frame.
+        Index of the point. A point of a limb has too few rigid neighbours; the result is then False in every frame.
     unsure : bool array (T, P)
-        Points that may be missing: they do not count as neighbours, and the usual distances are taken from frames
-        without them.
+        Whether a point may be missing in a frame. Such points are no neighbours, and the usual distances are measured
+        in other frames.
     """
     others = np.arange(points.shape[1]) != k
     apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]
@@ -263,7 +263,7 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
 
 
 def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> Array:
-    """Return the 14 joints (T, 14, 3) in tree order, NaN where a name is absent or left out."""
+    """Return the 14 joints (T, 14, 3) in tree order; NaN for names that are absent or excluded."""
     body = np.full((len(points), len(JOINTS), 3), np.nan)
     for k, name in enumerate(names):
         if name in JOINT and name not in without:
@@ -272,7 +272,7 @@ def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> A
 
 
 def _check_depth(body: Array, source: str) -> None:
-    """Refuse points whose x, y or z is the same number for all joints in all frames: they are not in space."""
+    """Refuse points whose x, y or z is the same number for all joints in all frames: such points are not 3D."""
     known = body[np.isfinite(body).all(axis=-1)]
     if len(body) > 1 and len(known) > len(body) * 4:
         for k in range(3):
@@ -283,7 +283,10 @@ def _check_depth(body: Array, source: str) -> None:
 
 
 def stature(body: Array) -> float:
-    """Return the stature of joints (T, 14, 3), in their unit: median limb length over its share; NaN without limbs."""
+    """Estimate the stature of a body with joints (T, 14, 3), in their unit, from the median lengths of limbs.
+
+    The stature is NaN without limbs.
+    """
     statures = [
         _apart(body[:, JOINT[f"{side}_{start}"]], body[:, JOINT[f"{side}_{end}"]]) / share
         for (start, end), share in LIMB_SHARES.items()
@@ -293,13 +296,14 @@ def stature(body: Array) -> float:
 
 
 def body_unit(body: Array, stated: str, options: Options) -> tuple[str, float]:
-    """Find the unit of joints (T, 14, 3): the stated unit, or another if only that makes the body human-sized.
+    """Find the unit of joints (T, 14, 3): the stated unit, or another unit if only that makes the body human-sized.
 
     Returns
     -------
     unit : str
+        Name of the unit.
     metres : float
-        Metres in one unit.
+        Metres per unit.
     """
     if stated and stated not in METRES:
         raise refusal("", "unit", shown(stated), f"one of {', '.join(METRES)}", "give it with --unit")
@@ -342,9 +346,10 @@ def stands_along(body: Array) -> str:
 
 
 def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: Options) -> str:
-    """Find the up axis of joints (T, 14, 3): stated, or by how bodies stand, or by level ground, or by convention.
+    """Find the up axis of joints (T, 14, 3): the stated axis, else by standing bodies, level ground or convention.
 
-    A stated axis that bodies contradict is kept with a warning. An axis found against the convention is a warning, too.
+    If bodies contradict a stated axis, it is kept with a warning. An axis that differs from the convention gives a
+    warning, too.
     """
     if stated and stated not in UP_AXES:
         raise refusal("", "up", shown(stated), f"one of {', '.join(UP_AXES)}", "give it with --up")
@@ -359,7 +364,7 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
             )
         return stated
     if stands and not (rise[stands] > STEEP_METRES and min(rise.values()) < FLAT_METRES):
-        finding = f"{stands} is up by how bodies stand"
+        finding = f"{stands} is up, because bodies stand along it"
         if custom and stands != custom:
             options.warn(f"{finding}, against {custom} by convention: if people lie, state the axis (--up)")
         elif stands[0] == "-":
@@ -379,7 +384,7 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
 
 
 def _rise(body: Array, clip: Ints | None, up: str) -> float:
-    """Return the range (5th to 95th percentile) of the lowest joint's height along an axis, median over clips."""
+    """Return the range (5th to 95th percentile) of the lowest joint's height along an axis; median over clips."""
     lowest = np.fmin.reduce(body @ up_vector(up), axis=1)
     spreads = []
     for index in [0] if clip is None else np.unique(clip):
@@ -391,7 +396,7 @@ def _rise(body: Array, clip: Ints | None, up: str) -> float:
 
 
 def _is_rooted(body: Array) -> bool:
-    """Return whether the middle of the hips, or the pelvis, is at the origin in every frame of several."""
+    """Return whether the midpoint of the hips, or the pelvis, is at the origin in every frame of several frames."""
     middle = (body[:, JOINT["right_hip"]] + body[:, JOINT["left_hip"]]) / 2
     known = (root[np.isfinite(root).all(axis=-1)] for root in (middle, body[:, JOINT["pelvis"]]))
     return any(len(root) > 1 and np.abs(root).max() < ROUNDING_METRES for root in known)
@@ -405,9 +410,10 @@ def times(
     clip: Ints | None = None,
     frame: Ints | None = None,
 ) -> Array | None:
-    """Return the time of each frame (T,), seconds: the file's times, or those of a rate; None if neither is known.
+    """Return the time of each frame (T,), seconds, from time stamps or else from a rate; None if both are unknown.
 
-    Contradictions between times and rates are added to the warnings. Rows of one frame are alternative postures.
+    Contradictions between times and rates are added to the warnings. Rows with the same frame number are alternative
+    postures.
     """
     stated = rate if rate is not None and 0 < rate < np.inf else None
     clip = np.zeros(frames, dtype=np.intp) if clip is None else clip
@@ -437,7 +443,7 @@ def times(
 
 
 def _unrounded(time: Array, stated: float | None, options: Options) -> Array:
-    """Return evenly spaced times (T,) if a file's times, as 0.017, 0.033, 0.05, are even except for rounding."""
+    """Return evenly spaced times (T,) if a file's times are rounded even times, such as 0.017, 0.033, 0.05."""
     digits = next((d for d in range(7) if np.array_equal(np.round(time, d), time)), None)
     if digits is None or len(time) < 3 or not time[-1] > time[0]:
         return time

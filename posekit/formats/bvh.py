@@ -1,9 +1,9 @@
-"""BVH: a skeleton's hierarchy and its channels over time, as animation programs write it.
+"""BVH: a skeleton's hierarchy and its channels over time, a text format of animation programs.
 
-Three sections of text: HIERARCHY with ROOT, JOINT and End Site, each with OFFSET and CHANNELS; MOTION with Frames and
-Frame Time; a line of values a frame, degrees. Meredith & Maddock 2001, *Motion Capture File Formats Explained*
-(University of Sheffield, CS-01-11). The file names no unit and no axis: by convention y is up, centimetres are
-frequent.
+A file has three sections: HIERARCHY with ROOT, JOINT and End Site, each with OFFSET and CHANNELS; MOTION with Frames
+and Frame Time; and one line of values for each frame, with angles in degrees (Meredith & Maddock 2001, *Motion Capture
+File Formats Explained*, University of Sheffield, CS-01-11). The file states no unit and no up axis. By convention y is
+up; centimetres are frequent.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ MAX_JOINTS: Final = 2000
 MAX_DEPTH: Final = 250
 #: Largest length, position or angle that is read, in any unit.
 LARGEST_VALUE: Final = 1e9
-#: For each channel, in lower case: whether it is a rotation, and its axis 0 to 2.
+#: For each channel name in lower case: whether it is a rotation, and its axis, 0 to 2.
 KINDS: Final = ("position", "rotation")
 CHANNELS: Final = {f"{a}{kind}": (kind == "rotation", k) for kind in KINDS for k, a in enumerate("xyz")}
 
-#: Metres in a unit of the CMU database, inches times 0.45 (mocap.cs.cmu.edu, FAQs): also in its BVH conversions.
+#: Metres per unit of the CMU database, 1/0.45 inch (mocap.cs.cmu.edu, FAQs); its BVH conversions have this unit, too.
 CMU_METRES: Final = 0.0254 / 0.45
 UNITS: Final = {**METRES, "0.45 in": CMU_METRES}
 #: Usual length of the longest chain of bones between two ends of a skeleton, metres: CMU, LAFAN1 and Bandai-Namco
 #: have 1.9 to 2.3.
 CHAIN_METRES: Final = 2.0
-#: Length of this chain in a small child and in a giant, metres.
+#: Smallest and largest plausible length of this chain, metres: a small child's and a giant's.
 CHAIN_BOUNDS: Final = (0.9, 4.5)
-#: Number of frames from which the unit is found.
+#: Number of frames that are sampled to find the unit.
 FRAMES_SAMPLED: Final = 200
-#: Offsets below this share of the largest offset are not compared with their position channels.
+#: Share of the largest offset below which offsets are not compared with their position channels.
 SMALL_OFFSET_SHARE: Final = 1e-3
 _MOTION: Final = re.compile(r"^[ \t]*MOTION[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
 _HEAD: Final = re.compile(r"\s*Frames\s*:\s*(\S+)\s+Frame\s*Time\s*:\s*(\S+)", re.IGNORECASE)
@@ -51,26 +51,26 @@ _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?", re.ASC
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Bvh:
-    """Contents of a BVH file: joints and End Sites in the file's order, parents first.
+    """Content of a BVH file: joints and End Sites in the file's order, parents first.
 
     Attributes
     ----------
     text : str
-        The whole file.
+        Text of the file.
     names : tuple of str (P,)
-        An End Site is named after its joint, ``LeftHand_end``.
+        Names of the joints. An End Site is named after its joint, such as ``LeftHand_end``.
     parents : tuple of int (P,)
-        -1 for a root.
+        Index of each joint's parent; -1 for a root.
     offsets : array (P, 3)
-        In the file's unit.
+        Offset of each joint from its parent, in the file's unit.
     channels : tuple (P,) of tuple of (bool, int)
-        Whether each channel rotates, and its axis 0 to 2.
+        Whether each channel is a rotation, and its axis, 0 to 2.
     sites : tuple of bool (P,)
-        True for End Sites.
+        Whether each joint is an End Site.
     frame_time : float
         Seconds from frame to frame; NaN if the file states no valid number.
     values : array (T, C)
-        The channels of all joints one after the other, file's unit and degrees.
+        Values of the channels of all joints, in the file's unit of length and in degrees.
     frames : int
         Number of frames that the file states.
     """
@@ -98,7 +98,7 @@ def parse(data: bytes, source: str) -> Bvh:
     Raises
     ------
     InputError
-        If it is damaged or cut off, with the line that is wrong.
+        If the file is damaged or cut off; the message names the wrong line.
     """
     document = text(data, source)
     motion = _MOTION.search(document)
@@ -116,7 +116,7 @@ def parse(data: bytes, source: str) -> Bvh:
     names, parents, offsets, channels, sites = zip(*joints, strict=True)
     width = sum(map(len, channels))
     if width == 0:
-        raise refusal(source, "CHANNELS", "none", "channels of one joint at least", "nothing moves in it")
+        raise refusal(source, "CHANNELS", "none", "channels of at least one joint", "nothing moves in it")
     return Bvh(
         text=document,
         names=names,
@@ -131,7 +131,7 @@ def parse(data: bytes, source: str) -> Bvh:
 
 
 def _hierarchy(document: str, source: str) -> list[Any]:
-    """Read joints as [name, parent, offset, channels, is End Site], word by word, without recursion."""
+    """Read joints as [name, parent, offset, channels, whether an End Site], word by word, without recursion."""
     tokens = list(_TOKEN.finditer(document))
     words = [token.group() for token in tokens]
     joints: list[Any] = []
@@ -212,12 +212,12 @@ def _values(document: str, start: int, width: int, source: str) -> Array:
         if bad or (words and len(words) != width):
             got = shown(bad[0]) if bad else f"{len(words)} values"
             remedy = "the file is cut off there, or its CHANNELS are not those of its frames"
-            raise refusal(source, f"line {number}", got, f"{width} finite numbers, one a channel", remedy)
-    raise refusal(source, "MOTION", "no frames", "a line of values a frame", "the file is cut off")
+            raise refusal(source, f"line {number}", got, f"{width} finite numbers, one per channel", remedy)
+    raise refusal(source, "MOTION", "no frames", "one line of values per frame", "the file is cut off")
 
 
 def read(document: Bvh, path: str, options: Options) -> Motion:
-    """Make a motion of a BVH file: points are its joints and the End Sites that have a length."""
+    """Convert a BVH file to a motion; its points are the joints, and the End Sites with an offset."""
     absolute = positions_are_absolute(document)
     points = world_points(document, absolute=absolute)
     held = zip(document.parents, document.channels, strict=True)
@@ -244,7 +244,7 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
 
 
 def holds(document: Bvh, motion: Motion) -> bool:
-    """Return whether the joints of a motion are still exactly those of the file that it was read from."""
+    """Return whether the joints of a motion are unchanged since the motion was read from the file."""
     if motion.joints is None or len(motion) != len(document.values):
         return False
     layout = motion.layout if motion.layout.endswith(".toml") else ""
@@ -253,7 +253,7 @@ def holds(document: Bvh, motion: Motion) -> bool:
 
 
 def with_values(document: Bvh, values: Array) -> Bvh:
-    """Return the file with other values (T, C); unchanged numbers keep their text, byte for byte."""
+    """Return the file with new values (T, C); unchanged numbers keep their text byte for byte."""
     if values.shape != document.values.shape:
         raise refusal("", "values", f"shape {values.shape}", f"{document.values.shape}", "keep the frames")
     head = _HEAD.match(document.text, _MOTION.search(document.text).end())  # type: ignore[union-attr]
@@ -265,24 +265,24 @@ def with_values(document: Bvh, values: Array) -> Bvh:
 
 
 def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) -> Array:
-    r"""Place joints and End Sites of every frame by forward kinematics.
+    r"""Compute the positions of joints and End Sites in every frame by forward kinematics.
 
-    A joint's frame in its parent's is the translation by its offset and position channels, then the rotations in the
-    order of its channels, each about axes that the one before has turned: :math:`T = T(o) R_a R_b R_c` (Meredith &
-    Maddock 2001).
+    The transform from a joint to its parent is a translation by offset and position channels, followed by intrinsic
+    rotations in the order of the channels: :math:`T = T(o) R_a R_b R_c` (Meredith & Maddock 2001).
 
     Parameters
     ----------
     document : Bvh
+        Content of the file.
     absolute : bool
-        Whether position channels stand in place of the offset, or are added to it.
+        Whether position channels replace the offset; otherwise they are added to it.
     values : array (T, C), optional
-        Other values than the file's.
+        Channel values; by default those of the file.
 
     Returns
     -------
     array (T, P, 3)
-        In the file's unit and axes.
+        Positions in the file's unit and axes.
     """
     values = document.values if values is None else values
     points = np.empty((len(values), len(document.names), 3))
@@ -308,9 +308,9 @@ def world_points(document: Bvh, *, absolute: bool, values: Array | None = None) 
 def positions_are_absolute(document: Bvh) -> bool:
     """Return whether position channels replace the offsets; otherwise they are added to the offsets.
 
-    The format's notes add a joint's position channels to its offset. MotionBuilder, Blender and data sets made with
-    them (LAFAN1, Bandai-Namco) write the whole position into the channels, beside the same offset. Joints below
-    the root decide: their channels stay near the offset or near zero, while a root may be anywhere.
+    According to the format's description, a joint's position channels are added to its offset. MotionBuilder, Blender
+    and data sets made with them (LAFAN1, Bandai-Namco) write the whole position into the channels and also state the
+    offset. Joints below the root decide: their channels stay near the offset or near zero, but a root may be anywhere.
     """
     small = SMALL_OFFSET_SHARE * float(np.abs(document.offsets).max(initial=0.0))
     votes: dict[bool, list[bool]] = {True: [], False: []}
@@ -327,7 +327,7 @@ def positions_are_absolute(document: Bvh) -> bool:
 
 
 def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[str, float]:
-    """Find the unit by the length of the longest chain of bones, which does not depend on the posture."""
+    """Find the unit from the length of the longest chain of bones, which does not depend on the posture."""
     length = _longest_chain(points[:: max(1, len(points) // FRAMES_SAMPLED)], document.parents)
     unit = min(UNITS, key=lambda name: abs(np.log(max(length * UNITS[name] / CHAIN_METRES, 1e-300))))
     metres = length * UNITS[unit]
@@ -340,9 +340,9 @@ def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[
 
 
 def _longest_chain(points: Array, parents: tuple[int, ...]) -> float:
-    """Return the length of the longest chain of bones between two ends of the tree, median over frames.
+    """Return the length of the longest chain of bones between two leaves of the tree; median over frames.
 
-    A root with a single child is a point of the world, not of the body, and does not count.
+    A root with a single child is a point of the world instead of the body, and is excluded.
     """
     count = len(parents)
     children = np.bincount([parent for parent in parents if parent >= 0], minlength=count)

@@ -1,9 +1,9 @@
 """C3D: the binary format of motion capture systems (Motion Lab Systems, *The C3D File Format User Guide*, c3d.org).
 
-Blocks of 512 bytes: a header whose words count points, analogue values and frames; parameters in groups; then the
-frames, each with four numbers a point (x, y, z and a residual, negative where the point was not seen) and the analogue
-values, as 16-bit integers if the scale is positive and as 32-bit floats if it is negative. Every count is compared with
-the length of the file before anything is read.
+A file consists of blocks of 512 bytes: a header with the numbers of points, analogue values and frames; parameters in
+groups; then the frames. A frame has four numbers for each point (x, y, z, and a residual that is negative if the point
+was not seen) and the analogue values. They are 16-bit integers if the scale is positive, 32-bit floats if it is
+negative. Every count is compared with the length of the file before frames are read.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MAX_VALUES: Final = 100_000_000
 MAX_PARAMETERS: Final = 10_000
 #: Largest number that a word of the header holds.
 MAX_COUNT: Final = 65_535
-#: Bytes of a parameter's value by type: text, byte, 16-bit integer, 32-bit float.
+#: Size in bytes of a parameter's value by type: text, byte, 16-bit integer, 32-bit float.
 _SIZES: Final = {-1: 1, 1: 1, 2: 2, 4: 4}
 _SCREEN_X: Final = {"x": "+Y", "y": "+Z", "z": "+X"}
 _REMEDY: Final = "the file is cut off or damaged: export it again"
@@ -40,22 +40,22 @@ _REMEDY: Final = "the file is cut off or damaged: export it again"
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class C3d:
-    """Contents of a C3D file.
+    """Content of a C3D file.
 
     Attributes
     ----------
     points : array (T, P, 3)
-        In the file's unit, NaN where a point was not seen.
+        Positions in the file's unit; NaN for points that were not seen.
     rate : float
-        Frames a second; NaN if the file states none.
+        Frames per second; NaN if the file states no rate.
     parameters : dict
         Lists of text and arrays of numbers by ``GROUP:NAME``.
     kind : str
-        NumPy's name of the type of the frames' numbers; empty for floats of DEC.
+        NumPy's name of the number type of frames; empty for DEC floats.
     scale : float
-        Units in a whole number; 1 for floats.
+        Length of one integer step in the file's unit; 1 for floats.
     start, width : int
-        First byte of the frames, and numbers a frame: four a point, then the analogue values.
+        Offset of the first frame in bytes, and count of numbers per frame: four for each point, then analogue values.
     """
 
     points: Array
@@ -67,7 +67,7 @@ class C3d:
     width: int
 
     def texts(self, name: str) -> list[str]:
-        """Return the texts of a parameter of the group POINT; empty if there are none."""
+        """Return the texts of a parameter of the group POINT; empty without such a parameter."""
         found = self.parameters.get(f"POINT:{name}", [])
         return found if isinstance(found, list) else []
 
@@ -78,7 +78,7 @@ def parse(data: bytes, source: str) -> C3d:
     Raises
     ------
     InputError
-        If the data are no C3D file, hold no points, are cut off, or state more frames than they hold.
+        If the data are not a C3D file, contain no points, are cut off, or state more frames than they contain.
     """
 
     def damaged(field: str, got: str, expected: str) -> InputError:
@@ -123,7 +123,7 @@ def parse(data: bytes, source: str) -> C3d:
 
 
 def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
-    """Decode 32-bit floats; floats of DEC (85) have exchanged halves and four times the value."""
+    """Decode 32-bit floats; DEC floats (processor 85) have exchanged halves and a value four times as large."""
     if processor != 85:
         return np.frombuffer(data, ">f4" if processor == 86 else "<f4").astype(np.float32)
     words = np.frombuffer(data, "<u2").astype(np.uint32).reshape(-1, 2)
@@ -137,7 +137,7 @@ def _numbers(parameters: dict[str, Any], name: str) -> list[float]:
 
 
 def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width: int, damaged: Any) -> int:
-    """Return the number of frames: the header counts to 65,535; longer files state it in one of three parameters."""
+    """Return the number of frames: from the header up to 65,535, from one of three parameters in longer files."""
     count = last - first + 1
     if count < 1:
         raise damaged("header", f"frames {first} to {last}", "the last not before the first")
@@ -156,9 +156,9 @@ def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width:
 
 
 def _parameters(data: bytes, place: int, processor: int, damaged: Any) -> dict[str, Any]:
-    """Return parameters by group and name, ``POINT:FRAMES``: lists of text, or arrays of numbers.
+    """Return parameters by group and name, such as ``POINT:FRAMES``: lists of text, or arrays of numbers.
 
-    They begin at the byte `place` and end with the data at the latest.
+    The parameters start at byte `place` of the data.
     """
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Any]] = []
@@ -208,7 +208,7 @@ def _value(kind: int, dimensions: tuple[int, ...], data: bytes, processor: int) 
 
 
 def read(document: C3d, path: str, options: Options) -> Motion:
-    """Make a motion of a C3D file's points; analogue channels are left out, and time begins at 0."""
+    """Convert the points of a C3D file to a motion; analogue channels are ignored, and time starts at 0."""
     count = document.points.shape[1]
     labels = ("LABELS", *(f"LABELS{k}" for k in range(2, 258)))
     names = [name for label in labels for name in document.texts(label)]
@@ -232,9 +232,9 @@ def read(document: C3d, path: str, options: Options) -> Motion:
 
 
 def with_points(data: bytes, document: C3d, points: Array) -> bytes:
-    """Return the bytes of a file with other points (T, P, 3) in its unit; everything else stays byte for byte.
+    """Return the bytes of a file with new points (T, P, 3) in its unit; all other bytes stay the same.
 
-    Unknown points keep their numbers. The result is empty for floats of DEC.
+    Unknown points keep their numbers. The result is empty for files with DEC floats.
     """
     if not document.kind:
         return b""
@@ -243,7 +243,7 @@ def with_points(data: bytes, document: C3d, points: Array) -> bytes:
     placed = values.reshape(frames, -1)[:, : 4 * count].reshape(frames, count, 4)
     moved = np.isfinite(points).all(axis=-1) & (points != document.points).any(axis=-1)
     numbers = points[moved] / document.scale
-    whole = document.kind.endswith("i2")  # the repaired file is judged again, which finds clipped numbers
+    whole = document.kind.endswith("i2")  # the check of the repaired file finds clipped numbers
     placed[moved, :3] = np.clip(np.round(numbers), -32768, 32767) if whole else numbers
     placed[moved, 3] = np.maximum(placed[moved, 3], 0)  # a point that was not seen is known now
     values.reshape(frames, -1)[:, : 4 * count] = placed.reshape(frames, -1)
@@ -251,9 +251,9 @@ def with_points(data: bytes, document: C3d, points: Array) -> bytes:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write the points of one recording as C3D: 32-bit floats in metres, axes unchanged.
+    """Write the points of one recording as C3D: 32-bit floats in metres, with unchanged axes.
 
-    The up axis goes into ``POINT:Y_SCREEN``; a missing point has the residual -1. Times become frames at the rate.
+    The up axis is stored in ``POINT:Y_SCREEN``. A missing point has the residual -1. Times are stored as a rate.
 
     Raises
     ------
@@ -290,7 +290,7 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
 
 
 def _section(groups: dict[str, dict[str, tuple[int, Any]]]) -> bytes:
-    """Write groups of parameters: (type, values) by name."""
+    """Return the bytes of groups of parameters, given as (type, values) by name."""
     made = b"\0\0\0\0"
     for number, (group, parameters) in enumerate(groups.items(), 1):
         made += struct.pack("bb", len(group), -number) + group.encode() + struct.pack("<HB", 3, 0)

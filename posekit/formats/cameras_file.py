@@ -1,8 +1,9 @@
 """Cameras in files: OpenCV's YAML, XML and JSON, ROS's camera_info, NPZ arrays, and TOML of Pose2Sim and Anipose.
 
-All of these are named fields, spelled differently: one reader finds intrinsics, lens, pose and size under the names
-that are in use. Pose2Sim's tables have ``fisheye`` for every camera, metres, and a world whose z points up; Anipose's
-unit is that of its calibration board, mostly millimetres; Caliscope's ``rotation_count`` tells which way is up.
+All these formats have named fields, with different names. One reader finds intrinsics, distortion, pose and image size
+under their usual names. Pose2Sim states ``fisheye`` for every camera; its unit is metres, and its z axis points up.
+Anipose's unit is that of its calibration board, mostly millimetres. Caliscope's ``rotation_count`` determines which
+direction is up.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from posekit.settings import UNITS
 
 Fields = Mapping[str, Any]
 
-#: Known names of each field; case and underscores do not count.
+#: Known names of each field; case and underscores are ignored.
 FIELDS: Final = {
     "words for K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix",
     "K": "camera_matrix intrinsic_matrix camera_intrinsics intrinsics matrix mtx k m",
@@ -45,22 +46,22 @@ FIELDS: Final = {
     "model": "distortion_model camera_model model",
     "name": "camera_name name id",
 }
-#: Intrinsics of one camera, or of one of several: ``K_left``, ``M1``.
+#: Pattern of the name of an intrinsic matrix, with an optional suffix for one of several cameras: ``K_left``, ``M1``.
 INTRINSICS: Final = re.compile(
     rf"(?:{'|'.join(FIELDS['K'].replace('_', '_?').split())})(?:[_-]+(.+)|(\d+))?", re.IGNORECASE
 )
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
-#: Largest distance of a camera from the world's origin at which a file without a unit is taken as metres.
+#: Largest distance of a camera from the world's origin at which lengths of an unknown unit are read as metres.
 METRES_UP_TO: Final = 100.0
-#: Smallest distance at which it is taken as millimetres; below it, it could be centimetres as well.
+#: Smallest distance at which they are read as millimetres; smaller distances may also be centimetres.
 MILLIMETRES_FROM: Final = 1000.0
-#: Cosine between an axis of the world and the mean upward direction of the pictures, from which that axis is up.
+#: Minimum cosine between the world's up axis and the mean upward direction of the pictures.
 LEAST_UPRIGHT: Final = 0.8
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a document has intrinsics or a field with such a name, at its top or one level below."""
+    """Return whether a document has a field of intrinsics, at the top level or one level below."""
     if isinstance(document, list):
         return any(isinstance(one, Mapping) and _suffixes(one) for one in document[:1])
     if not isinstance(document, Mapping):
@@ -76,22 +77,22 @@ def read(document: Any, path: str | Path, options: Options) -> dict[str, Pinhole
     Parameters
     ----------
     document : mapping or list
-        One camera's fields; several cameras' with the camera in the fields' names (``K_left``, ``M1``); or an object a
-        camera.
+        Fields of one camera; or fields of several cameras with a suffix for each camera (``K_left``, ``M1``); or one
+        object for each camera.
     path : path
-        The file.
+        Path of the file.
     options : Options
-        `unit` of translations, and the world's `up` axis.
+        Options with the `unit` of translations and the world's `up` axis.
 
     Returns
     -------
     dict of str to PinholeCamera
-        Lengths in metres.
+        Cameras by name; lengths in metres.
 
     Raises
     ------
     InputError
-        If there is no camera, or one that is impossible.
+        If there is no camera, or a camera is impossible.
     """
     fields = {"cameras": document} if isinstance(document, list) else dict(document)
     held: list[tuple[str, Mapping[str, Any], str]] = []
@@ -127,13 +128,13 @@ def read(document: Any, path: str | Path, options: Options) -> dict[str, Pinhole
 
 
 def _camera(fields: Fields, path: str | Path, name: str, suffix: str, unit: str, up: str) -> PinholeCamera:
-    """Make one camera; among the fields of several cameras, its own have the suffix."""
+    """Make one camera from fields; the fields of one of several cameras have a suffix."""
     place = f"{cut(name)}."
     K = _numbers(_value(fields, "K", suffix), path, f"{place}K", 9).reshape(3, 3)
     given = _value(fields, "distortion", suffix)
     distortion = np.empty(0) if given is None else _numbers(given, path, f"{place}distortion")
     fisheye = _is_fisheye(fields, path, place, suffix)
-    if not fisheye and 0 < len(distortion) < 4:  # some programs leave out coefficients that are 0
+    if not fisheye and 0 < len(distortion) < 4:  # some programs omit coefficients that are 0
         distortion = np.pad(distortion, (0, 4 - len(distortion)))
     R, t = _pose(fields, path, place, suffix)
     guess: dict[str, Any] = {
@@ -158,7 +159,7 @@ def _camera(fields: Fields, path: str | Path, name: str, suffix: str, unit: str,
 
 
 def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
-    """Find the unit of the cameras' positions from their distances to the origin."""
+    """Find the unit of the cameras' positions from their distances from the origin."""
     poses = [as_numbers(_value(one, "translation")) for one in entries]
     farthest = max((float(np.linalg.norm(t)) for t in poses if t is not None and t.size == 3), default=0.0)
     if farthest <= METRES_UP_TO or not np.isfinite(farthest):
@@ -168,7 +169,7 @@ def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
         expected = f"metres, up to {METRES_UP_TO:.0f}"
         raise refusal(path, "translation", got, expected, "give the unit with --unit cm or mm")
     warnings.warn(
-        f"{path}: cameras up to {farthest:,.0f} from the origin: translations are taken as millimetres; "
+        f"{path}: cameras up to {farthest:,.0f} from the origin: translations are read as millimetres; "
         "give another unit with --unit",
         UserWarning,
         stacklevel=2,
@@ -177,7 +178,7 @@ def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
 
 
 def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Array | None, Array | None]:
-    """Return R and t; None for both if t is missing, as ROS calls its rectification R."""
+    """Return R and t; None for both if t is missing, because a sole R is the rectification of ROS."""
     t = _value(fields, "translation", suffix)
     given = [_value(fields, name, suffix) for name in ("matrix of rotation", "rotation")]
     arrays = [_numbers(one, path, f"{place}R") for one in given if one is not None]
@@ -188,7 +189,7 @@ def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Ar
 
 
 def _size(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[int, int] | None:
-    """Return width and height; None if the file has neither, or zero, as ROS writes an unknown size."""
+    """Return width and height in pixels; None if they are absent or zero, as in ROS for an unknown size."""
     sides = [_value(fields, name, suffix, "") for name in ("width", "height")]
     if (pair := _value(fields, "size", suffix, "")) is not None:
         pair = pair.get("data") if isinstance(pair, Mapping) else pair
@@ -213,7 +214,7 @@ def _is_fisheye(fields: Fields, path: str | Path, place: str, suffix: str) -> bo
 
 
 def _up_of_pictures(turns: list[Any], cameras: list[PinholeCamera]) -> str:
-    """Return the world's axis that points up in pictures that are upright after quarter turns (``rotation_count``)."""
+    """Return the world's axis that points up in the pictures, after their rotation by quarter turns (`turns`)."""
     if not all(isinstance(turn, int) for turn in turns) or any(camera.R is None for camera in cameras):
         return ""
     in_camera = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -224,7 +225,7 @@ def _up_of_pictures(turns: list[Any], cameras: list[PinholeCamera]) -> str:
 
 
 def _numbers(value: Any, path: str | Path, field: str, count: int | None = None) -> Array:
-    """Return the numbers of a list, an array, or OpenCV's object with rows, cols and data, as a flat array."""
+    """Return the numbers of a list, an array or OpenCV's object with rows, cols and data as a 1D array."""
     data = value.get("data") if isinstance(value, Mapping) else value
     array = Node(data, path, field).array().ravel()
     declared = array.size
@@ -238,7 +239,7 @@ def _numbers(value: Any, path: str | Path, field: str, count: int | None = None)
 
 
 def _suffixes(fields: Fields) -> list[str]:
-    """List the camera suffixes of fields that are 3x3 intrinsics: nothing, a number, or a word after an underscore."""
+    """List the suffixes of fields with 3x3 intrinsics: empty, a number, or a word after an underscore."""
     found = []
     for key, value in fields.items():
         match = INTRINSICS.fullmatch(str(key))
@@ -248,13 +249,13 @@ def _suffixes(fields: Fields) -> list[str]:
 
 
 def _is_intrinsic(value: Any) -> bool:
-    """Return whether a value is a 3x3 matrix with the last row 0, 0, 1, unlike projection matrices and rotations."""
+    """Return whether a value is a 3x3 matrix of intrinsics: the last row is 0, 0, 1, unlike in a rotation."""
     array = as_numbers(value.get("data") if isinstance(value, Mapping) else value)
     return array is not None and array.size == 9 and bool((array.ravel()[6:] == [0, 0, 1]).all())
 
 
 def _value(fields: Fields, field: str, *suffixes: str) -> Any:
-    """Return the value of a field under the first of its known names and suffixes that the file has; None if absent."""
+    """Return the value of a field by the first of its known names, with a suffix, that the file has; None if absent."""
     by_key = {plain(str(key)): value for key, value in fields.items()}
     named = (plain(alias + suffix) for suffix in suffixes or ("",) for alias in FIELDS[field].split())
     value = next((by_key[name] for name in named if name in by_key), None)
@@ -262,19 +263,19 @@ def _value(fields: Fields, field: str, *suffixes: str) -> Any:
 
 
 def write_json(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
-    """Write cameras as an object each; metres."""
+    """Write cameras as JSON with one object for each camera; lengths in metres."""
     json_file.write(path, {name: camera.fields() for name, camera in cameras.items()})
 
 
 def write_toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
-    """Write cameras as Pose2Sim reads them; metres.
+    """Write cameras as TOML for Pose2Sim; lengths in metres.
 
-    The cause and the deviation of a guessed focal length go along in ``how`` and ``deviation``.
+    For a guessed focal length the fields ``how`` and ``deviation`` state the reason and the standard deviation.
 
     Raises
     ------
     InputError
-        If the worlds of the cameras point up differently.
+        If the cameras have different up axes.
     """
     ups = {camera.up for camera in cameras.values()}
     if len(ups) > 1:

@@ -1,4 +1,4 @@
-"""From a detector's rows to `Detections`: which point is which, which are missing, and where each picture belongs."""
+"""Conversion of a detector's rows to `Detections`: layout of points, missing points, and order of pictures."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from posekit.formats.tables import seconds
 from posekit.geometry import Array, Ints
 from posekit.skeleton import HEAD_POINTS
 
-#: Minimum share of a film's pictures that a detector lists, where picture numbers count in their common divisor;
-#: pictures of a collection have numbers far apart.
+#: Minimum share of a film's pictures that a detector lists, with picture numbers divided by their common divisor. The
+#: numbers of unrelated pictures are far apart.
 DENSE: Final = 0.5
-#: Largest ratio of the range of picture numbers to the number of pictures; above it they do not count pictures.
+#: Largest ratio of the range of picture numbers to the number of pictures; above it the numbers are not frame numbers.
 MOST_SPREAD: Final = 20
-#: Median motion of a person between pictures of a film, in units of the square root of the body's area; between
-#: unrelated photographs it is about 1 and more.
+#: Largest median motion of a person between pictures of a film, as a multiple of the square root of the body's area;
+#: between unrelated photographs it is about 1 or more.
 FILM_MOTION: Final = 0.5
 #: Largest number of pictures in which this motion is measured.
 MOST_COMPARED: Final = 200
-#: A picture whose size is not known.
+#: Width and height of a picture whose size is unknown.
 UNKNOWN: Final = (math.nan, math.nan)
-#: Size of nose, eyes and ears against the whole body that stands for a layout without them, as Human3.6M's: where the
-#: head's points belong it is smaller, in a wrong order larger.
+#: Size of the head (nose, eyes and ears) relative to the body, assumed for layouts without head points, such as
+#: Human3.6M's. In the correct layout of points with a head the size is smaller, in a wrong layout it is larger.
 HEADLESS_SHARE: Final = 0.385
-#: Minimum ratio of the head's size in a wrong order of points to its size in the right order.
+#: Minimum ratio of the head's size in a wrong layout to its size in the correct layout.
 CLEAR_RATIO: Final = 1.17
 
 
 class Rows:
-    """People that a file lists in any order, each in a picture with a label.
+    """Detected people of a file in any order; each person has the label of a picture.
 
     Attributes
     ----------
     source, kind : str
-        The file, and the name of its format.
+        Path of the file, and name of its format.
     names : tuple of str
-        Names of the points; empty if the file has none.
+        Names of the points; empty for points without names.
     film : bool or None
-        Whether the pictures are of one film; None if their numbers and the people's motion tell.
+        Whether the pictures are of one film; None to decide by the picture numbers and the people's motion.
     in_folder : bool
-        Whether there is one file a picture.
+        Whether each picture has its own file.
     by_camera : bool
-        Whether the numbers of people are those of the cameras that saw one person.
+        Whether the numbers of people are numbers of cameras, each of which shows the same person.
     pictures : dict
         For each label: time (s), width and height, NaN where unknown.
     people : list of (str, array, int)
@@ -66,24 +66,24 @@ class Rows:
         self.people: list[tuple[str, Array, int]] = []
 
     def picture(self, label: Any, *, time: float = math.nan, size: tuple[float, float] = UNKNOWN) -> str:
-        """Note a picture, with or without people; return its label as text."""
+        """Add a picture, with or without people; return its label as text."""
         name = str(label)
         known, stated = self.pictures.get(name, (math.nan,) * 3), (float(time), *size)
         self.pictures[name] = tuple(b if math.isnan(a) else a for a, b in zip(known, stated, strict=True))
         return name
 
     def add(self, label: Any, points: Array, person: Any = None) -> None:
-        """Note a person in a picture.
+        """Add a person in a picture.
 
         Parameters
         ----------
         label : object
-            The picture.
+            Label of the picture.
         points : array (K, 3)
-            Pixels, or fractions of the picture, and confidences, NaN if not known. A point with confidence 0 is
-            missing wherever it lies; so is one at the origin or at (-1, -1), and one that is known in part.
+            Coordinates in pixels or as fractions of the picture, and confidences (NaN if unknown). A point is missing
+            if its confidence is 0, if it is at the origin or at (-1, -1), or if a coordinate is unknown.
         person : object
-            The file's number of the person; anything else is unknown.
+            Number of the person in the file; values other than numbers mean unknown.
         """
         whole = isinstance(person, int | float) and not isinstance(person, bool) and 0 <= person < 2**31
         self.people.append((self.picture(label), points, int(person) if whole else -1))
@@ -94,7 +94,7 @@ class Rows:
         Raises
         ------
         InputError
-            If people have different numbers of points, or a point is out of all pictures.
+            If people have different numbers of points, or coordinates are too large for any picture.
         """
         counts = [len(points) for _, points, _ in self.people]
         odd = next((k for k, count in enumerate(counts) if count != counts[0]), None)
@@ -122,12 +122,12 @@ class Rows:
 
 
 def detections_of(rows: Rows, options: Options) -> Detections:
-    """Make detections of all rows.
+    """Convert all rows to detections.
 
     Raises
     ------
     InputError
-        If it is not clear which points the points are, or files of several cameras are in one folder.
+        If the layout of the points is unknown, or a folder contains files of several cameras.
     """
     held, values, person = rows.seen()
     layout = _layout(rows, values[..., :2], options)
@@ -171,7 +171,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
 
 
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:
-    """Find the layout: the user's, by the names in the file, or by the number of points and the head's size."""
+    """Find the layout: the user's, or by the names in the file, or by the number of points and the head's size."""
     if options.layout:
         return load_layout(options.layout)
     if rows.names:
@@ -192,7 +192,7 @@ def _layout(rows: Rows, points: Array, options: Options) -> Layout:
 
 
 def _head_share(points: Array, layout: Layout) -> float:
-    """Return the size of nose, eyes and ears against the whole body by a layout, median over people (N, K, 2)."""
+    """Return the head's size relative to the whole body in a layout; median over people with points (N, K, 2)."""
     head = [
         layout.points.index(layout.landmarks[name][0]) for name in HEAD_POINTS if name in layout.landmarks
     ]
@@ -209,7 +209,7 @@ def _head_share(points: Array, layout: Layout) -> float:
 
 
 def _in_pixels(rows: Rows, held: list[str], points: Array, options: Options) -> Array:
-    """Turn fractions of the picture into pixels; without the picture's size they stay fractions."""
+    """Convert fractions of the picture to pixels; if the picture's size is unknown they remain fractions."""
     known = points[~np.isnan(points[..., 0])]
     if rows.kind == "openpose" and len(known) and np.abs(known).max() <= 1 and known.min() < 0:
         points, known = (points + 1) / 2, (known + 1) / 2  # --keypoint_scale 4: from -1 to 1
@@ -217,13 +217,13 @@ def _in_pixels(rows: Rows, held: list[str], points: Array, options: Options) -> 
         return points
     sizes = np.array([rows.pictures[label][1:] for label in held])
     if np.isnan(sizes).any():
-        options.note("points are fractions of the picture, whose size the file does not have")
+        options.note("points are fractions of the picture; the file does not state its size")
         return points
     return np.asarray(points * sizes[:, None])
 
 
 def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tuple[bool, dict[str, int]]:
-    """Return whether the pictures form a film, and each picture's frame by its label; absent pictures leave gaps."""
+    """Return whether the pictures form a film, and each picture's frame number by label; numbers may have gaps."""
     labels = list(rows.pictures)
     numbers = _numbers(rows, labels)
     if numbers is None:
@@ -252,7 +252,7 @@ def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tup
 
 
 def _numbers(rows: Rows, labels: list[str]) -> NDArray[np.int64] | None:
-    """Return a number from each picture's label, different for all pictures; None if the labels have no such number."""
+    """Return the number in each picture's label; None if labels have no number, or numbers are not unique."""
     found = [[int(one) for one in re.findall(r"\d{1,15}", label)] for label in labels]
     widths = {len(one) for one in found}
     if len(widths) == 1 and widths != {0}:
@@ -267,7 +267,7 @@ def _numbers(rows: Rows, labels: list[str]) -> NDArray[np.int64] | None:
 
 
 def _moves_little(frame: Ints, points: Array) -> bool:
-    """Return whether, in most pictures, a person is near the place of a person in the picture before."""
+    """Return whether, in most pictures, a person is near the position of a person in the previous picture."""
     moved = []
     for number in np.unique(frame)[1 : MOST_COMPARED + 1]:
         before, now = points[frame == number - 1], points[frame == number]
@@ -283,7 +283,7 @@ def _moves_little(frame: Ints, points: Array) -> bool:
 
 
 def _times(stated: Array, film: bool, options: Options) -> Array | None:
-    """Return the times of all pictures (F,), interpolated for absent pictures; None if the file has no times."""
+    """Return the times of all pictures (F,), seconds, interpolated for absent pictures; None without times."""
     known = np.isfinite(stated)
     if not known.any() or not film:
         return None

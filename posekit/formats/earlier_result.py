@@ -1,7 +1,7 @@
-"""``posekit.result/2``, the format of earlier versions: its JSON and NPZ are converted to a document of ``result/3``.
+"""Conversion of ``posekit.result/2``, the format of earlier versions, from JSON or NPZ to ``result/3``.
 
-``result/2`` stores no joints of the answer; the joints of the first representative are used. Postures are sorted by
-decreasing probability, and the covariance of each joint becomes its radius.
+``result/2`` does not store the joints of the answer; the joints of the first representative replace them. Postures are
+sorted by decreasing probability, and the covariance of each joint is converted to a radius.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ROOT_FIELDS: Final = ("method", "estimate", "deviation", "lower", "upper")
 
 
 def document_of(root: Node) -> dict[str, Any]:
-    """Return the document of ``posekit.result/3`` for one of ``posekit.result/2``, in the file's unit."""
+    """Convert a document of ``posekit.result/2`` to ``posekit.result/3``, in the file's unit."""
     document: Mapping[str, Any] = _unpadded(root) if "count" in root.value else root.value
     frames = [dict(frame.object()) for frame in Node(document, root.source).at("frames").list(1)]
     _add_radius([posture for frame in frames for posture in frame["postures"]])

@@ -1,10 +1,10 @@
-r"""The figure as animation programs have it: a tree from the pelvis, y up, facing z; written as BVH.
+r"""The figure as a joint tree of animation programs: the root is the pelvis, y is up, z is forward. BVH is written.
 
-The figure's URDF starts from the torso, whose origin is the neck. Here the tree starts from the pelvis (the hips):
-torso (turning about the pelvis), neck (the head), shoulders, elbows, hips, knees; wrists, ankles and head points turn
-nothing. With B from the URDF's axes (x forward, y left, z up) to these (x left, y up, z forward), a ball joint's
-:math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` is :math:`R_x(\alpha) R_z(\beta) R_y(\gamma)`: the angles of the joint, in
-its order.
+The root of the figure's URDF is the torso, whose origin is the neck. Here the root is the pelvis, followed by torso,
+neck, shoulders, elbows, hips and knees. Wrists, ankles and head points are leaves without rotation. The URDF's axes are
+x forward, y left, z up; here they are x left, y up, z forward. Therefore the rotation
+:math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of a ball joint becomes :math:`R_x(\alpha) R_z(\beta) R_y(\gamma)`, with the
+same angles in the same order.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.motion import Motion
 
-#: From the URDF's axes to x left, y up, z forward.
+#: Rotation from the URDF's axes to x left, y up, z forward.
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-#: Axes of the three angles of a joint, in their order: x, z, y.
+#: Axes of the three angles of a joint, in the order of rotation: x, z, y.
 AXIS_ORDER: Final = (0, 2, 1)
 
 
 class Node(NamedTuple):
-    """A joint of the tree: its name, its name in BVH, its parent's index, the link that turns with it, its points."""
+    """A joint of the tree: name, name in BVH, index of the parent, link that rotates with it, points of that link."""
 
     name: str
     bvh: str
@@ -50,35 +50,36 @@ def _nodes() -> tuple[Node, ...]:
     return tuple(Node(name, bvh, index.get(above, -1), *rest) for name, bvh, above, *rest in rows)
 
 
-#: Depth first, as a file lists them.
+#: Joints of the tree in depth-first order, as in files.
 NODES: Final = _nodes()
 
 
 def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
     """Return a figure with the person's lengths, and the root and angles of its tree in each frame of a recording.
 
-    Stored configurations of the figure are used unchanged; otherwise they are computed from the joints in closed
-    form. An unknown angle keeps the value of the nearest frame that has it; one that is never known stands at zero, or
-    at its limit next to zero.
+    Stored configurations of the figure are used unchanged; otherwise closed-form inverse kinematics computes them from
+    the joints. An unknown angle has the value of the nearest frame in which it is known. An angle that is unknown in
+    all frames is zero, or the limit nearest to zero.
 
     Parameters
     ----------
     motion : Motion
+        One recording.
     format : str
-        Name of the format, for errors.
+        Name of the file format, for error messages.
 
     Returns
     -------
     figure : Figure
     root : array (T, 3)
-        The pelvis in the world, y up, metres.
+        Position of the pelvis in a world with y up, metres.
     angles : array (T, 21, 3)
-        Angles of each node against its parent (the first against the world), about x, z and y, radians.
+        Angles of each node relative to its parent (of the root relative to the world), about x, z and y, radians.
 
     Raises
     ------
     InputError
-        If there are several recordings, or a frame has no torso, to which head and limbs are attached.
+        If there are several recordings, or the torso is unknown in a frame.
     """
     from posekit.body import load_figure, scaled_to, segment_lengths
 
@@ -111,19 +112,19 @@ def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
 
 
 def rest_place(figure: Figure, node: Node) -> Array:
-    """Return the place (3,) of a node at the neutral configuration, metres, the URDF's axes, from the neck."""
+    """Return a node's position (3,) relative to the neck in the neutral configuration, metres, in the URDF's axes."""
     return np.asarray(figure.neutral_points[[POINT[point] for point in node.points]].mean(axis=0))
 
 
 def offsets(figure: Figure) -> Array:
-    """Return each node's place in its parent's frame (21, 3), metres; the root's is zero."""
+    """Return each node's position in its parent's frame (21, 3), metres; zero for the root."""
     place = np.stack([rest_place(figure, node) for node in NODES])
     steps = [place[k] - place[one.parent] if one.parent >= 0 else np.zeros(3) for k, one in enumerate(NODES)]
     return np.asarray(np.stack(steps) @ TO_Y_UP.T)
 
 
 def _placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
-    """Put configurations (T, nq) into the tree: the root (T, 3) and the angles (T, 21, 3) of `figure_in_tree`."""
+    """Convert configurations (T, nq) to the root (T, 3) and the angles (T, 21, 3) of `figure_in_tree`."""
     W = rotation_between(up_vector(up or "+z"), up_vector("+y"))
     R_torso = W @ rotation_from_quaternion(q[:, 3:7]) @ TO_Y_UP.T
     pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
@@ -134,7 +135,7 @@ def _placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
         for turn, place in column.items():
             if f"{node.name}.{turn}" in own:
                 angles[:, k, place] = own[f"{node.name}.{turn}"]
-    # The URDF turns the hips against the torso; here the torso turns against the hips, and the hips are the root.
+    # In the URDF the hips rotate relative to the torso; here the torso rotates relative to the hips, the root.
     R_hips = euler_rotation(angles[:, 0])
     angles[:, 1] = euler_angles(R_hips.transpose(0, 2, 1))
     angles[:, 0] = euler_angles(R_torso @ R_hips)
@@ -142,16 +143,16 @@ def _placed(figure: Figure, q: Array, up: str) -> tuple[Array, Array]:
 
 
 def euler_rotation(angles: Array) -> Array:
-    """Return the rotations (..., 3, 3) of angles (..., 3), radians, in the order of `AXIS_ORDER`."""
+    """Return rotation matrices (..., 3, 3) from Euler angles (..., 3) about the axes of `AXIS_ORDER`, radians."""
     x, z, y = (coordinate_rotation(axis, angles[..., k]) for k, axis in enumerate(AXIS_ORDER))
     return np.asarray(x @ z @ y)
 
 
 def euler_angles(R: Array) -> Array:
-    """Return the angles (..., 3) of rotations (..., 3, 3), radians, the middle one within a quarter turn.
+    """Return Euler angles (..., 3) of rotation matrices (..., 3, 3), radians, the second within a quarter turn.
 
-    The first is taken out of the rotation before the last is read: where the middle one is a quarter turn the first is
-    arbitrary, and the last makes up for it.
+    The third angle is computed after the rotation by the first angle is removed. At gimbal lock (the second angle is a
+    quarter turn) the first angle is arbitrary, and the third angle compensates for it.
     """
     from posekit.body.angles import ball_branch
 
@@ -160,10 +161,10 @@ def euler_angles(R: Array) -> Array:
 
 
 def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -> None:
-    """Write one recording as BVH, y up; a motion that came from BVH keeps its hierarchy, names and channels.
+    """Write one recording as BVH, y up; a motion read from BVH keeps its hierarchy, names and channels.
 
     Joints of the figure have the channels Xrotation Zrotation Yrotation: flexion, abduction (or bending) and rotation.
-    Angles and places have 6 decimals.
+    Angles and positions have 6 decimals.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
 
 
 def _block(k: int, steps: Array, depth: int) -> list[str]:
-    """Write a node and its descendants as lines of BVH; the tree is 6 levels deep."""
+    """Return the lines of BVH of a node and its descendants."""
     tab, node = "\t" * depth, NODES[k]
     x, y, z = np.round(steps[k], 8) + 0.0
     turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in AXIS_ORDER)
@@ -199,7 +200,7 @@ def _block(k: int, steps: Array, depth: int) -> list[str]:
         f"{tab}\tCHANNELS {3 if depth else 6} {'' if depth else moves}{turns}\n",
     ]
     children = [child for child, other in enumerate(NODES) if other.parent == k]
-    if not children:  # a reader expects an end; the figure has no hands and no feet, so it has no length
+    if not children:  # readers expect an End Site; its offset is zero, as the figure has no hands and no feet
         lines.append(f"{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0.0 0.0 0.0\n{tab}\t}}\n")
     for child in children:
         lines += _block(child, steps, depth + 1)

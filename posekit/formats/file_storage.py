@@ -1,4 +1,4 @@
-"""YAML and XML as OpenCV's FileStorage and ROS write them, parsed into maps, lists, numbers and words."""
+"""Parsers of YAML and XML files of OpenCV's FileStorage and ROS; they return maps, lists, numbers and words."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import yaml
 from posekit.errors import cut, one_line, refusal, shown
 from posekit.files import text
 
-#: Words that are not read as text, and their values.
+#: Values of the words that are not read as text.
 WORDS: Final[dict[str, Any]] = {
     **{"true": True, "false": False, "null": None, "~": None, "": None},
     **{".nan": float("nan"), ".inf": float("inf"), "-.inf": float("-inf")},
@@ -19,7 +19,7 @@ WORDS: Final[dict[str, Any]] = {
 
 
 class _Loader(yaml.BaseLoader):  # type: ignore[misc]
-    """YAML without aliases and with each key once; other tags than OpenCV's are left out, too."""
+    """YAML loader that refuses aliases and repeated keys, and knows no tags except OpenCV's."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -44,7 +44,7 @@ def parse_yaml(data: bytes, source: str) -> Any:
     Raises
     ------
     InputError
-        If the text is no YAML, or has aliases, several documents or a key twice.
+        If the text is not YAML, or has aliases, several documents or a repeated key.
     """
     # OpenCV writes "%YAML:1.0", which is not YAML's own directive.
     content = re.sub(r"^%.*$", "", text(data, source), flags=re.MULTILINE)
@@ -79,7 +79,7 @@ def parse_xml(data: bytes, source: str) -> dict[str, Any]:
 
 
 def _xml_value(element: ElementTree.Element) -> Any:
-    """Turn an element into an object, a list, numbers or a text."""
+    """Convert an element to an object, a list, numbers or a text."""
     if len(element):
         inner = {child.tag: _xml_value(child) for child in element}
         return [_xml_value(child) for child in element] if set(inner) == {"_"} else inner
@@ -91,7 +91,7 @@ def _xml_value(element: ElementTree.Element) -> Any:
 
 
 def scalar(word: str) -> Any:
-    """Read a plain word: a number, a truth value, nothing, or a text."""
+    """Convert an unquoted word to a number, a truth value, None, or a text."""
     word = word.strip()
     if word.casefold() in WORDS:
         return WORDS[word.casefold()]

@@ -1,9 +1,9 @@
-"""GLB: the figure's body, standing or moving, as glTF 2.0 in one binary file. It is written, not read.
+"""GLB: the figure's body, standing or moving, as glTF 2.0 in one binary file. GLB files are written, but not read.
 
-Khronos Group, *glTF 2.0 Specification* (2021). Metres, y up, right-handed. One node a joint, with the joint's name and
-its place; the capsule of its link hangs on it. A motion is one animation with a rotation for each node that turns and a
-translation for the pelvis, linear between frames. Numbers of an animation are 32-bit floats: so that they stay exact to
-1e-6 m far from the origin, the whole hangs on a node at whole metres near the person.
+The format is that of Khronos Group, *glTF 2.0 Specification* (2021), in metres, with y up. Each joint is a node with
+its name and position; the capsule of its link is a child of the node. A motion is one animation: rotations of nodes and
+the translation of the pelvis, interpolated linearly between frames. Numbers of an animation are 32-bit floats. So that
+they are exact to 1e-6 m far from the origin, the root node is at whole metres near the person.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.motion import Motion
 
-#: Colours of one body: right orange, left blue, the trunk grey.
+#: Colours (RGB) of a body: right orange, left blue, trunk grey.
 SIDE_COLOURS: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
-#: Corners of a capsule's rings, and rings of a half sphere: faces lie inside the capsule by under 1 % of its radius.
+#: Numbers of corners of a capsule's rings and of rings of a half sphere. The mesh deviates from the capsule by less
+#: than 1 % of the radius.
 RING_CORNERS, HALF_SPHERE_RINGS = 24, 6
 _FLOAT, _UINT16 = 5126, 5123
 
 
 class _Glb:
-    """A glTF document and its buffer of numbers, both appended to while a body is written."""
+    """A glTF document and its buffer of numbers, to which a body is appended."""
 
     def __init__(self) -> None:
         self.document: dict[str, Any] = {
@@ -52,7 +53,7 @@ class _Glb:
         return len(items) - 1
 
     def accessor(self, values: NDArray[Any]) -> int:
-        """Add numbers (N,), (N, 3) or (N, 4) and return the index of their accessor; whole numbers are indices."""
+        """Add an array (N,), (N, 3) or (N, 4) and return the index of its accessor; integer arrays are indices."""
         kind, spelt = (_UINT16, "<u2") if values.dtype.kind == "i" else (_FLOAT, "<f4")
         data = np.ascontiguousarray(values, dtype=spelt)
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": data.nbytes}
@@ -69,7 +70,7 @@ class _Glb:
         return self.append("accessors", accessor)
 
     def packed(self) -> bytes:
-        """Return the file: a chunk of JSON and a chunk of numbers, both padded to 4 bytes."""
+        """Return the bytes of the file: a chunk of JSON and a chunk of numbers, both padded to 4 bytes."""
         document = {**self.document, "buffers": [{"byteLength": len(self.data)}]}
         text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii")
         text += b" " * (-len(text) % 4)
@@ -79,7 +80,7 @@ class _Glb:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write one recording as GLB: a body of capsules and its animation.
+    """Write one recording as GLB: a body of capsules, and its animation.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def _material(glb: _Glb, name: str, rgb: tuple[float, ...]) -> int:
 
 
 def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
-    """Add the capsules' triangles, each in its link's frame."""
+    """Add the triangles of each link's capsules, in the link's frame."""
     at = {node.link: rest_place(figure, node) for node in NODES if node.link}
     shapes = {}
     for capsule in figure.capsules:
@@ -128,7 +129,7 @@ def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
 
 
 def _body(glb: _Glb, figure: Figure, root: Array, turns: Array) -> None:
-    """Add the nodes of the body after that of the world, parents first."""
+    """Add the nodes of the body after the world's node, parents first."""
     nodes, shapes, steps = glb.document["nodes"], _shapes(glb, figure), offsets(figure)
     colours = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
     for k, node in enumerate(NODES):

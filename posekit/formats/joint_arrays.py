@@ -1,4 +1,4 @@
-"""Points in space as arrays (NPZ, NPY, pickle) and tables (CSV, Parquet), with names or in a layout's order."""
+"""3D points in arrays (NPZ, NPY, pickle) and tables (CSV, Parquet), with names or in a layout's order."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Arrays by name.
 Held = Mapping[str, Any]
 
-#: Names of arrays of points, in the order in which they are looked for.
+#: Names of arrays of points, in the order of the search.
 POINTS: Final = (
     *("joints", "points", "posed_joints", "pred_keypoints_3d", "keypoints_3d", "keypoints3d", "positions_3d"),
     *("poses_3d", "joints_3d", "joints3d", "kpts_3d", "pred_joints", "joint_positions", "positions"),
@@ -36,13 +36,13 @@ POINTS: Final = (
 NAMES: Final = ("joint_names", "names", "keypoint_names", "point_names", "marker_names", "labels")
 #: Columns of Caliscope's triangulated points; points 0 to 32 are MediaPipe's (mprib/caliscope).
 CALISCOPE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
-#: Names of columns that hold the recording or the person of a row.
+#: Names of columns with the recording or the person of each row.
 PEOPLE: Final = ("clip", "person", "person_id", "track_id", "subject")
 FRAMES: Final = ("frame", "fnum", "sync_index", "frame_index")
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a document holds points in space."""
+    """Return whether a document contains 3D points."""
     if isinstance(document, Table):
         return set(CALISCOPE_COLUMNS) <= set(document.names) or bool(_wide_columns(document.names))
     return isinstance(document, Mapping) and _key(document) is not None
@@ -62,12 +62,12 @@ def _key(document: Held) -> str | None:
 
 
 def read(document: Any, path: str, options: Options) -> Motion:
-    """Read points in space.
+    """Read 3D points as a motion.
 
     Raises
     ------
     InputError
-        If shapes do not fit; the error names the layouts with that number of points.
+        If shapes are wrong; the message names the layouts with that number of points.
     """
     if isinstance(document, Table):
         return _read_table(document, path, options)
@@ -86,7 +86,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     fields: dict[str, Any] = {"clips": tuple(str(one) for one in np.ravel(document.get("clip_names", ())))}
     fields |= _counts(document, frames, len(fields["clips"]) or frames, path)
     if "pred_cam_t" in document:  # SAM 3D Body
-        options.note("points are relative to the body in each frame; pred_cam_t is left out")
+        options.note("points are relative to the body in each frame; pred_cam_t is ignored")
     if "in_world" in document or "pred_cam_t" in document:
         fields["in_world"] = bool(document.get("in_world", False))
     if np.shape(document.get("q"))[:1] == (frames,):
@@ -101,7 +101,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
 
 
 def _shaped(values: Any, path: str, key: str) -> Array:
-    """Return points (T, P, 3) of an array (T, P, 3), (1, T, P, 3), (T, 3 P) or (T, P, 4) with a confidence."""
+    """Return points (T, P, 3) from an array (T, P, 3), (1, T, P, 3), (T, 3 P), or (T, P, 4) with confidences."""
     points = np.asarray(values, dtype=np.float64)
     if points.ndim == 4 and 1 in points.shape[:2]:
         points = points[0] if points.shape[0] == 1 else points[:, 0]
@@ -126,7 +126,7 @@ def _shaped(values: Any, path: str, key: str) -> Array:
 
 
 def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Ints]:
-    """Return the index of the recording and the number of each frame, if the file has them."""
+    """Return the recording's index and the frame number of each row, if the file states them."""
     found = {}
     for key, most in (("clip", clips), ("frame", 2**53)):
         values = np.asarray(document.get(key, ()))
@@ -139,7 +139,7 @@ def _counts(document: Held, frames: int, clips: int, path: str) -> dict[str, Int
 
 
 def _times(held: Held, clip: Ints | None, frames: int, path: str) -> tuple[float | None, Array | None]:
-    """Return the file's rate and times; if each recording has its own rate, times are computed from the rates."""
+    """Return the file's rate and times; if recordings have different rates, times are computed from these rates."""
     time, rate = time_and_rate(held)
     if time is not None and len(time) != frames:
         raise refusal(path, "time", f"{len(time)} of them", f"{frames} numbers", "correct the file")
@@ -159,7 +159,7 @@ def _word(document: Held, key: str, known: Mapping[str, str], path: str) -> str:
 
 
 def _wide_columns(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the columns x, y, z of each point that has all three, by the point's name."""
+    """Return the names of the columns x, y, z of each point that has all three, by the point's name."""
     found = columns_of_points(names).items()
     return {name: [axes[axis] for axis in "xyz"] for name, axes in found if set("xyz") <= set(axes)}
 
@@ -191,7 +191,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
         fields["clip"] = np.array([fields["clips"].index(one) for one in kept], dtype=np.intp)
     number = table.checked(frame_name)[rows] if frame_name else np.full(len(rows), np.nan)
     if np.isfinite(number).all():
-        # Frames that were left out keep their place; each recording counts from 0.
+        # Omitted frames leave gaps in the numbers; the numbers of each recording start at 0.
         clip = fields.get("clip", np.zeros(len(rows), dtype=np.intp))
         first = np.array([number[clip == index].min() for index in range(clip.max() + 1)])
         fields["frame"] = (number - first[clip]).astype(np.intp)
@@ -217,7 +217,7 @@ def _caliscope(table: Table, path: str, count: int) -> tuple[Array, Ints]:
 
 
 def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write a whole motion as NPZ without pickles: points, configurations, times, clips, frames, axes."""
+    """Write all arrays of a motion as NPZ without pickles: points, configurations, times, clips, frames, axes."""
     arrays: dict[str, Any] = {
         "time": motion.time,
         "frame": np.asarray(motion.frame, dtype=np.int64),
@@ -242,7 +242,7 @@ def _clip_names(motion: Motion) -> tuple[str, ...]:
 
 
 def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
-    """Return columns with one row per frame: time, clip if there are several, ``neck_x``, …, or q by its names."""
+    """Return columns with one row per frame: time, name of the clip if there are several, ``neck_x``, …, or q."""
     clip = np.asarray(motion.clip)
     columns: dict[str, NDArray[Any]] = {}
     if not motion.in_time and len(motion) > 1:
@@ -260,7 +260,7 @@ def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
 
 
 def write_csv(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write a motion's points (or configurations) as CSV or TSV, a row a frame; metres, seconds, radians."""
+    """Write a motion's points (or configurations) as CSV or TSV with one row per frame; metres, seconds, radians."""
     tabs = Path(path).name.lower().removesuffix(".gz").endswith(".tsv")
     write_bytes(path, csv_text(columns_of(motion), "\t" if tabs else ",").encode())
 

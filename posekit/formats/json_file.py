@@ -1,4 +1,4 @@
-"""JSON: parse bytes that may be damaged, and write documents whose arrays hold NaN."""
+"""JSON: parse files that may be damaged, and write documents whose arrays contain NaN."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from posekit.errors import InputError, cut, refusal, shown
 from posekit.files import text, write_bytes
 
-#: Bytes of JSON that are parsed or written: in memory a parsed document takes about ten times as many.
+#: Largest size in bytes of a file that is parsed or written; a parsed document takes about ten times as much memory.
 MAX_JSON_BYTES: Final = 500_000_000
 
-#: Largest size in bytes of a file that is checked for repeated keys, as people edit small files by hand.
+#: Largest size in bytes of a file that is checked for repeated keys; only small files are edited by hand.
 MAX_BY_HAND: Final = 1_000_000
 
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Pause cyclic garbage collection, which takes half of the time to parse or write millions of lists."""
+    """Pause cyclic garbage collection, which takes half of the time of parsing or writing millions of lists."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -40,20 +40,20 @@ def parse(data: bytes, source: str | Path) -> Any:
     Parameters
     ----------
     data : bytes
-        Content of the file, UTF-8.
+        Content of the file in UTF-8.
     source : path
-        The file, for errors.
+        Path of the file, for error messages.
 
     Returns
     -------
     object
-        Lists, objects, strings, numbers, booleans and None. NaN and infinite numbers are kept; a reader refuses them
-        where they mean nothing.
+        Lists, dicts, strings, numbers, booleans and None. NaN and infinite numbers are accepted here; readers refuse
+        them in fields that need finite numbers.
 
     Raises
     ------
     InputError
-        If the file is empty, too large, malformed, nests too deeply, or repeats a key within one object.
+        If the file is empty, too large, malformed or nested too deeply, or an object repeats a key.
     """
     if len(data) > MAX_JSON_BYTES:
         raise _too_large(source)
@@ -85,18 +85,20 @@ def parse(data: bytes, source: str | Path) -> Any:
 
 
 def write(path: str | Path, head: dict[str, Any], name: str = "", items: Iterable[Any] = ()) -> None:
-    """Write ``{**head, name: [items]}`` as JSON with one entry and one item a line, whole or not at all.
+    """Write ``{**head, name: [items]}`` as JSON with one entry and one item per line.
+
+    If writing fails, no incomplete file remains.
 
     Parameters
     ----------
     path : path
-        ``.json``, or ``.json.gz`` for a packed file.
+        Path that ends in ``.json``, or in ``.json.gz`` for a compressed file.
     head : dict
-        Entries of the document, without NaN: see `nullable`.
+        Entries of the document, without NaN; see `nullable`.
     name : str
-        Key of the long list; empty if the document has none.
+        Key of the list of items; empty for a document without this list.
     items : iterable
-        Members of the list.
+        Items of the list.
 
     Raises
     ------
@@ -126,7 +128,7 @@ def _pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[s
 
 
 def nullable(values: NDArray[Any] | float) -> Any:
-    """Turn an array into nested lists, or a number into a float, with None for NaN."""
+    """Convert an array to nested lists, or a number to a float, with None for NaN."""
     array = np.asarray(values)
     if array.dtype.kind != "f" or not np.isnan(array).any():
         return array.tolist()

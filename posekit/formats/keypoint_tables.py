@@ -1,4 +1,4 @@
-"""Key points in tables: DeepLabCut's CSV, a row a picture (SLEAP, MediaPipe), and Caliscope's row a point."""
+"""Key points in tables: DeepLabCut's CSV, one row per picture (SLEAP, MediaPipe), one row per point (Caliscope)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from posekit.formats.tables import Table, by_row, columns_of_points, numbers
 from posekit.geometry import Array
 
 DEEPLABCUT_LEVELS: Final = ("scorer", "individuals", "bodyparts", "coords")
-#: Columns of Caliscope's ``xy_HOLISTIC.csv``: points 0 to 32 are MediaPipe's of the body, a port is a camera.
+#: Columns of Caliscope's ``xy_HOLISTIC.csv``: points 0 to 32 are MediaPipe's body landmarks, a port is a camera.
 CALISCOPE: Final = {
     **{"sync_index": "frame", "port": "port", "frame_time": "time"},
     **{"point_id": "id", "img_loc_x": "x", "img_loc_y": "y"},
@@ -26,19 +26,19 @@ CALISCOPE: Final = {
 PICTURE: Final = "frame frameidx frameid frameindex framenumber image imageid filename".split()
 TIME: Final = ("time", "timestamp", "seconds", "times")
 PERSON: Final = ("person", "personid", "track", "trackid", "individual")
-#: Parts of a point, in their order in arrays.
+#: Coordinates and confidence of a point, in their order in arrays.
 COORDS: Final = ("x", "y", "sure")
 #: Minimum number of points in a table with one row per picture.
 LEAST_POINTS: Final = 4
 
 
 def looks_like(table: Table) -> bool:
-    """Return whether a table holds key points in pictures."""
+    """Return whether a table contains key points in pictures."""
     return _reader(table) is not None
 
 
 def _reader(table: Table) -> Callable[[Table, Rows], None] | None:
-    """Return the function that reads a table; None for points in space, which have a z and no confidence."""
+    """Return the function that reads a table; None for 3D points, which have a z coordinate and no confidence."""
     if table.head and table.head[0][:1] == ["scorer"]:
         return _deeplabcut
     if set(CALISCOPE) <= set(table.names):
@@ -46,12 +46,12 @@ def _reader(table: Table) -> Callable[[Table, Rows], None] | None:
     points = _in_pictures(table.names)
     deep = any("z" in parts for parts in columns_of_points(table.names).values())
     sure = any("sure" in parts for parts in points.values())
-    in_space = any(name.endswith("_ncams") for name in table.names)  # Anipose's points have a score, too
+    in_space = any(name.endswith("_ncams") for name in table.names)  # Anipose's 3D points have a score, too
     return _row_a_picture if len(points) >= LEAST_POINTS and (sure or not deep) and not in_space else None
 
 
 def _in_pictures(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the columns of each point by part, of names such as ``nose_x``, ``nose.score``."""
+    """Return the columns of each point by coordinate or confidence, from names such as ``nose_x``, ``nose.score``."""
     found = columns_of_points(names).items()
     return {
         name: parts for name, parts in found if {"x", "y"} <= set(parts) and "world" not in name.casefold()
@@ -64,7 +64,7 @@ def read(table: Table, path: str | Path, options: Options) -> Detections:
     Raises
     ------
     InputError
-        If a cell is not a number, or the names of the points fit no layout.
+        If a cell is not a number, or no layout fits the names of the points.
     """
     rows = Rows(source=str(path))
     (_reader(table) or _row_a_picture)(table, rows)
@@ -88,7 +88,7 @@ def _deeplabcut(table: Table, rows: Rows) -> None:
     for k in range(lead, len(coords)):
         part = columns.setdefault(individuals[k], {}).setdefault(levels["bodyparts"][k], {})
         part.setdefault("sure" if coords[k] == "likelihood" else coords[k], k - lead)
-    # Points outside all individuals have other names, and belong to no person.
+    # Points outside all individuals have other names; they belong to no person.
     most = max(columns.values(), key=len)
     rows.names = tuple(most)
     labels = [rows.picture("/".join(row[:lead])) for row in body]
@@ -110,7 +110,7 @@ def _stacked(parts: Mapping[str, Mapping[str, Any]], column: Callable[[Any], Arr
 
 
 def _caliscope(table: Table, rows: Rows) -> None:
-    """Read the pixels of one person in each camera's picture; times are seconds of a clock."""
+    """Read the pixels of one person in each camera's pictures; times are clock times in seconds."""
     rows.kind, rows.by_camera = "mediapipe", True
     rows.names = load_layout("mediapipe_33").points
     data = {ours: table.checked(name) for name, ours in CALISCOPE.items()}
@@ -145,6 +145,6 @@ def _row_a_picture(table: Table, rows: Rows) -> None:
 
 
 def _column(table: Table, wanted: Sequence[str]) -> Any:
-    """Return the first column whose name is one of the wanted names; None if no column has one."""
+    """Return the first column whose name is one of the wanted names; None without such a column."""
     words = {plain(name): name for name in reversed(table.names)}
     return next((words[one] for one in wanted if one in words), None)

@@ -1,4 +1,4 @@
-"""Key points that detectors wrote: COCO, MMPose, OpenPose, Halpe, MediaPipe as JSON.
+"""Key points in JSON files of detectors: COCO, MMPose, OpenPose, Halpe, MediaPipe.
 
 Sources: cocodataset.org, "Data format" and "Results format"; jin-s13/COCO-WholeBody; MMPose 1.x,
 ``demo/topdown_demo_with_mmdet.py --save-predictions`` and ``MMPoseInferencer``; OpenPose, ``doc/02_output.md``;
@@ -23,7 +23,7 @@ from posekit.formats.options import Options
 from posekit.formats.tables import TIMES
 from posekit.geometry import Array
 
-#: Fields of a person's points in OpenPose's files; the second in files older than 2018.
+#: Fields of a person's points in OpenPose's files; files from before 2018 have the second name.
 OPENPOSE_POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
 #: Fields of a person's landmarks in MediaPipe's frames.
 LANDMARKS: Final = ("pose_landmarks", "poseLandmarks", "landmarks")
@@ -33,7 +33,7 @@ LARGEST_SIDE: Final = 10**6
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a JSON document, or a folder of JSON files, holds key points in pictures."""
+    """Return whether a JSON document, or a folder of JSON files, contains key points in pictures."""
     if isinstance(document, Path):
         return any(True for _ in document.glob("*.json"))
     return bool(_kind(document))
@@ -45,16 +45,16 @@ def read(document: Any, path: str | Path, options: Options) -> Detections:
     Parameters
     ----------
     document : object
-        Parsed JSON, or the path of a folder with one JSON file a picture.
+        Parsed JSON, or the path of a folder with one JSON file per picture.
     path : path
-        The file or the folder.
+        Path of the file or the folder.
     options : Options
-        `layout` of the points if the file does not name them, `rate` if it has no times.
+        Options with the `layout` of points without names, and the `rate` of a file without times.
 
     Raises
     ------
     InputError
-        If the file is malformed, or it is not clear which points its points are.
+        If the file is malformed, or the layout of its points is unknown.
     """
     rows = Rows(source=str(path))
     if isinstance(document, Path):
@@ -70,12 +70,12 @@ def read(document: Any, path: str | Path, options: Options) -> Detections:
 
 
 def _counted(name: str) -> list[tuple[int, str]]:
-    """Order names by the numbers in them."""
+    """Return a key that sorts names by the numbers in them."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 def _kind(document: Any) -> str:
-    """Return the name of a document's format; empty if it holds no key points."""
+    """Return the name of a document's format; empty for a document without key points."""
     if isinstance(document, dict):
         if isinstance(document.get("annotations"), list):
             holders = (*_dicts(document["annotations"]), *_dicts(document.get("categories")))
@@ -107,7 +107,7 @@ def _has(entry: Any, names: Sequence[str]) -> bool:
 
 
 def _add(root: Node, rows: Rows, label: str) -> None:
-    """Add the pictures and the people of one document; a picture without a name of its own is called `label`."""
+    """Add the pictures and people of one document to rows; a picture without a name gets the name `label`."""
     kind = _kind(root.value)
     if not kind:
         expected = "key points of COCO, MMPose, OpenPose or MediaPipe"
@@ -158,7 +158,7 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
 
 
 def _results(root: Node, rows: Rows, label: str) -> None:
-    """Read a flat list of people: COCO results, and AlphaPose's with the picture's name for its id."""
+    """Read a flat list of people: COCO results, or AlphaPose's, in which the picture's id is its name."""
     rows.film = None
     for one in root.list():
         identity = one.at("image_id").value
@@ -173,7 +173,7 @@ def _results(root: Node, rows: Rows, label: str) -> None:
 
 
 def _mmpose(root: Node, rows: Rows, label: str) -> None:
-    """Read the demos' ``{meta_info, instance_info}``, and the Inferencer's list of people or of pictures."""
+    """Read MMPose's ``{meta_info, instance_info}`` of demos, or the Inferencer's list of people or of pictures."""
     listed = root
     if isinstance(root.value, dict):
         listed = root.at("instance_info")
@@ -199,7 +199,7 @@ def _instance(one: Node, rows: Rows, label: str) -> None:
         got = f"{points.shape[1]} coordinates a point"
         raise one.at("keypoints").refused("two, pixels", "save the predictions of a 2D model", got)
     sure = one.at("keypoint_scores").array(len(points), unknown=True)
-    # MMPose writes -1 of the crop for a point without a positive score (mmpose/codecs/utils/post_processing.py).
+    # For a point without a positive score MMPose writes -1 in the crop (mmpose/codecs/utils/post_processing.py).
     values = np.column_stack([points, np.where(sure <= 0, 0.0, sure)])
     rows.add(label, values, one.value.get("track_id"))
 
@@ -217,7 +217,7 @@ def _openpose(root: Node, rows: Rows, label: str) -> None:
 
 
 def _by_three(node: Node) -> Array:
-    """Return a list of x, y and flag or confidence of each point as rows (K, 3)."""
+    """Return a flat list of x, y and flag or confidence of each point as rows (K, 3)."""
     flat = node.array(None, unknown=True)
     if not len(flat) or len(flat) % 3:
         raise node.refused("a list [x, y, v, x, y, v, …]", got=f"{len(flat)} numbers")
@@ -225,7 +225,7 @@ def _by_three(node: Node) -> Array:
 
 
 def _mediapipe(root: Node, rows: Rows, label: str) -> None:
-    """Read frames ``{frame, pose_landmarks: [{x, y, z, visibility} * 33]}``, or of several people each."""
+    """Read frames ``{frame, pose_landmarks: [{x, y, z, visibility} * 33]}`` of one person or several people."""
     document = root.value
     listed = root if isinstance(document, list) else root.at("frames", None)
     frames = list(listed.list()) if listed.value is not None else [root]
@@ -255,13 +255,13 @@ def _landmark(one: Node) -> tuple[float, float, float]:
 
 
 def _time(frame: Node) -> float:
-    """Return a frame's time in seconds; NaN if it has none."""
+    """Return a frame's time in seconds; NaN if it states no time."""
     name = next((name for name in TIMES if type(frame.value.get(name)) in (int, float)), None)
     return frame.at(name).number(most=1e18) * (TIMES[name] or 1.0) if name else np.nan
 
 
 def _size(holder: Any, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:
-    """Return the width and height in an object, or the known size if it has none."""
+    """Return the width and height that an object states, or else the known size."""
     sides = (holder.get("width"), holder.get("height")) if isinstance(holder, dict) else (None, None)
     if all(isinstance(side, int | float) and 0 < side < LARGEST_SIDE for side in sides):
         return float(sides[0]), float(sides[1])  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Layouts: which names or places of a file are which joints, from TOML in ``urdf/layouts`` or of the user's own."""
+"""Layouts: the mapping from a file's point names or indices to joints, from TOML in ``urdf/layouts`` or of the user."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ from posekit.geometry.landmarks import PELVIS_SHARE, hips_from_markers, middles,
 from posekit.skeleton import FEET_POINTS, NAMES, POINTS, SIDES, other_side
 
 FOLDER: Final = DATA / "layouts"
-#: Landmarks that are not joints: the middle of the shoulders is not the neck, the middle of the hips not the pelvis.
+#: Landmarks that are not joints: the midpoint of the shoulders is not the neck, that of the hips is not the pelvis.
 MIDDLES: Final = ("mid_shoulders", "mid_hips")
 LANDMARKS: Final = (*POINTS, *MIDDLES)
-#: Landmarks that every layout of a body places.
+#: Landmarks that every layout of a body defines.
 PARTS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 LIMBS: Final = tuple(f"{side}_{part}" for part in PARTS for side in SIDES)
 
-#: A file's points for each of posekit's names.
+#: Names of a file's points by posekit's name; the mean of several points is used.
 Placed = dict[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Layout:
-    """Meaning of a file's names, columns or places.
+    """Mapping from a file's points, names or columns to posekit's landmarks.
 
     Attributes
     ----------
     name : str
-        As ``coco_17``; the path of a user's file.
+        Name, such as ``coco_17``, or the path of a user's file.
     kind : str
-        ``points``, ``names`` (naming habits of animation programs) or ``robot``.
+        ``points``, ``names`` (naming conventions of animation programs) or ``robot``.
     points : tuple of str
-        The format's points in its order; empty if its files name their points.
+        Names of the format's points in order; empty if files state the names.
     landmarks : dict
-        Landmark (`LANDMARKS`) to the file's names whose mean it is.
+        By landmark (`LANDMARKS`), the names of the file's points whose mean is the landmark.
     feet : dict
-        Toes and heels (`posekit.skeleton.FEET_POINTS`) to the file's names.
+        By toe or heel (`posekit.skeleton.FEET_POINTS`), the names of the file's points.
     fields : dict
         All other fields of the TOML: ``source``, ``up``, ``unit``, ``counts``, ``parts``, ``robot``, ``needs``,
-        ``joints`` and the places of a robot's root.
+        ``joints``, and the arrays or columns of a robot's root.
     """
 
     name: str
@@ -63,19 +63,20 @@ class Layout:
         return {**self.landmarks, **self.feet}
 
     def gather(self, points: Array, names: Sequence[str] = ()) -> dict[str, Array]:
-        """Pick landmarks out of a file's points.
+        """Compute landmarks from a file's points.
 
         Parameters
         ----------
         points : array (..., P, D)
-            The file's points, NaN where one is missing.
+            Positions of the file's points; NaN for missing points.
         names : sequence of str (P,), optional
-            Their names; the layout's own if not given.
+            Names of the points; by default those of the layout.
 
         Returns
         -------
         dict of array (..., D)
-            Positions by landmark or foot point; NaN if a point of a mean is missing. Absent landmarks are left out.
+            Positions by landmark or foot point. A landmark is NaN if one of its points is missing, and omitted if the
+            file has none of its points.
         """
         column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
         found = {
@@ -90,10 +91,10 @@ class Layout:
         return found
 
     def seen(self, names: Sequence[str], values: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-        """Name points in pictures (N, P, D) as posekit does, with neck and pelvis between shoulders and hips.
+        """Convert points in pictures (N, P, D) to posekit's names; neck and pelvis lie between shoulders and hips.
 
-        A detector's neck is the middle of the shoulders; the figure's pelvis lies toward the middle of the hips.
-        Both are placed in the image: bent spines and perspective move them by a centimetre or two.
+        A detector's neck is the midpoint of the shoulders. The figure's pelvis is between the neck and the midpoint of
+        the hips, near the hips. Both are computed in the image; bent spines and perspective cause errors of 1 to 2 cm.
         """
         found = self.gather(values, names)
         found = {**middles(found), **found}
@@ -103,27 +104,29 @@ class Layout:
             found["neck"] = shoulders
             derived.append("neck")
         if "pelvis" not in found and shoulders is not None and hips is not None:
-            share = PELVIS_SHARE if values.shape[-1] > 1 else 0.5  # a confidence is the mean of both
+            share = PELVIS_SHARE if values.shape[-1] > 1 else 0.5  # the confidence is the mean of both
             found["pelvis"] = shoulders + share * (hips - shoulders)
             derived.append("pelvis")
         return *_in_order(found, values), tuple(derived)
 
     def place(self, names: Sequence[str], points: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-        """Name a file's points in space as posekit does, with neck and pelvis placed if the file has none.
+        """Convert a file's 3D points to posekit's names; neck and pelvis are computed if the file lacks them.
 
         Parameters
         ----------
         names : sequence of str (P,)
-            The file's names, or () for the layout's own.
+            Names in the file, or () for those of the layout.
         points : array (T, P, 3)
+            Positions.
 
         Returns
         -------
         names : tuple of str (K,)
-            Of `posekit.skeleton.NAMES`, in that order.
+            Names from `posekit.skeleton.NAMES`, in that order.
         points : array (T, K, 3)
+            Positions, in the unit of the given points.
         derived : tuple of str
-            Joints that were placed between others, as the file has no point for them.
+            Joints that were computed from other joints, because the file has no point for them.
         """
         found = self.gather(points, names)
         for name, middle in middles(found).items():
@@ -140,13 +143,13 @@ class Layout:
 
 
 def _in_order(found: Mapping[str, Array], points: Array) -> tuple[tuple[str, ...], Array]:
-    """Stack landmarks in the order of `posekit.skeleton.NAMES`, as the file's points are."""
+    """Stack landmarks in the order of `posekit.skeleton.NAMES`."""
     placed = tuple(name for name in NAMES if name in found)
     return placed, np.stack([found[name] for name in placed], axis=-2) if placed else points[..., :0, :]
 
 
 def plain(name: str) -> str:
-    """Return the lower-case letters and digits of a name, without a prefix that ends in a colon, for comparison."""
+    """Return a name's letters in lower case and its digits, without a prefix that ends in a colon, for comparison."""
     return re.sub(r"[\W_]+", "", name.rpartition(":")[2].casefold())
 
 
@@ -165,7 +168,7 @@ def load_layout(name: str | Path) -> Layout:
     Raises
     ------
     InputError
-        If there is no such layout, or a landmark or a point in it is not known.
+        If there is no such layout, or it refers to an unknown landmark or point.
 
     Examples
     --------
@@ -227,7 +230,7 @@ def _parts(table: Any, title: str, order: Sequence[str], points: Sequence[str], 
 
 
 def by_order(count: int) -> list[Layout]:
-    """List the layouts whose files have `count` points and do not name them."""
+    """List the layouts of files with `count` points without names."""
     every = map(_built_in, layout_names())
     return [one for one in every if one.points and count in one.fields.get("counts", [len(one.points)])]
 
@@ -235,15 +238,16 @@ def by_order(count: int) -> list[Layout]:
 def by_names(names: Sequence[str], source: str) -> Layout:
     """Find the layout of a file that names its points.
 
-    A layout fits if it places both ends of every limb. The best is made of just these points; then the one with most
-    names to the letter (``RHip`` is not ``r_hip``, whose neck may be another), then the one that places most landmarks,
-    then one of files that name their points, then the one that uses most names. If none fits, the naming habits of
-    animation programs are tried, then a layout that places shoulders, hips and half of the other limb joints.
+    A layout fits if it defines all joints of every limb. Layouts that fit are ranked: first those with exactly these
+    points, then by the number of identical names (``RHip`` differs from ``r_hip``, with possibly another neck), then by
+    the number of landmarks, then those of files that name their points, then by the number of used names. If no layout
+    fits, the naming conventions of animation programs are tried, then layouts that define shoulders, hips and half of
+    the other limb joints.
 
     Raises
     ------
     InputError
-        If none fits: the nearest one is named, and what it lacks.
+        If no layout fits; the message names the nearest layout and its missing joints.
     """
     there, verbatim = {plain(name): name for name in names}, set(names)
     every = [one for one in map(_built_in, layout_names()) if one.kind == "points"]
@@ -281,7 +285,7 @@ def by_names(names: Sequence[str], source: str) -> Layout:
 
 
 def _by_habit(names: Sequence[str]) -> Layout | None:
-    """Read names that animation programs build: a common prefix, a side, a part of the body."""
+    """Return a layout of names of animation programs, which consist of a common prefix, a side and a body part."""
     habits = _built_in("animation").fields
     prefix = _common_prefix(names)
     found: dict[tuple[str, str], str] = {}
@@ -315,7 +319,7 @@ def _common_prefix(names: Sequence[str]) -> str:
 
 
 def _words(name: str, left: Sequence[str], right: Sequence[str]) -> tuple[str, str] | None:
-    """Part a name into side and part: ``lThigh``, ``thigh_l``, ``Thigh.L``, ``LeftThigh`` are ("left", "thigh")."""
+    """Split a name into side and body part: ``lThigh``, ``thigh_l``, ``LeftThigh`` become ("left", "thigh")."""
     pieces = [piece for piece in re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])|(?<=^[LR])(?=[A-Z])", name) if piece]
     words = [piece.casefold() for piece in pieces]
     for side, signs in (("left", left), ("right", right)):

@@ -1,4 +1,4 @@
-"""`Node`: a checked walk through a parsed document, whose errors name the file, the field and the value."""
+"""`Node`: checked access to a parsed document, with error messages that name the file, the field and the value."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 from posekit.errors import InputError, cut, nearest, one_line, refusal, shown
 from posekit.geometry import FARTHEST_COORDINATE, Array
 
-#: Default of a field that is required.
+#: Default value that marks a required field.
 MISSING: Final = object()
 
 
 class Node:
-    """One value of a parsed JSON, TOML or NPZ document, and its place in the file.
+    """One value of a parsed JSON, TOML or NPZ document, and its path in the document.
 
     Parameters
     ----------
     value : object
         The value.
     source : path
-        The file.
+        Path of the file.
     place : str
-        Place of the value, as ``frames[3].image``; empty for the whole document.
+        Path of the value in the document, such as ``frames[3].image``; empty for the whole document.
     """
 
     __slots__ = ("place", "source", "value")
@@ -38,11 +38,11 @@ class Node:
         self.value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
     def refused(self, expected: str, remedy: str = "correct it", got: str = "") -> InputError:
-        """Build the error about this value."""
+        """Return the error about this value."""
         return refusal(self.source, self.place, got or self._shown(), expected, remedy)
 
     def wrong(self, key: str, value: Any, expected: str, remedy: str, got: str = "") -> InputError:
-        """Build the error about a member's value."""
+        """Return the error about a member's value."""
         place = f"{self.place}.{cut(key)}".lstrip(".")
         return Node(value, self.source, place).refused(expected, remedy, got)
 
@@ -54,7 +54,7 @@ class Node:
         return shown(self.value.tolist() if isinstance(self.value, np.ndarray | np.generic) else self.value)
 
     def at(self, key: str | int, default: Any = MISSING) -> Node:
-        """Return a member of an object or list; the default replaces a missing or null one, which is else refused."""
+        """Return a member of an object or list; a missing or null member is the default or, without one, refused."""
         place = f"{self.place}[{key}]" if isinstance(key, int) else f"{self.place}.{cut(key)}".lstrip(".")
         value = self.value[key] if isinstance(key, int) else self.object().get(key)
         if value is None and default is MISSING:
@@ -66,7 +66,7 @@ class Node:
         return self.object().get(key) is not None
 
     def object(self, names: Iterable[str] = (), remedy: str = "") -> Mapping[str, Any]:
-        """Return the object; refuse another value, and keys that are not among `names` if these are given."""
+        """Return the value as a mapping; refuse other values and, if `names` are given, keys outside `names`."""
         if not isinstance(self.value, Mapping):
             raise self.refused("an object", remedy or "correct it")
         valid = list(names)
@@ -78,13 +78,13 @@ class Node:
         return self.value
 
     def list(self, least: int = 0) -> Iterator[Node]:
-        """Iterate over the members of a list; refuse a list with fewer than `least`."""
+        """Iterate over the members of a list; refuse a list with fewer than `least` members."""
         if not isinstance(self.value, list | tuple) or len(self.value) < least:
             raise self.refused(f"a list of {least} or more" if least else "a list")
         return (Node(value, self.source, f"{self.place}[{k}]") for k, value in enumerate(self.value))
 
     def text(self, choices: Iterable[str] = ()) -> str:
-        """Return the string, one of the choices if these are given."""
+        """Return the value as a string; refuse strings that are not among the choices, if choices are given."""
         value, valid = self.value, list(choices)
         if not isinstance(value, str) or (valid and value not in valid):
             near = nearest(value, valid) if isinstance(value, str) and valid else "correct it"
@@ -92,14 +92,14 @@ class Node:
         return value
 
     def texts(self) -> tuple[str, ...]:
-        """Return a list or an array of strings."""
+        """Return the value, a list or an array of strings, as a tuple."""
         values = self.value.tolist() if isinstance(self.value, np.ndarray) else self.value
         if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
             raise self.refused("a list of texts")
         return tuple(values)
 
     def number(self, least: float = -FARTHEST_COORDINATE, most: float = FARTHEST_COORDINATE) -> float:
-        """Return the finite number within bounds."""
+        """Return the value as a finite number; refuse numbers outside the bounds."""
         value = self.value.item() if getattr(self.value, "size", 0) == 1 else self.value
         ok = isinstance(value, int | float) and not isinstance(value, bool)
         if not ok or not least <= value <= most:
@@ -108,19 +108,19 @@ class Node:
         return float(value)
 
     def positive(self) -> float:
-        """Return the finite number above 0."""
+        """Return the value as a finite number; refuse numbers that are not positive."""
         value = self.number()
         if value <= 0:
             raise self.refused("a number greater than 0")
         return value
 
     def array(self, *shape: int | None, unknown: bool = False, most: float = FARTHEST_COORDINATE) -> Array:
-        """Return numbers of a shape, None for any extent, as floats.
+        """Return the value as an array of floats.
 
         Parameters
         ----------
         *shape : int or None
-            Extents; none for any shape.
+            Required shape; None accepts any length of an axis. Without arguments any shape is accepted.
         unknown : bool
             Whether null and NaN are accepted and become NaN.
         most : float
@@ -145,7 +145,7 @@ class Node:
 
 
 def as_numbers(value: Any) -> Array | None:
-    """Convert nested lists of numbers and nulls, or an array of numbers or booleans, to floats; None for others."""
+    """Convert nested lists of numbers and nulls, or an array of numbers or booleans, to floats; None if impossible."""
     try:
         array: NDArray[Any] = np.asarray(value)
         if array.dtype.kind == "O" and {type(one) for one in array.flat} <= {int, float, type(None)}:
@@ -164,13 +164,13 @@ def points_by_name(nodes: Sequence[Node], names: Sequence[str], axes: int, kind:
     Parameters
     ----------
     nodes : sequence of F Node
-        An object each; a node of None or an empty object has no points.
+        One object for each frame; None or an empty object has no points.
     names : sequence of str
-        Names that a point can have.
+        Allowed names of points.
     axes : int
-        Coordinates of a point; 0 for a single number.
+        Number of coordinates of a point; 0 for a single number without a list.
     kind : str
-        Kind of thing that the names name, for errors: ``joint``.
+        Noun for a named point in error messages, such as ``joint``.
     """
     place, most = {name: column for column, name in enumerate(names)}, FARTHEST_COORDINATE
     found = np.full((len(nodes), len(names), *([axes] if axes else [])), np.nan)
@@ -190,14 +190,14 @@ def points_by_name(nodes: Sequence[Node], names: Sequence[str], axes: int, kind:
 
 
 def known_points(points: Array, names: Sequence[str]) -> dict[str, Any]:
-    """Return the known points (P, axes), or numbers (P,), of one frame by name."""
+    """Return the known points of one frame by name, from points (P, axes) or numbers (P,)."""
     known = np.isfinite(points if points.ndim == 1 else points[:, 0])
     return {names[k]: points[k].tolist() for k in np.flatnonzero(known).tolist()}
 
 
 @contextmanager
 def undamaged(source: str | Path, schema: str) -> Iterator[None]:
-    """Turn errors of Python while a file is read into the refusal of a damaged file."""
+    """Convert Python's errors during reading to an `InputError` about a damaged file."""
     try:
         yield
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
@@ -206,7 +206,7 @@ def undamaged(source: str | Path, schema: str) -> Iterator[None]:
 
 
 def schema_of(document: Any) -> str:
-    """Return the schema that a JSON or NPZ document states, or a table in its metadata; empty if it states none."""
+    """Return the schema that a JSON or NPZ document, or a table's metadata, states; empty without a schema."""
     about = getattr(document, "about", {}).get("posekit", "")
     if about:
         return next(iter(re.findall(r'^\{"schema": "([^"]*)"', about[:200])), "")

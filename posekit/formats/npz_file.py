@@ -1,4 +1,4 @@
-"""Arrays by name: NPZ, NPY, pickles, joblib and PyTorch files, read without running code from them."""
+"""Reader of named arrays in NPZ, NPY, pickle, joblib and PyTorch files; it never runs code from a file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from posekit.files import MAX_BYTES
 Named = dict[tuple[str, str], Any]
 
 MAX_MEMBERS: Final = 10_000
-#: Errors of NumPy, zipfile and pickle about a file that is damaged.
+#: Errors of NumPy, zipfile and pickle for damaged files.
 _DAMAGED: Final = (
     *(ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RuntimeError, OSError, EOFError),
     *(MemoryError, AssertionError, SyntaxError, SystemError, struct.error, zlib.error, tokenize.TokenError),
@@ -38,16 +38,17 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        Arrays by name; an unnamed array is under ``""``. A pickle of one clip by its name gives the clip.
+        Arrays by name; an array without a name has the key ``""``. If a pickle is a dict with one clip, the result is
+        that clip.
 
     Raises
     ------
     InputError
-        If the file is damaged, too large, or holds objects other than arrays, numbers, strings and plain containers.
+        If the file is damaged or too large, or contains objects except arrays, numbers, strings and plain containers.
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # NumPy warns of headers of its earlier versions
+            warnings.simplefilter("ignore")  # NumPy warns of headers written by earlier versions
             if data[:2] == b"PK":
                 return _zip(data, source)
             if data[:6] == b"\x93NUMPY":
@@ -117,7 +118,7 @@ def _named(found: Any) -> dict[str, Any]:
 
 
 def _plain_array(value: Any) -> Any:
-    """Turn an array of objects into a list, a scalar, or an array of text."""
+    """Convert an array of objects to a list, a scalar, or an array of text."""
     if isinstance(value, np.ndarray) and value.nbytes > MAX_BYTES:
         raise ValueError("an array larger than can be read")
     if isinstance(value, np.ndarray) and value.dtype.hasobject:
@@ -128,9 +129,9 @@ def _plain_array(value: Any) -> Any:
 
 
 class _Pending:
-    """An array, a data type, or joblib's header of an array: its state follows in the pickle.
+    """An array, a data type, or joblib's header of an array, before its state is read from the pickle.
 
-    NumPy's own `__setstate__` is not called: it trusts the state, and a damaged one crashes the process.
+    NumPy's `__setstate__` is not called, because it does not check the state: a damaged state crashes the process.
     """
 
     kind = "joblib"
@@ -142,7 +143,7 @@ class _Pending:
         self.kind, self.spec = kind, spec
 
     def build(self, state: Any, file: io.BytesIO) -> Any:
-        """Return the array of a pickle's state; a data type returns itself, as its state is only the byte order."""
+        """Return the array that a pickle's state describes; a data type returns itself, with the state's byte order."""
         if self.kind == "dtype":
             if state[2] is not None or state[3] is not None or state[1] not in ("<", ">", "=", "|"):
                 raise pickle.UnpicklingError("a compound data type")
@@ -188,7 +189,7 @@ def _encoded(text: str, encoding: str = "latin1") -> bytes:
 
 
 def _plain_names() -> dict[tuple[str, str], Any]:
-    """Return the names that a pickle may use: makers of arrays, numbers and plain containers."""
+    """Return the names that a pickle may use: constructors of arrays, numbers and plain containers."""
     found: dict[tuple[str, str], Any] = {
         ("numpy", "ndarray"): None,
         ("numpy", "dtype"): lambda spec, *_: _Pending("dtype", spec),
@@ -211,9 +212,9 @@ PLAIN_NAMES: Final = _plain_names()
 
 
 class _Plain(pickle._Unpickler):
-    """Unpickle arrays, numbers, strings and plain containers, and nothing that runs a program.
+    """Unpickle arrays, numbers, strings and plain containers; refuse all objects that could run code.
 
-    It is the unpickler in Python, because the arrays of joblib stand in its stream.
+    The base class is Python's slow unpickler, because joblib stores arrays inside the stream of the pickle.
     """
 
     stack: list[Any]
@@ -242,7 +243,7 @@ class _Plain(pickle._Unpickler):
 
 
 def unpickled(data: bytes, source: str) -> Any:
-    """Return the content of a pickle, nested in the same way, with lists in place of tuples; its code is not run."""
+    """Return the content of a pickle with the same nesting, and lists in place of tuples; its code is not run."""
     return _unpickled(io.BytesIO(_unpacked(data)), source)
 
 
@@ -254,7 +255,7 @@ def _unpickled(file: io.BytesIO, source: str, extra: Named | None = None, load: 
 
 
 def _resolved(found: Any) -> Any:
-    """Replace arrays that a pickle refers to twice, and refuse functions and classes."""
+    """Replace unfinished arrays, to which a pickle refers twice, and refuse functions and classes."""
     if isinstance(found, _Pending):
         return _resolved(found.value)
     if isinstance(found, dict):
@@ -267,7 +268,7 @@ def _resolved(found: Any) -> Any:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """Unpack the zlib compression of joblib, and refuse data that do not begin as a pickle."""
+    """Decompress zlib data of joblib, and refuse data that do not start like a pickle."""
     if data[:1] == b"x":
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(data, MAX_BYTES)

@@ -1,4 +1,4 @@
-"""`open`: read any file once, recognise its container, then the first reader that fits its content."""
+"""`open`: read a file, recognise its container, and call the first reader that fits its content."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CONTAINERS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "yaml": ("file_storage:parse_yaml", (".yaml", ".yml")),
     "xml": ("file_storage:parse_xml", (".xml",)),
 }
-#: Containers by the first bytes of a file whose ending is not known.
+#: Containers by first bytes, for files with an unknown suffix.
 STARTS: Final = {
     **{b"HIERARCHY": "bvh", b"PathFileType": "table", b"{": "json", b"[": "json", b"PAR1": "parquet"},
     **{b"PK\x03\x04": "arrays", b"\x93NUMPY": "arrays"},
@@ -48,20 +48,20 @@ READERS: Final[dict[str, tuple[str, ...]]] = {
     "xml": ("cameras_file",),
     "folder": ("keypoints",),  # a folder's document is its Path; `parsed` reads one of its files
 }
-#: Containers with a single reader, which reads every file.
+#: Containers with a single reader, which reads all their files.
 ONE_CONTENT: Final = ("bvh", "c3d")
-#: Endings of pictures and films: detectors read them, posekit does not.
+#: Suffixes of pictures and films, which posekit does not read: run a detector on them first.
 PICTURES: Final = ".png .jpg .jpeg .tif .tiff .webp .bmp .gif .heic .mp4 .mov .avi".split()
-#: Endings of files that posekit writes for other programs and does not read.
+#: Suffixes of files that posekit writes but does not read.
 WRITTEN_ONLY: Final = (".glb", ".gltf")
 
 
 def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
-    """Read a file once and return its container's name and its plain document.
+    """Read a file and return the name of its container and its document.
 
-    Documents: JSON, TOML: dict or list. Arrays (NPZ, NPY, pickles): dict of arrays, numbers, strings and plain
-    containers, an unnamed array under "". Table: `posekit.formats.tables.Table`; of Parquet with metadata in `about`.
-    A folder's document is its `Path`.
+    The document of JSON and TOML is a dict or a list. The document of arrays (NPZ, NPY, pickles) is a dict of arrays,
+    numbers, strings and plain containers; an array without a name has the key "". The document of a table is a
+    `posekit.formats.tables.Table`, for Parquet with metadata in `about`. The document of a folder is its `Path`.
     """
     path = Path(path)
     if path.is_dir():
@@ -87,7 +87,7 @@ def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
 
 
 def suffix_of(path: Path) -> str:
-    """Return the ending of a file's name in lower case, without ``.gz``."""
+    """Return the suffix of a file's name in lower case, without ``.gz``."""
     return (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
 
 
@@ -109,25 +109,25 @@ def open(  # the door's name, as in `gzip.open`
     urdf: str = "",
     person: int | None = None,
 ) -> Any:
-    """Open a file or folder, which is read once and recognised by its content; or understand an array.
+    """Read a file, a folder or an array, and return an object of the type that its content determines.
 
     Parameters
     ----------
     path : path or array
         A file of motion, key points, a view, cameras, a result, a report or a robot; or a detector's folder. Files may
-        be gzipped. An array (T, J, 3) has joints in space, one (T, P, 2) key points in pixels.
+        be compressed with gzip. An array (T, J, 3) has 3D joint positions, an array (T, P, 2) key points in pixels.
     layout : str
-        Name of a layout (`posekit.formats.layout.layout_names`), or path of a TOML file of your own.
+        Name of a layout (`posekit.formats.layout.layout_names`), or path of a TOML file with a layout.
     unit : str, optional
         Unit of the file's lengths: "m", "cm", "mm" or "in".
     up : str, optional
-        Axis that points up: "+y".
+        Axis that points up, such as "+y".
     rate : float, optional
-        Frames a second of a file without times.
+        Frames per second of a file without times.
     urdf : str
-        Name or path of the robot of a table of configurations.
+        Name or path of the robot whose configurations a table contains.
     person : int, optional
-        Person of a file of several, from 0.
+        Index of the person in a file of several people, from 0.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def open(  # the door's name, as in `gzip.open`
     Raises
     ------
     InputError
-        If the file cannot be read or recognised, or contradicts itself.
+        If the file cannot be read or recognised, or its content is contradictory.
 
     Examples
     --------

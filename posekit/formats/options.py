@@ -1,4 +1,4 @@
-"""Options of `posekit.open`: facts that a file does not state, given by its user, and remarks on what was read."""
+"""Options of `posekit.open`: facts about a file that its user states, and notes and warnings of the readers."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from posekit.settings import number
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Facts about a file that its user states; posekit finds the facts of empty fields in the file.
+    """Facts about a file that its user states; facts that are not stated are found in the file.
 
-    Words such as ``"meters"``, ``"Y"`` and ``"y-up"`` are understood, and the rate may be text such as ``"30 Hz"``.
+    Words such as ``"meters"``, ``"Y"`` and ``"y-up"`` are accepted. The rate may be a text such as ``"30 Hz"``.
 
     Attributes
     ----------
     layout : str
-        Name of a layout, or path of the user's own TOML file.
+        Name of a layout, or path of a TOML file with a layout.
     unit : str
         Unit of the file's lengths: "m", "cm", "mm" or "in".
     up : str
         Axis that points away from the ground: "+x", "-x", "+y", "-y", "+z" or "-z".
     rate : float or None
-        Frames a second of a file that has no times.
+        Frames per second of a file without times.
     urdf : str
-        Name or path of the robot of a table of configurations.
+        Name or path of the robot whose configurations a table contains.
     person : int or None
-        Person of a file of several people, from 0.
+        Index of the person in a file of several people, from 0.
     notes, warnings : list of str
-        Readers add the assumptions that they make, and the contradictions that a user must see.
+        Assumptions of the readers, and contradictions in the file.
 
     Raises
     ------
     InputError
-        If the unit, the axis or the rate is impossible.
+        If the unit, the axis or the rate is invalid.
     """
 
     layout: str = ""
@@ -71,7 +71,7 @@ class Options:
 
 
 def facts_of(**given: Any) -> dict[str, Any]:
-    """Return the facts that are not None, checked and spelled as in `Options`."""
+    """Return the given facts that are not None, checked and normalized as in `Options`."""
     stated = {name: fact for name, fact in given.items() if fact is not None}
     options = Options(**stated)
     return {name: getattr(options, name) for name in stated}

@@ -25,7 +25,7 @@ def _arrow() -> tuple[Any, Any]:
 
 
 def parse(data: bytes, source: str) -> Table:
-    """Read a Parquet file: columns of numbers, or of text; null is NaN or empty. The metadata is in `Table.about`.
+    """Read the columns of a Parquet file, numbers or text; null becomes NaN or empty. `Table.about` is the metadata.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def _column(pa: Any, values: Any) -> Any:
 
 
 def packed_table(columns: Mapping[str, Any], about: Mapping[str, str]) -> bytes:
-    """Write columns of one length as Parquet, with metadata that pandas and pyarrow leave alone."""
+    """Return columns of equal length as bytes of Parquet, with metadata that pandas and pyarrow do not change."""
     pa, pq = _arrow()
     arrays = {}
     for name, values in columns.items():

@@ -1,4 +1,4 @@
-"""``posekit.postures/1`` and ``posekit.configurations/1``: postures as named points, or as a robot's configurations."""
+"""Files of ``posekit.postures/1`` (postures as named points) and ``posekit.configurations/1`` (of a robot)."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ def looks_like(document: Any) -> bool:
 
 
 def read(document: Any, path: str | Path, options: Options) -> Motion:
-    """Read postures; a file without times and rate is no recording.
+    """Read postures. Without times and rate, the postures are not successive in time.
 
     Parameters
     ----------
     document : dict
-        JSON with ``postures`` (N x K x 3, null for an unknown point) by ``joint_names``, or with ``q`` (N x K) by
-        ``configuration_names``; NPZ with ``joints`` (N, K, 3) in metres and ``head`` (N, 5, 3), or with ``q``.
+        JSON with ``postures`` (N x K x 3, null for an unknown point) and ``joint_names``, or with ``q`` (N x K) and
+        ``configuration_names``; or NPZ with ``joints`` (N, K, 3) in metres and ``head`` (N, 5, 3), or with ``q``.
     path : path
-        The file.
+        Path of the file.
     options : Options
-        `rate` of a file without times, `up`, and the robot (`urdf`) of configurations.
+        Options with the `rate` of a file without times, the axis `up`, and the robot (`urdf`) of configurations.
 
     Raises
     ------
     InputError
-        If the document breaks its schema.
+        If the document does not follow its schema.
     """
     root = Node(document, path)
     schema = check_schema(root, POSTURES_SCHEMA, CONFIGURATIONS_SCHEMA)
@@ -104,11 +104,11 @@ def write(path: str | Path, motion: Motion, unit: str | None = None) -> None:
     Parameters
     ----------
     path : path
-        ``.json`` or ``.json.gz``.
+        Path that ends in ``.json`` or ``.json.gz``.
     motion : Motion
         The postures.
     unit : "m", "cm" or "mm", optional
-        Unit of length of the points; the motion's own by default.
+        Unit of length in the file; by default that of the motion's file.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """``posekit.report/2``: a `Report` as JSON, NPZ, CSV, Parquet and Markdown.
 
-JSON and NPZ have all of it, as columns by name; CSV and Parquet have the table of findings, a row a violation, which
-pandas reads in one line, and Parquet keeps the rest in its metadata.
+JSON and NPZ contain the whole report as named columns. CSV and Parquet contain the table of findings with one row per
+violation, for pandas. Parquet stores the rest of the report in its metadata.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from posekit.validators.report import Report
 
 REPORT_SCHEMA: Final = "posekit.report/2"
-#: Arrays with one entry a frame, and their types.
+#: Arrays with one entry per frame, and their types.
 ROWS: Final = {"clip": np.intp, "frame": np.intp, "time": np.float64, "incomplete": np.bool_}
-#: Arrays with one entry a frame and check.
+#: Arrays with one entry per frame and check, and their types.
 TABLES: Final = {"margins": np.float64, "silent": np.bool_}
-#: Columns of the findings that are whole numbers.
+#: Columns of the findings with integers, and their types.
 FINDINGS: Final = {"row": np.intp, "check": np.intp, "place": np.intp}
 NUMBERS: Final = ("value", "lower", "upper", "margin")
 TEXTS: Final = ("files", "names", "checks", "units", "places", "notes", "warnings", "refused")
@@ -39,7 +39,7 @@ MAPPINGS: Final = ("messages", "not_asked", "settings")
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a JSON document, NPZ arrays or a Parquet table hold a report."""
+    """Return whether a JSON document, NPZ arrays or a Parquet table contain a report."""
     return schema_of(document).startswith("posekit.report/")
 
 
@@ -132,7 +132,7 @@ def _about(report: Report) -> dict[str, Any]:
 
 
 def _arrays(report: Report) -> Mapping[str, Any]:
-    """Return the arrays by name, truth values as 0 and 1."""
+    """Return the arrays by name, with booleans as 0 and 1."""
     held = {name: np.asarray(getattr(report, name)) for name in (*ROWS, *TABLES)}
     held |= {f"findings.{name}": np.asarray(report.findings[name]) for name in (*FINDINGS, *NUMBERS)}
     return {name: one.astype(np.int8) if one.dtype == np.bool_ else one for name, one in held.items()}

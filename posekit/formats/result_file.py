@@ -1,8 +1,9 @@
 """``posekit.result/3``: a `Recovery` as JSON, NPZ and Parquet; ``posekit.result/2`` is read by `earlier_result`.
 
-JSON has an object a posture, lengths in the file's unit, null for unknown numbers; columns that hold nothing are left
-out. NPZ and Parquet have the columns of the survivors under their names, metres: NPZ also ``frames.*``, ``answer.*``
-and ``path.*`` arrays. Everything else is one JSON text, ``about``, which Parquet keeps in its metadata.
+JSON contains one object per posture, with lengths in the file's unit and null for unknown numbers; empty columns are
+omitted. NPZ and Parquet contain the survivors' columns under their names, in metres. NPZ also contains the arrays
+``frames.*``, ``answer.*`` and ``path.*``. All other fields are in one JSON text, ``about``, which Parquet stores in its
+metadata.
 """
 
 from __future__ import annotations
@@ -30,21 +31,21 @@ from posekit.skeleton import HEAD_POINTS, JOINTS
 
 RESULT_SCHEMA: Final = "posekit.result/3"
 EARLIER_SCHEMA: Final = "posekit.result/2"
-#: Tables of a recovery by the first word of their columns' names: ``frames.time``. Columns of survivors have none.
+#: Tables of a recovery by the prefix of their columns' names, as in ``frames.time``. Survivors' columns have no prefix.
 TABLES: Final = {"": Survivors, "frames": Frames, "answer": Answer, "path": Paths}
-#: Power of length of each column that has one: metres (1), or pixels per metre (-1).
+#: Exponent of length in the unit of each column that depends on it: 1 for metres, -1 for pixels per metre.
 POWERS: Final = {"joints": 1, "head": 1, "radius": 1, "scale": -1, "answer.joints": 1, "path.joints": 1}
 
 
 class Column(NamedTuple):
-    """Shape of a row's value (None: number of frames, or size of q), and the value of an unknown row."""
+    """Shape of one row's value (None stands for the number of frames or the size of q), and the value if unknown."""
 
     shape: tuple[int | None, ...] = ()
     empty: Any = np.nan
 
 
 def _declared(key: str) -> dict[str, Any]:
-    """Return the metadata with this key of the tables' fields, by their names in files: ``shape`` or ``entry``."""
+    """Return the metadata ``shape`` or ``entry`` of the tables' fields, by the fields' names in files."""
     return {
         f"{table}.{one.name}".lstrip("."): one.metadata
         for table, kind in TABLES.items()
@@ -60,23 +61,23 @@ COLUMNS: Final = {
     "path.probability": Column(),
     "path.joints": Column((None, len(JOINTS), 3)),
 }
-#: Columns that every file has, even if all of their values are empty.
+#: Columns that are in every file, even if all their values are empty.
 NEEDED: Final = (
     *("joints", "q", "probability"),
     *(name for name in COLUMNS if name.startswith(("frames.", "answer."))),
 )
-#: Lists with an entry per frame, and the empty entry.
+#: Lists with one entry per frame, and their empty entries.
 LISTS: Final = {name: one["entry"] for name, one in _declared("entry").items()}
 #: Fields of a frame's ``camera`` and ``root`` that are lengths.
 CAMERA_LENGTHS: Final = ("f", "position")
 ROOT_LENGTHS: Final = ("estimate", "deviation", "lower", "upper", "depth")
-#: Fields of a recovery beside its tables.
+#: Fields of a recovery that are mappings.
 MAPPINGS: Final = ("settings", "tolerances", "lengths", "camera")
 ABOUT: Final = ("unit", *MAPPINGS, "source", "joint_names", "configuration_names")
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a JSON document, NPZ arrays or a Parquet table hold a result."""
+    """Return whether a JSON document, NPZ arrays or a Parquet table contain a result."""
     return schema_of(document).startswith("posekit.result/")
 
 
@@ -102,7 +103,7 @@ def read(document: Any, path: str | Path, options: Options) -> Recovery:
 
 
 def write_json(path: str | Path, recovery: Recovery) -> None:
-    """Write a result as JSON, an object a posture."""
+    """Write a result as JSON with one object per posture."""
     head = {"schema": RESULT_SCHEMA, **plain({field: getattr(recovery, field) for field in ABOUT})}
     head["lengths"] = {name: value * PER_METRE[recovery.unit] for name, value in recovery.lengths.items()}
     tables = _in_unit(recovery)
@@ -139,7 +140,7 @@ def write_parquet(path: str | Path, recovery: Recovery) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Turn mappings, sequences and arrays into dicts and lists for JSON, with None for NaN."""
+    """Convert mappings, sequences and arrays to dicts and lists for JSON, with None for NaN."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -152,19 +153,19 @@ def plain(value: Any) -> Any:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """Split a name in files into table and field; the table of ``joints`` is "", of ``frames.time`` "frames"."""
+    """Split a column's name in files into table and field: ``frames.time`` is ("frames", "time")."""
     table, dot, field = name.partition(".")
     return (table, field) if dot else ("", name)
 
 
 def _held(recovery: Recovery, name: str) -> Any:
-    """Return a column or a list of a recovery by its name in files; None if the recovery has no such table."""
+    """Return a column or a list of a recovery by its name in files; None if its table is absent."""
     table, field = _parted(name)
     return getattr(getattr(recovery, table or "survivors"), field, None)
 
 
 def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
-    """Return the columns of all tables by name, metres; survivors' columns with only empty values are left out."""
+    """Return the columns of all tables by name, in metres, without survivors' columns whose values are all empty."""
     found = {}
     for name, column in COLUMNS.items():
         if (held := _held(recovery, name)) is not None:
@@ -227,7 +228,7 @@ def _frame_fields(recovery: Recovery, tables: Mapping[str, dict[str, list[Any]]]
 
 
 def _scaled(fields: Mapping[str, Any] | None, lengths: tuple[str, ...], per: float) -> dict[str, Any] | None:
-    """Multiply the lengths among a frame's fields; a residual is a length if the camera has an f, else pixels."""
+    """Multiply the lengths among a frame's fields by `per`; a residual is in pixels unless the camera has a field f."""
     if fields is None:
         return None
     found = dict(fields)
@@ -240,7 +241,7 @@ def _scaled(fields: Mapping[str, Any] | None, lengths: tuple[str, ...], per: flo
 
 
 def _of_json(root: Node) -> Recovery:
-    """Make a recovery of a JSON document."""
+    """Convert a JSON document to a recovery."""
     document, per = root.value, PER_METRE[root.at("unit").text(PER_METRE)]
     frames = document["frames"]
     counts = [len(frame["postures"]) for frame in frames]
@@ -286,14 +287,14 @@ def _of_json(root: Node) -> Recovery:
 
 
 def _stacked(holders: Sequence[Mapping[str, Any]], name: str, *shape: int) -> Array:
-    """Gather one field of many objects into an array (N, *shape); NaN where it is null or absent."""
+    """Gather one field of N objects into an array (N, *shape); NaN for null or absent fields."""
     nothing = np.full(shape, np.nan).tolist() if shape else np.nan
     values = [nothing if (value := one.get(name)) is None else value for one in holders]
     return np.array(values, dtype=np.float64).reshape(len(holders), *shape)
 
 
 def _flat_names(name: str, width: int) -> list[str]:
-    """Name the flat columns of one column of the survivors, as `Recovery.to_pandas` names them."""
+    """Return the names of the scalar columns of one array column, as in `Recovery.to_pandas`."""
     if name == "q":
         return [f"q_{k}" for k in range(width)]
     if name in ("joints", "head"):
@@ -303,7 +304,7 @@ def _flat_names(name: str, width: int) -> list[str]:
 
 
 def _table_columns(table: Table) -> dict[str, Any]:
-    """Gather the survivors' columns of a flat table."""
+    """Gather the survivors' array columns from the scalar columns of a table."""
     names = set(table.names)
     frame = table.column("frame").astype(np.intp)
     found: dict[str, Any] = {"frame": frame}
@@ -319,7 +320,7 @@ def _table_columns(table: Table) -> dict[str, Any]:
 
 
 def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Recovery:
-    """Make a recovery from arrays by name and from all other fields, a mapping or one JSON text."""
+    """Make a recovery from arrays by name and from all other fields, given as a mapping or as JSON text."""
     if isinstance(about, str):
         about = json_file.parse(about.encode(), f"{path}: about")
     root, arrays = Node(about, path), Node({**(about.get("arrays") or {}), **columns}, path)
@@ -359,7 +360,7 @@ def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Rec
 
 
 def _values(arrays: Node, name: str, rows: int | None, frames: int | None) -> NDArray[Any]:
-    """Return the array of a column, with its empty value in place of NaN."""
+    """Return the array of a column, in which NaN is replaced by the column's value for unknown rows."""
     node, (shape, empty) = arrays.at(name), COLUMNS[name]
     if empty == "":
         return np.asarray(node.value)

@@ -1,7 +1,7 @@
-"""Configurations of a robot over time: arrays and tables of a root's place and rotation and of joints.
+"""Configurations of a robot over time, from arrays and tables of root position, root rotation and joint positions.
 
-The layouts of kind ``robot-file`` in ``urdf/layouts`` say which arrays or columns are what. Configurations are returned
-in Pinocchio's convention: x, y, z in metres, the unit quaternion qx, qy, qz, qw, joints in radians.
+The layouts of kind ``robot-file`` in ``urdf/layouts`` define the meaning of arrays and columns. Configurations follow
+Pinocchio's convention: x, y, z in metres, the unit quaternion qx, qy, qz, qw, joints in radians.
 """
 
 from __future__ import annotations
@@ -31,36 +31,36 @@ X, Y, Z = np.eye(3)
 ROOT_NAMES: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 RATES: Final = ("fps", "rate", "frame_rate", "framerate", "frequency", "mocap_framerate", "mocap_frame_rate")
 COUNTS: Final = ("frame", "index", "frame#", "")
-#: Layouts of files in the order in which they are tried; a simulator's file may also have arrays of the root.
+#: Layouts in the order in which they are tried; a simulator's file may also have arrays of the root.
 LAYOUTS: Final = tuple(
     f"robot_{kind}" for kind in "pinocchio simulator arrays qpos loco_mujoco bones_seed columns rows".split()
 )
 
-#: Minimum difference of the median lean in degrees between two orders of a quaternion for one to be wrong.
+#: Minimum difference between the median leans in two orders of a quaternion, degrees, for one order to be wrong.
 LEAN_DEGREES: Final = 20.0
-#: Difference of the median lean in degrees below which the robot stands equally in both orders.
+#: Difference between the median leans, degrees, below which the robot stands equally upright in both orders.
 SAME_LEAN_DEGREES: Final = 1.0
-#: Minimum path of the root along the ground, metres, for its direction to be compared with the robot's heading.
+#: Minimum length of the root's path along the ground, metres, for a comparison of path and heading.
 TRAVEL_METRES: Final = 0.3
-#: Minimum difference, degrees, of the angle between heading and path for one order to be chosen.
+#: Minimum difference between the angles of heading and path in two orders, degrees, for one order to be chosen.
 HEADING_DEGREES: Final = 60.0
 #: Median lean in degrees above which a robot does not stand.
 STANDING_DEGREES: Final = 60.0
-#: Length below which a quaternion is unknown; deviation from length 1 above which it is noted, and refused.
+#: Length below which a quaternion is unknown; deviations from length 1 above which there is a warning and an error.
 ZERO_LENGTH, UNIT_LENGTH_ERROR, NO_QUATERNION = 1e-6, 0.01, 0.25
-#: Angles are degrees if 1 % of them exceed this number, which is more than a turn in radians.
+#: Number that 1 % of angles must exceed to be read as degrees; it is more than a full turn in radians.
 DEGREES_FROM: Final = 7.0
-#: Median height of a root below which its position is in each unit.
+#: For each unit, the median height of a root below which its position has this unit.
 HEIGHTS: Final = {"m": 10.0, "cm": 300.0, "mm": np.inf}
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether arrays or a table hold a robot's motion."""
+    """Return whether arrays or a table contain a robot's motion."""
     return _layout_of(_columns(document)) is not None
 
 
 def _columns(document: Any) -> Mapping[str, Any]:
-    """Return arrays by name; a table with names is returned under each name, numbers without names under ``""``."""
+    """Return the arrays, or the columns of a table, by name; numbers without names have the key ``""``."""
     if not isinstance(document, Table):
         both = isinstance(document, Mapping) and getattr(document.get("joints"), "ndim", 0) == 3
         return document if isinstance(document, Mapping) and not both else {}
@@ -83,7 +83,7 @@ def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
 
 
 def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
-    """Return the arrays or columns that a part of a layout names; empty if they are not all there."""
+    """Return the names of the arrays or columns for a part of a layout; empty if one of them is missing."""
     if "arrays" in part:  # the first known name
         return [name for name in part["arrays"] if getattr(columns.get(name), "ndim", 0) > 1][:1]
     if "each" in part:  # a name per coordinate
@@ -101,7 +101,7 @@ def _labels(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> tuple[str, 
 
 
 def _whole(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> str | None:
-    """Return the name of the array that holds root and joints; it has 7 columns more than there are joint names."""
+    """Return the name of the array with root and joints, which has 7 columns more than there are joint names."""
     wide = len(_labels(parts, columns)) + len(ROOT_NAMES)
     for name in parts["whole"]["arrays"]:
         values: Any = columns.get(name)
@@ -118,7 +118,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     Raises
     ------
     InputError
-        If arrays are missing or have other shapes, or a quaternion has another length than 1.
+        If arrays are missing or have wrong shapes, or a quaternion is not a unit quaternion.
     """
     columns = _columns(document)
     if isinstance(document, Table) and "" in columns:
@@ -164,7 +164,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
 
 
 def _stated_layout(columns: Mapping[str, Any], path: str, options: Options) -> tuple[Layout, str]:
-    """Return the layout of the file's arrays, and the name of the order of joints that the user states."""
+    """Return the layout of the file's arrays, and the name of the joint order that the user states."""
     stated = load_layout(options.layout) if options.layout else None
     if stated is not None and stated.kind not in ("robot-file", "robot"):
         raise refusal(path, "layout", shown(options.layout), "a layout of a robot", "choose another layout")
@@ -184,7 +184,7 @@ def _joints_alone(table: Table) -> dict[str, Any]:
 
 
 def _without_counter(values: Array, options: Options) -> dict[str, Array]:
-    """Return rows of position, quaternion and joints without a first column of frame numbers or seconds."""
+    """Return rows of position, quaternion and joints without the leading column of frame numbers or seconds."""
     first, whole = values[:, 0], values[np.isfinite(values).all(axis=1)]
     even = len(first) > 2 and first[0] == 0 and np.allclose(np.diff(first), first[1], rtol=1e-3, atol=2e-6)
     if not even or not first[1] > 0 or not len(whole):
@@ -200,7 +200,7 @@ def _without_counter(values: Array, options: Options) -> dict[str, Array]:
 def _of_whole(
     parts: Mapping[str, Any], columns: Mapping[str, Any]
 ) -> tuple[Array, Array, Array, tuple[str, ...]]:
-    """Split rows into position, quaternion, joints and their names; without a free-flying root all are joints."""
+    """Split rows into position, quaternion, joints and joint names; rows without a free root are joints only."""
     labels, root = _labels(parts, columns), len(ROOT_NAMES)
     values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
     if labels[:root] == ROOT_NAMES:
@@ -227,11 +227,11 @@ def _of_parts(
         joints = _stacked(columns, own) * np.array(signs)
         labels = tuple(joint_part.get("renamed", {}).get(one, one) for one in stripped)
     place, turn = (_stacked(columns, names[part]) for part in ("position", "rotation"))
-    if place.ndim == turn.ndim == 3:  # all bodies, the root first
+    if place.ndim == turn.ndim == 3:  # poses of all bodies, the root first
         root = int([str(one) for one in np.ravel(columns.get("body_names", ()))][:1] == ["world"])
         place, turn = place[:, root], turn[:, root]
     if labels and len(labels) + len(ROOT_NAMES) == joints.shape[-1]:
-        options.note("the joints begin with the root's place and quaternion")
+        options.note("the array of joints starts with the root's position and quaternion")
         place, turn, joints = joints[:, :3], joints[:, 3:7], joints[:, 7:]
     count = len(joints)
     fits = joints.ndim == 2 and place.shape == (count, 3) and turn.shape in ((count, 4), (count, 3))
@@ -242,7 +242,7 @@ def _of_parts(
 
 
 def _stacked(columns: Mapping[str, Any], names: Sequence[str]) -> Array:
-    """Return one array, or columns side by side (T, K)."""
+    """Return one array, or columns concatenated to an array (T, K)."""
     found = [_value(columns, name) for name in names]
     return found[0] if len(found) == 1 and found[0].ndim > 1 else np.stack(found, axis=1)
 
@@ -254,12 +254,12 @@ def _value(columns: Mapping[str, Any], name: str) -> Array:
 
 
 def _joint_name(name: str) -> str:
-    """Strip prefix, suffix and unit from a column's name: ``dof_elbow(rad)``, ``elbow_dof`` become ``elbow``."""
+    """Remove prefix, suffix and unit from a column's name: ``dof_elbow(rad)`` and ``elbow_dof`` become ``elbow``."""
     return re.sub(r"^dof_|_dof$|_pos$", "", re.sub(r"\s*[(\[](rad|deg)[)\]]$", "", name.strip()))
 
 
 def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | None]:
-    """Return the file's times (T,) and its rate; None for what it lacks."""
+    """Return the file's times (T,) and rate; None for a missing value."""
     name = next((name for name in columns if name.lower() in TIMES), None)
     key = next((name for name in RATES if name in columns), None)
     rate = np.empty(0) if key is None else np.ravel(_value(columns, key))
@@ -268,9 +268,9 @@ def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | Non
 
 
 def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:
-    """Return the layout of unnamed joints; a simulator's joints are breadth first, unless its bodies are depth first.
+    """Return the layout of joints without names: a simulator's breadth-first order, or the depth-first order.
 
-    Breadth first, the first two bodies are the left and right hip, equally far from the root.
+    In breadth-first order the first two bodies are the left and right hip, at equal distances from the root.
     """
     order = str(parts["joints"].get("orders", {}).get(str(count), ""))
     bodies = np.asarray(columns.get("body_pos_w", ()))
@@ -282,7 +282,7 @@ def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> 
 
 
 def _named(labels: tuple[str, ...], count: int, order: str, options: Options) -> tuple[str, ...]:
-    """Return the names of the joints: those of the file, or the layout's for joints without names."""
+    """Return the names of the joints from the file or, if it has none, from the layout."""
     names = load_layout(order).fields["joints"] if order and not labels else ()
     if len(names) == count and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
         options.note(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")
@@ -306,17 +306,17 @@ def _radians(joints: Array, unit: str, options: Options) -> Array:
 
 
 def _metres(place: Array, unit: str, up: str, options: Options) -> Array:
-    """Return the root's position in metres; its height shows whether the file has centimetres or millimetres."""
+    """Convert the root's position to metres; its height shows whether the file's unit is centimetres or millimetres."""
     heights = np.abs(place[:, "xyz".index(up[1])])
     height = float(np.nanmedian(heights)) if np.isfinite(heights).any() else 0.0
     found = next(name for name, most in HEIGHTS.items() if height < most or name == "mm")
     if not unit and found != "m":
-        options.note(f"the root's place is in {found}: its height is {height:.4g}")
+        options.note(f"the root's position is in {found}: its height is {height:.4g}")
     return place * METRES[unit or found]
 
 
 def _euler(angles: Array, part: Mapping[str, Any]) -> Array:
-    """Return quaternions (T, 4) of intrinsic angles (T, 3) about the axes that a layout names."""
+    """Return quaternions (T, 4) from intrinsic Euler angles (T, 3) about the axes that a layout names."""
     angles = angles * np.array(part.get("signs", (1.0, 1.0, 1.0)))
     angles = np.radians(angles) if part.get("unit") == "deg" else angles
     R = np.eye(3)
@@ -328,22 +328,22 @@ def _euler(angles: Array, part: Mapping[str, Any]) -> Array:
 def root_quaternion(
     values: Array, order: str, place: Array, up: str, source: str, options: Options
 ) -> tuple[Array, str]:
-    """Bring quaternions into the order x, y, z, w, and find the axis along which the robot stands.
+    """Convert quaternions to the order x, y, z, w, and find the axis along which the robot stands.
 
-    Without a stated order both are compared, in this order: by how upright the robot stands, by whether it heads where
-    it travels (its x axis points forward), and by convention (x, y, z, w). The length of each step of the rotation is
-    the same in both orders, so continuity decides nothing more.
+    If no order is stated, both orders are compared: first by how upright the robot stands, then by whether it heads in
+    its direction of travel (its x axis points forward). If both are equal, the order is x, y, z, w by convention.
+    Continuity cannot decide, because rotations between frames have the same angles in both orders.
 
     Parameters
     ----------
     values : array (T, 4)
-        As the file has them.
+        Quaternions in the order of the file.
     order : str
-        ``xyzw`` or ``wxyz``; empty if the file does not say it.
+        ``xyzw`` or ``wxyz``; empty if the file does not state it.
     place : array (T, 3)
-        The root in the world.
+        Position of the root in the world.
     up : str
-        Axis that points up, if it is stated.
+        Axis that points up, if stated.
 
     Returns
     -------
@@ -359,7 +359,7 @@ def root_quaternion(
         got = f"a quaternion of length {length[frame]:.4g}"
         raise refusal(source, f"rotation[{frame}]", got, "1", "give quaternions x, y, z, w or w, x, y, z")
     if off.max(initial=0.0) > UNIT_LENGTH_ERROR:
-        options.warn(f"quaternions are up to {off.max():.1%} off length 1: they are scaled to it")
+        options.warn(f"lengths of quaternions differ from 1 by up to {off.max():.1%}: they are normalized")
     if zero.any():
         options.warn(f"the quaternion is zero: no rotation is known in {zero.sum()} of {len(zero)} frames")
     values = values / np.where(zero, np.nan, length)[:, None]
@@ -372,7 +372,7 @@ def root_quaternion(
 
 
 def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
-    """Return the order of quaternions in which the robot stands or, if it stands in both, heads along its path."""
+    """Return the order of quaternions in which the robot stands, or in which it heads along its path."""
     lean = {name: min(median_lean(q, Z), median_lean(q, Y)) for name, q in both.items()}
     first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
     off = {name: _off_heading(q, place) for name, q in both.items()}
@@ -393,7 +393,7 @@ def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
 
 
 def _off_heading(q: Array, place: Array) -> float:
-    """Return the median angle between heading and travel, degrees; 0 if the robot hardly travels."""
+    """Return the median angle between heading and direction of travel, degrees; 0 if the robot hardly travels."""
     steps = np.diff(place[:, :2], axis=0)
     moved = np.linalg.norm(steps, axis=1)
     if not np.nansum(moved) > TRAVEL_METRES:

@@ -1,4 +1,4 @@
-"""`save`: write any object in the format that the file's name says."""
+"""`save`: write an object to a file; the suffix of the file's name determines the format."""
 
 from __future__ import annotations
 
@@ -32,20 +32,22 @@ WRITERS: Final[dict[str, dict[str, str]]] = {
     "Report": {f".{kind}": f"report_file:write_{kind}" for kind in ("json", "csv", "npz", "parquet", "md")},
     "dict": {f".{kind}": f"cameras_file:write_{kind}" for kind in ("toml", "json")},
 }
-#: Endings of pictures and pages, which `posekit.render` draws.
+#: Suffixes of pictures and pages, which `posekit.render` draws.
 DRAWN: Final = (".png", ".gif", ".mp4", ".html", ".svg", ".pdf")
-#: Formats of points or of the figure; a robot's configurations become points first.
+#: Formats of points or of the figure; for them a robot's configurations are converted to points.
 POINT_FORMATS: Final = (".trc", ".c3d", ".bvh", ".glb")
 
 
 def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: Any) -> None:
-    """Write an object in the format that the file's name says, whole or not at all.
+    """Write an object to a file in the format that the suffix of the name determines.
+
+    If writing fails, no incomplete file remains.
 
     Parameters
     ----------
     thing : Motion, View, Recovery, Report, or dict of cameras
     path : path
-        Its ending is the format; ``.gz`` behind it packs the file.
+        Path whose suffix determines the format; a further ``.gz`` compresses the file.
     which : {"", "answer", "path", "all", "first"}
         Postures of a recovery that files of motion get; the followed path if there is one, else the answer.
     **options
@@ -81,7 +83,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
 
 
 def refuse_ending(kind: str, path: Path) -> None:
-    """Refuse a name in whose format objects of a class are not written; a recovery can be written as motion."""
+    """Refuse a file name with a suffix in which objects of a class cannot be written; a recovery is also a motion."""
     known = {**WRITERS.get(kind, {}), **(WRITERS["Motion"] if kind == "Recovery" else {})}
     if suffix_of(path) not in known:
         expected = ", ".join(known) or "a motion, view, result or report"
@@ -100,7 +102,7 @@ def with_points(motion: Motion) -> Motion:
     Raises
     ------
     InputError
-        If the robot is not known, or the robot is not a humanoid or has other joints.
+        If the robot is unknown, is not a humanoid, or has joints that differ from the configurations.
     """
     if not motion.robot or motion.q is None:
         remedy = "give it with --urdf" + (

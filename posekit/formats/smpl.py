@@ -1,11 +1,12 @@
-"""The SMPL family: AMASS and its like, the angles of a body model over time (NPZ, pickle, PyTorch).
+"""Motion of the SMPL family, such as AMASS: angles of a body model over time (NPZ, pickle, PyTorch).
 
 Keys: ``poses`` (T, 3 K), rotation vectors of the joints in the model's order, or ``root_orient`` (T, 3) and
 ``pose_body`` (T, 63), or ``global_orient`` and ``body_pose``; ``trans`` or ``transl`` (T, 3), metres; ``betas`` (B,); a
 frame rate (Mahmood et al. 2019, *AMASS: Archive of Motion Capture as Surface Shapes*). By convention z is up.
 
-Joints at rest are those of the neutral SMPL model's mean shape unless the file has its own: shapes (``betas``) need the
-model's own files, which are not free to be shared. They change lengths by some per cent and no angle.
+The rest positions of joints are from the file or else from the mean shape of the neutral SMPL model. Shapes (``betas``)
+are ignored, because they need the model's files, which may not be redistributed. They change lengths by a few per cent
+but no angles.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from posekit.geometry import FARTHEST_COORDINATE, Array, rotation_from_vector
 if TYPE_CHECKING:
     from posekit.motion import Motion
 
-#: Number of joints of the body; they are the first joints of SMPL, SMPL+H and SMPL-X.
+#: Number of body joints, which are the first joints of SMPL, SMPL+H and SMPL-X.
 N_JOINTS: Final = 22
-#: Names of the angles and of the root's position; WHAM's names without ``world`` are in the camera frame.
+#: Names of the arrays of angles and of the root's position; WHAM's arrays without ``world`` are in the camera frame.
 _ANGLES: Final = (
     "pose_world poses pose root_orient+pose_body global_orient+body_pose fullpose smpl_poses".split()
 )
@@ -35,12 +36,12 @@ _PLACES: Final = ("trans_world", "trans", "transl", "translation", "Th", "smpl_t
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether arrays hold the angles of a body model."""
+    """Return whether a document contains the angles of a body model."""
     return bool(_angles(document)[1])
 
 
 def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return the arrays of a body model, at the top or in an inner dict, and the names of its angles."""
+    """Return the arrays of a body model, at the top level or in an inner dict, and the names of its angles."""
     inner = document.values() if isinstance(document, Mapping) else ()
     for arrays in (document, *inner):
         if isinstance(arrays, Mapping) and any(name in arrays for name in _PLACES):
@@ -51,12 +52,12 @@ def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
 
 
 def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
-    """Place the 22 joints of the body by the model's angles (Loper et al. 2015, *SMPL*, eq. 3 and 4).
+    """Compute the 22 body joints from the model's angles (Loper et al. 2015, *SMPL*, eq. 3 and 4).
 
     Raises
     ------
     InputError
-        If arrays are missing, infinite or of other shapes.
+        If arrays are missing, are not finite, or have wrong shapes.
     """
     outer, (document, keys) = document, _angles(document)
     parts = [np.asarray(document[key], dtype=np.float64).reshape(len(document[key]), -1) for key in keys]
@@ -87,30 +88,30 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
 
 
 def _rest(document: Mapping[str, Any], options: Options) -> Array:
-    """Return the joints at rest (22, 3), metres: from the file, or of the mean shape."""
+    """Return the rest positions of joints (22, 3), metres, from the file or else of the mean shape."""
     own = np.asarray(document.get("J", document.get("joints_rest", ())))
     if own.ndim == 2 and own.shape[0] >= N_JOINTS and own.shape[1] == 3:
-        options.note("joints at rest are the file's own")
+        options.note("rest positions of joints are those of the file")
         return own[:N_JOINTS].astype(np.float64)
     layout = load_layout("smpl_22").fields
     rest = np.array(layout["rest"])
     for k in range(1, N_JOINTS):
         rest[k] += rest[layout["parents"][k]]
     betas = np.ravel(document.get("betas", ()))
-    shape = "; the file's shape (betas) needs the model and is left out" if np.any(betas) else ""
+    shape = "; the file's shape (betas) needs the model and is ignored" if np.any(betas) else ""
     options.note(f"limbs have the lengths of SMPL's mean shape{shape}")
     return rest
 
 
 def placed(rest: Array, poses: Array, place: Array) -> Array:
-    """Place joints (T, 22, 3) by forward kinematics.
+    """Compute joint positions (T, 22, 3) by forward kinematics.
 
     Parameters
     ----------
     rest : array (22, 3)
-        Joints at rest, metres.
+        Rest positions of joints, metres.
     poses : array (T, 22, 3)
-        Rotation vectors, the root's in the world, the others' in their parent's frame.
+        Rotation vectors: of the root in the world, of other joints in the parent's frame.
     place : array (T, 3)
         Translation of the root, metres.
     """

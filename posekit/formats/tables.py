@@ -1,4 +1,4 @@
-"""Tables of text: CSV, TSV, TRC, MOT and the like, split into rows of cells. No column is interpreted here."""
+"""Text tables, such as CSV, TSV, TRC and MOT, split into rows of cells. Columns are interpreted by other modules."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ from posekit.errors import refusal, shown
 from posekit.files import text
 from posekit.geometry import Array, Ints
 
-#: Rows of names before the numbers: DeepLabCut has 4.
+#: Largest number of header rows before the numbers; DeepLabCut has 4.
 MAX_HEAD_ROWS: Final = 10
 #: Largest number of points in a table with one row per point.
 MAX_POINTS: Final = 30_000_000
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-#: Columns of a point by its name and a coordinate or confidence: ``nose_x``, ``nose.score``.
+#: Pattern of a column's name that consists of a point and a coordinate or confidence: ``nose_x``, ``nose.score``.
 _OF_POINT: Final = re.compile(
     r"(.+?)[\s._-]+(?:([xyz])|visibility|likelihood|confidence|score|presence|conf|c)",
     re.IGNORECASE | re.DOTALL,
 )
-#: Cells that hold no value, in lower case.
+#: Texts of empty cells, in lower case.
 MISSING: Final = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"})
-#: Names of columns of times, and their unit in seconds; None if the steps between the times give the unit.
+#: Names of columns of times, and their unit in seconds; None if the unit is found from the time steps.
 TIMES: Final = {
     **{"time": 1.0, "times": 1.0, "t": 1.0, "time_s": 1.0, "timestamp_s": 1.0, "timestamp": None},
     **{"timestamps": None, "time_ms": 1e-3, "timestamp_ms": 1e-3, "time_us": 1e-6, "timestamp_us": 1e-6},
 }
-#: Largest step between two frames, seconds: a larger step of timestamps is in ms, µs or ns.
+#: Largest time step between frames, seconds; larger steps of timestamps are in ms, µs or ns.
 LARGEST_STEP: Final = 2.0
 
 
 class Table:
-    """Rows of cells.
+    """A text table: rows of cells.
 
     Attributes
     ----------
     lines : list of str
-        The text's lines, without empty ones.
+        Lines of the text, without empty lines.
     numbers_of_lines : list of int
-        The number of each line in the file, from 1.
+        Number of each line in the file, from 1.
     delimiter : str
         Character between cells; empty for any white space.
     about : dict
-        Metadata of a container that has some.
+        Metadata of the file; empty for text files.
     """
 
     def __init__(self, lines: list[str], delimiter: str, source: str, numbers: Sequence[int] = ()) -> None:
@@ -77,7 +77,7 @@ class Table:
 
     @cached_property
     def head(self) -> list[list[str]]:
-        """Rows before the first that holds a number."""
+        """Rows before the first row that contains a number."""
         rows: list[list[str]] = []
         for line in self.lines[:MAX_HEAD_ROWS]:
             cells = self.parted(line)
@@ -88,17 +88,17 @@ class Table:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns: the last row before the numbers; empty without such a row."""
+        """Names of the columns, from the last row before the numbers; empty without such a row."""
         return tuple(self.head[-1] if self.head else ())
 
     @cached_property
     def cells(self) -> list[list[str]]:
-        """Rows after the names, all of one width.
+        """Rows after the names, all with the same number of cells.
 
         Raises
         ------
         InputError
-            If a row has another number of cells than the names or the first row.
+            If the number of cells in a row differs from the names or the first row.
         """
         start = len(self.head)
         rows = [self.parted(line) for line in self.lines[start:]]
@@ -113,18 +113,18 @@ class Table:
 
     @cached_property
     def columns(self) -> dict[str, Any]:
-        """Cells by the name of their column; of two columns with one name, the first."""
+        """Cells by the name of their column; if two columns have the same name, those of the first."""
         columns = zip(*self.cells, strict=True) if self.cells else ([] for _ in self.names)
         named = list(zip(self.names, columns, strict=True))
         return dict(reversed(named))
 
     @cached_property
     def numbers(self) -> Array:
-        """All cells of a table of text as numbers (N, C), NaN for other cells."""
+        """All cells as numbers (N, C); NaN for cells without a number."""
         return numbers([cell for row in self.cells for cell in row]).reshape(len(self.cells), -1)
 
     def column(self, name: str) -> Array:
-        """Return a column as numbers (N,), NaN for other cells."""
+        """Return a column as numbers (N,); NaN for cells without a number."""
         values = np.asarray(self.columns[name])
         known = values.dtype.kind in "iufb"
         return values.astype(np.float64) if known else numbers(self.texts(name))
@@ -134,7 +134,7 @@ class Table:
         return [str(value) for value in self.columns[name]]
 
     def checked(self, name: str) -> Array:
-        """Return a column as numbers (N,), NaN for empty cells; refuse other cells."""
+        """Return a column as numbers (N,); NaN for empty cells. Refuse other cells without a number."""
         if not self.lines:
             return self.column(name)
         lines = self.numbers_of_lines[len(self.head) :]
@@ -142,7 +142,7 @@ class Table:
 
 
 def parse(data: bytes, source: str) -> Table:
-    """Split a table of text into lines and find its delimiter: tab, semicolon, comma, else white space."""
+    """Split a text table into lines, and find its delimiter: tab, semicolon, comma, or else white space."""
     lines = text(data, source).splitlines()
     pairs = [(number, line) for number, line in enumerate(lines, 1) if line.strip(" ,;\t\r")]
     if not pairs:
@@ -154,7 +154,7 @@ def parse(data: bytes, source: str) -> Table:
 
 
 def numbers(cells: list[str]) -> Array:
-    """Turn cells into numbers (N,), NaN for other cells; decimal commas are understood."""
+    """Convert cells to numbers (N,); NaN for cells without a number. Decimal commas are accepted."""
     try:
         return np.array(cells, dtype=np.float64)
     except ValueError:
@@ -162,7 +162,7 @@ def numbers(cells: list[str]) -> Array:
 
 
 def checked(cells: list[str], source: str, place: Callable[[int], str]) -> Array:
-    """Turn cells into numbers (N,), NaN for empty cells; refuse another cell by its place in the file."""
+    """Convert cells to numbers (N,); NaN for empty cells. Refuse other cells; the message names their position."""
     values = numbers(cells)
     for k in np.flatnonzero(~np.isfinite(values)).tolist():
         if cells[k].casefold() not in MISSING:
@@ -180,7 +180,7 @@ def _number(cell: str) -> float:
 
 
 def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the columns of each point by part: ``x``, ``y``, ``z`` and ``sure``, the confidence."""
+    """Return the names of each point's columns by ``x``, ``y``, ``z`` and ``sure`` (confidence)."""
     found: dict[str, dict[str, str]] = {}
     for column in names:
         if match := _OF_POINT.fullmatch(column):
@@ -189,25 +189,25 @@ def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
 
 
 def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[NDArray[Any], Ints, Array]:
-    """Gather a table with one row per point into an array with one row per frame.
+    """Convert a table with one row per point to an array with one row per frame.
 
     Parameters
     ----------
     keys : array (N, K)
-        Numbers of a row's frame, such as the person and the picture.
+        Numbers that identify the frame of each row, such as person and picture.
     point : int array (N,)
-        The row's point, below `count`.
+        Index of the point of each row, below `count`.
     values : array (N, D)
-        Its coordinates.
+        Coordinates of each row's point.
 
     Returns
     -------
     keys : array (T, K)
-        Different keys, ascending.
+        Distinct keys, ascending.
     first : int array (T,)
-        Their first rows.
+        First row of each key.
     points : array (T, count, D)
-        NaN where a frame has no row of a point.
+        Coordinates; NaN if a frame has no row for a point.
     """
     found, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     if len(found) * count > MAX_POINTS:
@@ -218,7 +218,7 @@ def by_row(keys: NDArray[Any], point: Ints, values: Array, count: int) -> tuple[
 
 
 def seconds(name: str, time: Array) -> Array:
-    """Return times (T,) in seconds; the name of their column gives the unit, or, for timestamps, their steps do."""
+    """Convert times (T,) to seconds; the unit follows from the column's name or, for timestamps, from their steps."""
     unit = TIMES[name.casefold()]
     if unit is None:
         step = float(np.nanmedian(np.abs(np.diff(time)))) if np.isfinite(time).sum() > 1 else 0.0
@@ -227,12 +227,12 @@ def seconds(name: str, time: Array) -> Array:
 
 
 def columns_of_rows(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Return the columns of rows that have the same names."""
+    """Convert a list of rows with the same keys to columns by key."""
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def csv_text(columns: dict[str, Any], delimiter: str = ",") -> str:
-    """Write columns of one length as CSV; numbers read back exactly, NaN is an empty cell."""
+    """Return columns of equal length as CSV text; numbers are exact when read back, NaN is an empty cell."""
     cells = []
     for values in map(np.asarray, columns.values()):
         if values.dtype.kind == "f":

@@ -1,8 +1,8 @@
-"""TRC: tables of marker positions of OpenSim, Pose2Sim and Motion Analysis; MOT and STO: OpenSim's joint angles.
+"""TRC, tables of marker positions (OpenSim, Pose2Sim, Motion Analysis); MOT and STO, joint angles of OpenSim.
 
 TRC has five header lines: ``PathFileType``; the names of the trial's parameters (``DataRate``, ``NumFrames``,
-``Units``, …); their values; ``Frame#``, ``Time`` and the markers' names, each for three columns; the coordinates' names
-(``X1``, ``Y1``, ``Z1``, …). Each further line is a frame; the cells of a missing marker are empty (OpenSim
+``Units``, …); their values; ``Frame#``, ``Time`` and the markers' names, each above three columns; the coordinates'
+names (``X1``, ``Y1``, ``Z1``, …). Each further line is a frame; the cells of a missing marker are empty (OpenSim
 documentation, *Marker (.trc) Files*). By convention y is up. MOT and STO have a header that ends in ``endheader``
 (*Motion (.mot) Files*).
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from posekit.motion import Motion
 
 MAX_POINTS: Final = 10_000
-#: Largest deviation of a frame's time from an even sequence of times, as a share of the step.
+#: Largest deviation of a frame's time from evenly spaced times, as a share of the time step.
 UNEVEN_STEP_SHARE: Final = 0.1
 
 
@@ -49,7 +49,7 @@ def read(document: Table, path: str, options: Options) -> Motion:
     Raises
     ------
     InputError
-        If there is no header, or a row is incomplete.
+        If the header is missing, or a row is incomplete.
     """
     end = _end_of_header(document)
     return _read_trc(document, path, options) if end is None else _read_mot(document, end, path, options)
@@ -97,7 +97,7 @@ def _read_trc(table: Table, path: str, options: Options) -> Motion:
 
 
 def _title_cells(table: Table, line: str) -> list[str]:
-    """Split a line of the header; some files have spaces in it and tabs in their rows."""
+    """Split a header line into cells; some files have spaces in the header and tabs in the rows."""
     cells = table.parted(line)
     if table.delimiter == "\t" and len(cells) > 1:
         cells = [one for cell in cells for one in re.split(r"\s{2,}", cell)]
@@ -107,7 +107,7 @@ def _title_cells(table: Table, line: str) -> list[str]:
 
 
 def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
-    """Return the markers' names: usually one per three columns; some files have one per column, or doubled tabs."""
+    """Return the markers' names: usually one for three columns, in some files one per column or with doubled tabs."""
     every_third = tuple(cells[::3])
     if all(every_third) and not any(cells[1::3]) and not any(cells[2::3]):
         return every_third
@@ -118,14 +118,14 @@ def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
 
 
 def _rows(table: Table, start: int, width: int, path: str) -> Array:
-    """Return the rows (T, width) after the header; missing cells at the end of a row are unseen markers."""
+    """Return the rows (T, width) after the header; missing cells at the end of a row mean unseen markers."""
     cells: list[str] = []
     for k in range(start, len(table.lines)):
         row = table.parted(table.lines[k])
         if len(row) > width and not any(row[width:]):
             row = row[:width]
         elif len(row) < width and len(row) % 3 == 2 and table.delimiter and k < len(table.lines) - 1:
-            row += [""] * (width - len(row))  # editors take tabs from the ends of lines
+            row += [""] * (width - len(row))  # some editors remove tabs at the end of a line
         elif len(row) == width - 1 and table.delimiter:
             row.append("")
         if len(row) != width:
@@ -147,7 +147,7 @@ def _whole(text: str) -> int | None:
 
 
 def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
-    """Read the angles of OpenSim's inverse kinematics; the body model is known if the user states a URDF."""
+    """Read the joint angles of OpenSim's inverse kinematics; the user states their body model as a URDF."""
     header = " ".join(table.lines[:end]).lower()
     names = table.parted(table.lines[end + 1]) if end + 1 < len(table.lines) else []
     if not names or names[0].casefold() != "time":
@@ -179,7 +179,7 @@ def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
 
 
 def write(path: str | Path, motion: Motion, **_: Any) -> None:
-    """Write the points of one recording as TRC, in metres to the nanometre, y up where the up axis is known.
+    """Write the points of one recording as TRC in metres, rounded to nanometres; y is up if the up axis is known.
 
     Raises
     ------
@@ -205,7 +205,7 @@ def write(path: str | Path, motion: Motion, **_: Any) -> None:
 
 
 def one_recording(motion: Motion, format: str) -> Array:
-    """Return the points (T, J, 3) of a motion; refuse one without points or with several recordings."""
+    """Return the points (T, J, 3) of a motion; refuse a motion without points or with several recordings."""
     if motion.joints is None:
         got = "configurations without points"
         raise refusal(motion.source, "", got, f"points for {format}", "write csv or npz, or give --urdf")
@@ -216,13 +216,13 @@ def one_recording(motion: Motion, format: str) -> Array:
 
 
 def seconds(motion: Motion) -> Array:
-    """Return the times of a motion, seconds; unknown times are 1/30 s apart."""
+    """Return the times of a motion, seconds; if they are unknown, times at 30 Hz."""
     time = np.asarray(motion.time)
     return time if np.isfinite(time).all() else np.arange(len(motion)) / 30.0
 
 
 def even_step(motion: Motion, format: str) -> float:
-    """Return the seconds from frame to frame; refuse uneven times, which the format cannot hold."""
+    """Return the time step, seconds; refuse uneven times, which the format cannot represent."""
     time = seconds(motion)
     if len(time) == 1:
         return 1 / 30

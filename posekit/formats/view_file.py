@@ -1,4 +1,4 @@
-"""``posekit.view/1``: one camera's view of one person as JSON, in the file's unit; unknown points are left out."""
+"""Files of ``posekit.view/1``: one camera's view of one person as JSON; unknown points are omitted."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FIGURE_FIELDS: Final = ("lengths", "shoulders", "stature", "head_points")
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a JSON document states the schema, or has a view's fields without a schema."""
+    """Return whether a JSON document states the schema, or has the fields of a view without a schema."""
     if not isinstance(document, dict):
         return False
     schema = schema_of(document)
@@ -48,12 +48,12 @@ def read(document: Any, path: str | Path, options: Options) -> View:
     Returns
     -------
     View
-        In metres; image points in OpenCV's convention.
+        View with lengths in metres, and image points in OpenCV's convention.
 
     Raises
     ------
     InputError
-        If a field is missing, unknown or wrong.
+        If a field is missing, unknown or invalid.
     """
     root, unit, camera, frames = _parts(document, path, MISSING)
     figure = root.at("figure", {})
@@ -104,7 +104,7 @@ def read(document: Any, path: str | Path, options: Options) -> View:
 
 
 def _parts(document: Any, path: str | Path, unit: Any) -> tuple[Node, str, CameraModel, list[Node]]:
-    """Return the root of a view's document, its unit (`unit` if it states none), its camera and its frames."""
+    """Return a document's root node, unit (`unit` if it states none), camera, and nodes of frames."""
     root = Node(document, path)
     check_schema(root, VIEW_SCHEMA)
     root.object(FIELDS)
@@ -113,7 +113,7 @@ def _parts(document: Any, path: str | Path, unit: Any) -> tuple[Node, str, Camer
 
 
 def check_schema(root: Node, *schemas: str) -> str:
-    """Return the stated schema; refuse a document of another kind or version."""
+    """Return the schema that a document states; refuse a document with another schema or version."""
     if not isinstance(root.value, dict):
         raise root.refused(f"an object of schema {schemas[0]}", "check that it is such a file")
     stated = schema_of(root.value)
@@ -128,12 +128,12 @@ def check_schema(root: Node, *schemas: str) -> str:
 
 
 def camera_from(node: Node, unit: str) -> CameraModel:
-    """Make a camera from its fields in a view, in a result or in a header of live key points.
+    """Make a camera from its fields in a view, in a result or in the header of live key points.
 
     Raises
     ------
     InputError
-        If the fields describe no camera.
+        If the fields do not describe a camera.
     """
     model = node.at("model").text(CAMERA_FIELDS)
     node.object(CAMERA_FIELDS[model])
@@ -181,23 +181,23 @@ def _head_points(node: Node, unit: str) -> dict[str, Array] | None:
 
 
 def _refuse_objects(image: Node) -> None:
-    """Refuse the view of another object than a person: a view without any joint of a body."""
+    """Refuse the view of an object that is not a person: its frames have no joint of a body."""
     names = image.object()
     if len(names) > 1 and not any(name in POINTS for name in names):
         raise image.refused("the joints of a person", "recover another articulated object with --linkage")
 
 
 def write(path: str | Path, view: View, unit: str | None = None) -> None:
-    """Write a view as JSON, whole or not at all.
+    """Write a view as JSON. If writing fails, no incomplete file remains.
 
     Parameters
     ----------
     path : path
-        ``.json`` or ``.json.gz``.
+        Path that ends in ``.json`` or ``.json.gz``.
     view : View
         The view.
     unit : "m", "cm" or "mm", optional
-        The file's unit of length; the view's own by default.
+        Unit of length in the file; by default that of the view.
 
     Raises
     ------
@@ -240,16 +240,16 @@ def write(path: str | Path, view: View, unit: str | None = None) -> None:
 
 
 def read_object(document: Any, path: str | Path, points: Sequence[str]) -> dict[str, Any]:
-    """Read the view of another articulated object than a person.
+    """Read the view of an articulated object that is not a person.
 
     Parameters
     ----------
     document : dict
-        JSON of ``posekit.view/1`` with a scaled orthographic camera, whose images have the object's points.
+        JSON of ``posekit.view/1`` with a scaled orthographic camera and images of the object's points.
     path : path
-        The file.
+        Path of the file.
     points : sequence of P str
-        Points of the object.
+        Names of the object's points.
 
     Returns
     -------
@@ -260,7 +260,7 @@ def read_object(document: Any, path: str | Path, points: Sequence[str]) -> dict[
     Raises
     ------
     InputError
-        If a field is missing or wrong, or a point is not the object's.
+        If a field is missing or invalid, or a point does not belong to the object.
     """
     root, unit, camera, frames = _parts(document, path, "m")
     if not isinstance(camera, ScaledOrthographicCamera):
