@@ -291,6 +291,19 @@ def test_an_own_check_works_through_every_door(own: Any, tmp_path: Path) -> None
     assert posekit.Validator(robot, checks=by_name).check(high).ok.all()
 
 
+def test_postures_have_a_ground_only_if_it_is_stated() -> None:
+    @posekit.check("above", unit="m", reads=("joints", "up", "ground"))
+    def above(body: Any) -> posekit.Judgement:
+        """A joint is below the ground."""
+        return posekit.Judgement(JOINTS, body.height - body.ground, lower=0.0)
+
+    postures = Motion(joints=walk(1.0)[:3], frame=[0, 0, 0], up="+z")
+    unknown = posekit.Validator(checks=[above]).check(postures)
+    assert "above" in unknown.not_asked and not unknown.checks
+    stated = posekit.Validator(checks=[above], ground=0.05).check(postures)
+    assert stated.ok.tolist() == (postures.joints[..., 2].min(axis=1) >= 0.05).tolist()
+
+
 def test_an_own_check_works_on_the_command_line(tmp_path: Path) -> None:
     path = tmp_path / "sunk.npz"
     sunk = walk(0.5) - np.array([0.0, 0.0, 0.3])

@@ -260,3 +260,26 @@ def test_set_reads_the_kind_of_its_field(
     found = posekit.open(tmp_path / "a.json").settings[name]
     assert (list(found) if isinstance(value, list) else found) == value
     assert (found is value) or not isinstance(value, bool | None)
+
+
+@pytest.mark.parametrize(
+    ("words", "field", "least"),
+    [
+        (("walker",), "--frames", 1),
+        (("walker",), "--noise", 0),
+        (("walker",), "--seed", 0),
+        (("walker",), "--dt", 0.001),
+        (("random",), "--frames", 1),
+        (("mocap", "walk.npz"), "--frames", 1),
+        (("object", "panda"), "--frames", 1),
+    ],
+)
+def test_the_least_number_of_an_option_is_accepted_and_the_next_one_refused(
+    run: Any, words: tuple[str, ...], field: str, least: float, tmp_path: Path
+) -> None:
+    command = ("synth", *words, "-o", str(tmp_path / "view.json"))
+    small = ("--frames", "1") if field != "--frames" else ()
+    code, _, err = run(*command, *small, field, str(least))
+    assert code == 0, err
+    code, _, err = run(*command, *small, field, str(least - 1))
+    assert code == 2 and field in err

@@ -459,6 +459,17 @@ def test_two_cameras_in_one_folder_are_refused(tmp_path: Path) -> None:
         posekit.open(tmp_path)
 
 
+def test_a_visibility_of_two_is_no_confidence(tmp_path: Path) -> None:
+    """COCO marks annotated points by 2 if they are visible and by 1 if they are hidden; detectors give a share."""
+    keypoints = triples(person(0), COCO)
+    keypoints[2::3] = [2.0, 1.0, 0.5, *[2.0] * 14]
+    people = [{"image_id": 1, "category_id": 1, "keypoints": keypoints, "score": 1.0}]
+    found = posekit.open(dumped(tmp_path / "results.json", people))
+    confidence = dict(zip(found.names, found.confidence[0].tolist(), strict=True))
+    assert np.isnan(confidence["nose"]) and np.isnan(confidence["left_ankle"])
+    assert (confidence["left_eye"], confidence["right_eye"]) == (1.0, 0.5)
+
+
 def test_human36m_is_told_from_coco_by_the_head(tmp_path: Path) -> None:
     names = load_layout("h36m_17").points
     people = []

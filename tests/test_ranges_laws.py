@@ -13,6 +13,7 @@ import pytest
 import posekit
 from posekit.errors import InputError
 from posekit.skeleton import DOFS
+from posekit.validators.ranges import of_person
 
 FIGURE = posekit.load_figure()
 RANGES = Path(posekit.__file__).with_name("urdf") / "ranges"
@@ -175,3 +176,20 @@ def test_the_table_of_a_robots_joints_names_its_bad_limits(tmp_path: Path) -> No
     )
     with pytest.raises(InputError, match=r"mine\.toml: limits\.right_knee_Z"):
         posekit.Validator("human", ranges=str(path)).check(posekit.load_robot("human").neutral[None])
+
+
+@pytest.mark.parametrize("forward", [-30.0, 0.0, 5.0, 20.0])
+@pytest.mark.parametrize("outward", [0.0, 4.0])
+def test_ranges_of_a_person_widen_by_the_share_of_the_hips_that_may_be_another_pelvis(
+    forward: float, outward: float
+) -> None:
+    """The zero has the spread of people (6.75 degrees) and of a pelvis 1.5 cm off in 10; 10 degrees are the posture."""
+    own = 6.75**2 + math.degrees(math.atan(0.015 / 0.1)) ** 2
+    moved = of_person(PEOPLE, forward, outward)
+    angles = [(joint, angle) for joint in ("pelvis", "hip") for angle in PEOPLE[joint]]
+    for joint, angle in angles:
+        ends = [[one[joint][angle][end]["mean"] for end in ("lower", "upper")] for one in (PEOPLE, moved)]
+        mean = PEOPLE[joint][angle].get("zero", {}).get("mean", 0.0)
+        shift = np.sign(mean) * (forward - abs(mean)) * own / (own + 100.0)
+        shift = -outward if (joint, angle) == ("hip", "abduction") else shift
+        assert np.diff(ends, axis=0)[0] == pytest.approx([min(shift, 0.0), max(shift, 0.0)]), (joint, angle)
