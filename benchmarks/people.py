@@ -1,9 +1,11 @@
 """How good answers are on people: errors, representatives, how sure, and whether 95 % regions hold the joints.
 
-    python -m benchmarks.people [--data DIR] [--views 96] [--noise 2] [--trial POSE2SIM_FOLDER] [--only NAME,NAME]
+    python -m benchmarks.people [--data DIR] [--views 600] [--noise 2] [--trial POSE2SIM_FOLDER] [--only NAME,NAME]
 
-Motion is what files have (`--data`), or a walker's. Frames are drawn evenly over its clips, each seen by a
-camera of its own 2.5 to 6 m away; lengths are the medians of each clip, and their deviation is stated. Conditions:
+Motion is read from files (`--data`), or it is a walker's. Every body has as many frames as every other one, drawn
+evenly over its clips: many clips of one data set have the same skeleton. Each frame is seen by a camera of its own
+2.5 to 6 m away. Lengths are the medians of each clip; the stated deviation is the root mean square of the clip's own
+lengths about them, because spines bend and shoulders move. Conditions:
 
 - neck: the neck is given exactly;
 - no neck: neither neck nor head points are given, depth comes from the lengths;
@@ -30,18 +32,21 @@ import numpy as np
 import posekit
 from benchmarks.common import data_of, parser, recordings, table
 from posekit.body import segment_lengths
+from posekit.body.lengths import lengths_in_frames
 from posekit.cameras import View
 from posekit.evaluation import Evaluation, evaluate, posture_errors, with_truth
 from posekit.evaluation.scores import MEASURES, reliability
 from posekit.geometry import Array
 from posekit.motion import Motion
+from posekit.ranking.directions import LIMB_SEGMENTS
 from posekit.recovery import Recovery
+from posekit.skeleton import segment_name
 from posekit.synthesis import forget_camera, mocap_views, with_noise
 
 NEAR_METRES = 0.06
-CLIP_DEVIATION = 0.01
-"""Relative deviation of the medians of a clip: bones are rigid, shoulders and spine hardly."""
 TAPE_DEVIATION = 0.02
+SAME_BODY_METRES = 0.01
+"""Largest difference of the limbs' lengths in clips of one body."""
 PA = MEASURES.index("pa")
 HEAD = (
     "condition",
@@ -95,13 +100,13 @@ def neck_given(view: View) -> View:
     neck = view.truth[:, 0]
     image = view.image.copy()
     image[:, 0] = view.camera.project(neck)
-    return replace(view, root=neck, image=image, length_deviation=CLIP_DEVIATION)
+    return replace(view, root=neck, image=image)
 
 
 def neck_unknown(view: View) -> View:
     nothing = np.full((len(view), 3), np.nan)
     head = np.full_like(view.head_image, np.nan)
-    return replace(view, root=nothing, head_image=head, length_deviation=CLIP_DEVIATION)
+    return replace(view, root=nothing, head_image=head)
 
 
 def taped(view: View) -> View:
@@ -126,16 +131,44 @@ CONDITIONS: dict[str, Callable[[View], View]] = {
 
 
 def views_of(motions: Iterable[Motion], count: int, noise: float, rng: np.random.Generator) -> list[View]:
-    """Draw views of clips in equal shares, with noise."""
-    clips = list(motions)
+    """Draw views in equal shares of bodies, and of the clips of a body, with noise."""
     found: list[View] = []
-    for number, clip in enumerate(clips):
-        share = count // len(clips) + (number < count % len(clips))
-        whole = int(np.isfinite(clip.figure_joints).all(axis=(1, 2)).sum())
-        if min(share, whole):
-            drawn = mocap_views(clip, min(share, whole), rng)
-            found += [with_noise(one, noise, rng) if noise else one for one in drawn]
+    bodies = clips_by_body(motions)
+    for clips, of_body in zip(bodies, shares(count, len(bodies)), strict=True):
+        for clip, share in zip(clips, shares(of_body, len(clips)), strict=True):
+            whole = clip.figure_joints[np.isfinite(clip.figure_joints).all(axis=(1, 2))]
+            if min(share, len(whole)):
+                stated = length_deviation(whole)
+                for drawn in mocap_views(clip, min(share, len(whole)), rng):
+                    view = with_noise(drawn, noise, rng) if noise else drawn
+                    found.append(replace(view, length_deviation=stated))
     return found
+
+
+def length_deviation(joints: Array) -> float:
+    """Return the root mean square relative deviation of the lengths of postures (N, 14, 3) from their medians."""
+    lengths = np.log(lengths_in_frames(joints))
+    return float(np.sqrt(((lengths - np.median(lengths, axis=1, keepdims=True)) ** 2).mean()))
+
+
+def shares(count: int, parts: int) -> list[int]:
+    """Divide a number into parts that differ by one at most."""
+    return [count // parts + (k < count % parts) for k in range(parts)]
+
+
+def clips_by_body(motions: Iterable[Motion]) -> list[list[Motion]]:
+    """Return the clips of each body; clips with limbs of equal lengths are of one body."""
+    bodies: list[tuple[Array, list[Motion]]] = []
+    for clip in motions:
+        lengths = segment_lengths(clip.figure_joints)
+        limbs = np.array([lengths[segment_name(pair)] for pair in LIMB_SEGMENTS])
+        for own, clips in bodies:
+            if np.abs(own - limbs).max() <= SAME_BODY_METRES:
+                clips.append(clip)
+                break
+        else:
+            bodies.append((limbs, [clip]))
+    return [clips for _, clips in bodies]
 
 
 def trial_views(folder: Path, stature: float) -> Iterator[tuple[str, View]]:
@@ -191,7 +224,7 @@ def row(name: str, parts: list[Found]) -> tuple[str, ...]:
 
 def main() -> None:
     made = parser(__doc__)
-    made.add_argument("--views", type=int, default=96)
+    made.add_argument("--views", type=int, default=600)
     made.add_argument("--noise", type=float, default=2.0)
     made.add_argument("--trial", type=Path)
     made.add_argument("--stature", type=float, default=1.75)
