@@ -115,7 +115,7 @@ class ClosedForm:
         Vectors from the neck to the head points, in the head link's frame, metres.
     middle_pelvis : bool
         Whether the pelvis joint is between the hips. The spine then determines the orientation of the hips, and the
-        pelvis gets the smallest flexion for which the flexion of both hips is inside its limits, if possible.
+        pelvis gets the smallest flexion for which the flexion of both hips is inside the limits, if possible.
     """
 
     limits: Limits

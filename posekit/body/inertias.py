@@ -5,8 +5,8 @@ inertia parameters", J Biomech 29:1223, Table 4. They are means of women and men
 length. The trunk extends from the cervicale to the middle of the hips, the shank to the centre of the ankle. Body parts
 that are no segment of the figure use another length: head and trunk use the distance from the neck to the middle of the
 hips, the hand uses the forearm's length, and the foot (placed at the ankle) uses the shank's length. The trunk below
-the navel belongs to the hips link. The torso link has the moments of the whole trunk minus those of the lower trunk
-(Steiner's theorem).
+the navel belongs to the hips link. The torso link has the moments of the whole trunk minus the moments of the lower
+trunk (Steiner's theorem).
 """
 
 from __future__ import annotations

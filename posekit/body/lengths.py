@@ -228,7 +228,7 @@ LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 
 
 def lay(joints: Array, lengths: Array) -> Array:
-    r"""Move postures (F, 14, 3) to the nearest ones with given segment lengths (F, 17).
+    r"""Move postures (F, 14, 3) to the nearest postures with given segment lengths (F, 17).
 
     Newton steps minimise :math:`|x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. If they do not converge, e.g.
     because a segment has length zero, joints are placed one by one from the neck outward, along the given directions.

@@ -147,7 +147,7 @@ def _shoulders_behind(joints: Array) -> bool | None:
 
 @lru_cache(maxsize=8)
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
-    """Return a figure with the lengths of a person, as far as they are plausible.
+    """Return a figure with the plausible lengths of a person.
 
     Implausible lengths are replaced by the figure's lengths at the person's size. If no plausible body is near the
     lengths, all lengths except the limbs' are replaced. Results are cached, so that clips of one skeleton share a
@@ -184,6 +184,6 @@ def scaled_to(joints: Array) -> Figure:
     """Scale the built-in figure to the median segment lengths of postures (N, 14, 3) or (N, 19, 3), metres.
 
     Unknown segments keep the built-in lengths. Lengths do not distinguish a torso from its mirror image, so the side of
-    the shoulders is taken from the points.
+    the shoulders is computed from the points.
     """
     return load_figure().scaled(segment_lengths(joints), behind=shoulders_are_behind(joints))

@@ -12,8 +12,8 @@ from posekit.geometry import Array
 #: Real numbers, or complex numbers for complex-step derivatives.
 Numbers = NDArray[Any]
 
-#: Numbers of coefficients of OpenCV's models: Brown's four or five, the rational model's eight, twelve with thin
-#: prism, fourteen with a tilted sensor. The fisheye model has none or four.
+#: Numbers of coefficients of OpenCV's models: Brown's four or five, the rational model's eight, twelve with thin prism,
+#: fourteen with a tilted sensor. The fisheye model has no coefficients or four.
 COEFFICIENT_COUNTS: Final = (0, 4, 5, 8, 12, 14)
 
 #: Largest accepted coefficient: far above any lens, and products of five coefficients remain finite.
@@ -87,7 +87,7 @@ def lens_radius(normalized: Array, *, fisheye: bool = False) -> Array:
 
 
 def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
-    r"""Return the `lens_radius` at which the image folds back or the model has a pole; infinite if there is none.
+    r"""Return the `lens_radius` at which the image folds back or the model has a pole; infinite if neither happens.
 
     It is the first zero of the slope of the radial function, or of its denominator. Beyond it a polynomial fitted to a
     lens does not describe the lens.

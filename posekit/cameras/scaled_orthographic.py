@@ -11,7 +11,7 @@ from posekit.cameras.camera import COINCIDENT_METRES, Camera, Lift, per_frame, p
 from posekit.geometry import PER_METRE, Array
 
 #: Relative rounding error of coordinates. At the smallest possible s one segment is parallel to the image; despite
-#: rounding it must have one end, neither none nor two.
+#: rounding it must have exactly one possible end.
 BOUND_ROUNDING: Final = 1e-15
 
 

@@ -39,7 +39,7 @@ class View(Record):
     Parameters
     ----------
     camera : PinholeCamera, ScaledOrthographicCamera or LeeChenCamera
-        The camera, as far as it is known; lengths in metres.
+        The camera; unknown parameters are None, and lengths are in metres.
     time : array (F,)
         Seconds.
     image : array (F, 14, 2)
@@ -68,8 +68,8 @@ class View(Record):
     derived : tuple of str
         Joints of `image` that the detector does not report; they were computed from joints that it reports.
     head_points : mapping of str to array (3,), optional
-        Points of the rigid head in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them,
-        and any number of others under names of their own (Lee & Chen 1985, §2.1, recommend more than six).
+        Points of the rigid head in the head's frame, metres: the neck, some or all of `HEAD_POINTS`, and any number of
+        points with other names (Lee & Chen 1985, §2.1, recommend more than six points).
     unit : {"m", "cm", "mm"}
         Unit of lengths in the view's file; in memory all lengths are in metres.
     source : str

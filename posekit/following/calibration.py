@@ -51,7 +51,7 @@ def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] |
 
 
 def contradictions(camera: CameraModel, points: Array) -> list[str]:
-    """Describe contradictions: by the calibration the person is not upright, or in the picture upside down.
+    """List contradictions: a person who is not upright according to the calibration, or is upside down in the picture.
 
     The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. The two
     directions differ if the calibration maps camera to world, has y up in the camera, or states another up axis.

@@ -150,16 +150,17 @@ class Detections(Record):
         Parameters
         ----------
         which : int or str
-            Number of a person, see `people`. Or ``largest``, the default: the person with the largest share of the
-            pictures, summed over them; ``surest``: with the largest sum of confidences; ``first``: the first in the
-            first picture. In unrelated photographs, the rule is applied to each picture.
+            Number of a person (see `people`), or a rule: ``largest``, the default, is the person with the largest size
+            in the pictures, summed over pictures; ``surest`` is the person with the largest sum of confidences;
+            ``first`` is the first person in the first picture. In unrelated photographs, the rule is applied to each
+            picture.
         camera : str
             Name of the camera; the number in it selects the camera in a file of several cameras.
 
         Raises
         ------
         InputError
-            If nobody has that number.
+            If no person has this number.
         """
         numbers, rule = self.people(), str(which) or "largest"
         people, index = np.unique(numbers, return_inverse=True)

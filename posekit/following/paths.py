@@ -381,7 +381,7 @@ def _elsewhere(
     marginals: Sequence[Array],
     found: Sequence[Array],
 ) -> tuple[int, NDArray[np.bool_], float] | None:
-    """Find the frame and the ends in it that are most probable among those far from all paths found so far."""
+    """Find the frame, and the ends in it, that are most probable among all ends far from the paths found so far."""
     best, at = LEAST_SHARE, -1
     places: list[Array] = []
     away: list[NDArray[np.bool_]] = []

@@ -1,4 +1,4 @@
-"""`Tracker`: takes the key points of one picture at a time, and returns its posture and an earlier one on the path."""
+"""`Tracker`: takes the key points picture by picture, and returns its posture and an earlier posture of the path."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class TrackedPosture(Record):
 
 
 class Tracker:
-    """Recovers one picture per call, and follows the person.
+    """Recovers the posture in one picture per call, and follows the person from picture to picture.
 
     `posekit.recover` finds the postures of each picture alone; only the path uses earlier pictures.
 
@@ -182,7 +182,7 @@ class Tracker:
         counts = (len(self.names),) if self.layout else (len(JOINTS), len(POINTS))
         if table.ndim != 2 or len(table) not in counts or table.shape[1] not in (2, 3):
             expected = f"({' or '.join(map(str, counts))}, 2) or 3 columns"
-            raise refusal("Tracker", "points", f"shape {table.shape}", expected, "give NaN for gaps")
+            raise refusal("Tracker", "points", f"shape {table.shape}", expected, "give NaN for unseen points")
         recovery = None
         try:
             recovery = recover(self._view(table, time, root), self.settings)

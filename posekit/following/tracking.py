@@ -153,7 +153,7 @@ def _median(values: Array) -> Array:
 
 
 def _similarity(expected: Array, seen: Array, sizes: Array, reach: Array) -> Array:
-    """Compare expected people (T, P, 2) with seen ones (N, P, 2): similarities (T, N)."""
+    """Return the similarities (T, N) of expected people (T, P, 2) and seen people (N, P, 2)."""
     squared = ((expected[:, None] - seen[None]) ** 2).sum(axis=-1)
     falloff = FALLOFF**2 + (MOTION_SIGMA * reach[:, None, None]) ** 2
     alike = np.exp(-squared / (2 * np.nan_to_num(sizes, nan=1.0)[..., None] * falloff))

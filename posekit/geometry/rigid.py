@@ -35,7 +35,7 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
         R; NaN if M has a NaN.
     values : array (..., 3)
         The diagonal of D S: singular values in descending order; the last is negative if det M < 0. The best rotation
-        is unique if the sum of the last two is positive.
+        is unique if the sum of the last two values is positive.
     """
     known = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
     if not known.any():
@@ -136,8 +136,7 @@ def mpjpe(points: ArrayLike, target: ArrayLike) -> Array:
 
     Returns
     -------
-    array (...)
-        In their unit; NaN if no point is known in both.
+    array (...)        In the unit of the points; NaN if no point is known in both sets.
     """
     return mean_known(np.sqrt(_squared(*_paired(points, target))))
 

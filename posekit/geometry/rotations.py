@@ -44,7 +44,7 @@ def rotation_from_vector(vectors: Array) -> Array:
 
 
 def vector_from_rotation(R: Array) -> Array:
-    """Return the rotation vectors (..., 3), no longer than pi, of rotations (..., 3, 3)."""
+    """Return the rotation vectors (..., 3), with lengths of at most pi, of rotations (..., 3, 3)."""
     return quaternion_log(quaternion_from_rotation(R))
 
 

@@ -76,8 +76,8 @@ def log_room(joints: Array) -> Array:
 
     A direction is a point on the unit sphere, and its image is the projection of that point:
     :math:`d\omega = dA / |\cos\theta|`, with :math:`\theta` the angle between segment and ray. The same area of the
-    image corresponds to more directions if the segment is parallel to the image than if it points to the camera. Noise
-    limits the density: :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
+    image corresponds to more directions if the segment is parallel to the image than if it points to the camera.
+    Because noise blurs directions, :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
 
     Parameters
     ----------

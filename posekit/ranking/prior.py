@@ -114,7 +114,7 @@ class StudentMixture(Record):
         left = np.column_stack([points, dot(points, points), np.ones(len(points))])
         right = np.column_stack([-2 * middles, np.ones(len(middles)), self.dof + dot(middles, middles)])
         power = (self.dof + count) / 2
-        # In place: new arrays of this size take longer than the arithmetic.
+        # In place, because the allocation of arrays of this size is slower than the arithmetic.
         log = np.log(left @ (right.T / self.dof))
         log *= -power
         nearest = log.max(axis=1)

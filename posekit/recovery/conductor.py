@@ -275,7 +275,7 @@ class _Conductor:
         return found
 
     def about(self) -> dict[str, Any]:
-        """Return the settings and tolerances that decided the result, as JSON values."""
+        """Return the settings and tolerances behind the result, as JSON values."""
         tolerances: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
         if "noisy" in vars(self):
             tolerances["noisy"] = {

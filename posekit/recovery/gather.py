@@ -19,7 +19,7 @@ from posekit.recovery.sight import Sight
 from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS
 
-#: Rejected leaves of a frame for which no tree is grown.
+#: Rejected leaves of a frame without a tree.
 LOST: Final = {"root/not_known": 8192}
 
 #: Difference in depth (metres) below which neither end of a segment is nearer.
@@ -38,7 +38,7 @@ class Gathering:
     settings : RecoverSettings
     nearer : int array (F, 17)
         Stated depth order of segments: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer,
-        0 if nothing is given.
+        0 if it is not stated.
     """
 
     def __init__(
@@ -181,7 +181,8 @@ class Gathering:
         Parameters
         ----------
         margins : callable
-            Maps postures (N, 19, 3) and whether each was found under noise (N,) to their margins by check.
+            Function of postures (N, 19, 3) and a mask (N,) of the postures found under noise; it returns their margins
+            by check.
         **about
             ``settings`` and ``tolerances`` of the result.
         """

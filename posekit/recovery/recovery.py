@@ -60,7 +60,7 @@ class Table(Record):
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
     def columns(self) -> dict[str, Any]:
-        """Return all columns except derived ones, by name."""
+        """Return all columns by name, without derived columns."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.metadata}  # type: ignore[arg-type]
 
 
@@ -286,7 +286,7 @@ class Recovery(Record):
     path : Paths, optional
         Paths through the frames, if following was requested.
     settings : mapping
-        Settings that decided the result; plain numbers, strings and lists.
+        Settings that the result depends on, as plain numbers, strings and lists.
     tolerances : mapping
         Tolerances of exact and tolerated frames, and the noise assumed in other frames.
     lengths : mapping of str to float
@@ -342,7 +342,7 @@ class Recovery(Record):
         return Frame(number=number, answer=self.answer.joints[number], **entries, **columns)
 
     def __iter__(self) -> Iterator[Frame]:
-        """Go through the frames."""
+        """Iterate over the frames."""
         return (self[k] for k in range(len(self)))
 
     def rows(self, k: int) -> slice:

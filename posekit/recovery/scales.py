@@ -45,8 +45,8 @@ LONGEST_TOO_SHORT: Final = 0.3
 def point_offsets(points: Array, scale: Array) -> Array:
     """Return the standard deviations (N, 14), metres, of the points (N, 14, 2) of photographs at scales (N,).
 
-    Parts of the body that are nearer to the camera look larger. The distance of the camera is unknown, so the deviation
-    grows with the distance of a point from the middle of the body.
+    Body parts that are nearer to the camera look larger. The distance of the camera is unknown, so the deviation grows
+    with the distance of a point from the middle of the body.
     """
     metres = (points - np.nanmean(points[:, :6], axis=1, keepdims=True)) / scale[:, None, None]
     aside = np.nan_to_num(np.linalg.norm(metres, axis=2))

@@ -21,7 +21,7 @@ from posekit.recovery.scales import SCALE_DEVIATIONS, figure_linkage, likely_sca
 from posekit.settings import RecoverSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
-#: Standard deviation (pixels) of image points if none is stated: of a detector's key points, and of other points.
+#: Default standard deviation (pixels) of a detector's key points, and of other image points.
 KEY_POINT_PIXELS, UNSTATED_PIXELS = 3.0, 1.0
 
 #: Standard deviation (pixels) of image points that may be exact, in frames without a tree because a joint or the neck
@@ -32,8 +32,8 @@ SHARP_PIXELS: Final = 0.3
 #: by a power of the confidence (fitted on Pose2Sim's recordings).
 JOINT_OFFSET, OFFSET_POWER = 0.012, 0.7
 
-#: Confidence of a detector's point if none is given, and least confidence used for the offset in metres and for the
-#: noise in pixels.
+#: Default confidence of a detector's point, and smallest confidences used for the offset in metres and for the noise in
+#: pixels.
 UNSTATED_CONFIDENCE, LEAST_OFFSET_CONFIDENCE, LEAST_CONFIDENCE = 0.5, 0.05, 0.25
 
 #: Largest accepted distance of a given root from the neck's ray, metres.
@@ -225,7 +225,7 @@ def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) 
 
 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
-    """Return facts about the camera of frame k; for Lee & Chen's camera, rotation and position are those of Table 2."""
+    """Return facts about the camera of frame k; for Lee & Chen's camera, rotation and position as in Table 2."""
     model = view.camera
     record: dict[str, Any] = dict.fromkeys(("f", "rotation", "position", "residual"))
     if isinstance(model, LeeChenCamera) and model.f is not None:

@@ -117,7 +117,7 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
 
 
 def _check_mesh_file(path: Path) -> int:
-    """Return the size of a mesh file, bytes; refuse files that are too large to read or name other files."""
+    """Check a mesh file and return its size, bytes."""
     check, suffix, size = partial(need, path), path.suffix.lower(), path.stat().st_size
     ok = suffix in (".stl", ".obj", ".dae") and 0 < size <= MAX_MESHES_BYTES
     expected = f"a mesh (.stl, .obj, .dae) of at most {MAX_MESHES_BYTES / 1e6:.0f} MB"

@@ -32,7 +32,7 @@ FLAT: Final = 1e-6
 def set_pairs(
     model: pin.Model, geometry: pin.GeometryModel, neutral: Array, parts: Collection[tuple[str, str]]
 ) -> None:
-    """Choose the pairs of bodies to check for a robot whose SRDF disables none.
+    """Choose the pairs of bodies to check for a robot whose SRDF disables no pair.
 
     Neighbours and pairs that touch in the neutral configuration are removed. Capsules of a humanoid's parts are checked
     only if the stick figure checks the same parts: `parts` has the names of its pairs of bodies.
@@ -66,7 +66,7 @@ def disable_pairs(model: pin.Model, geometry: pin.GeometryModel, srdf: str, sour
     Raises
     ------
     InputError
-        If the text is no SRDF, or the robot has none of its links.
+        If the text is no SRDF, or the robot has no link that the SRDF names.
     """
     root = parse_xml(srdf, source)
     need(source, root.tag == "robot", "", f"the root element <{cut(root.tag)}>", "<robot>", "name an SRDF")

@@ -32,10 +32,10 @@ class Site(NamedTuple):
 class Kinematics:
     """Batched positions and Jacobians of points that are fixed to the joints of a model.
 
-    The results equal those of Pinocchio's `forwardKinematics` and joint Jacobians up to rounding, at about 30 times the
-    speed of a loop over configurations. Arrays inside have the batch as their last axis, and a frame lists its axes x,
-    y, z as rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a
-    hinge then changes the axes x and y alone.
+    The results equal Pinocchio's `forwardKinematics` and joint Jacobians up to rounding, at about 30 times the speed of
+    a loop over configurations. Arrays inside have the batch as their last axis, and a frame lists its axes x, y, z as
+    rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a hinge then
+    changes the axes x and y alone.
 
     Parameters
     ----------
@@ -153,8 +153,8 @@ def frame_places(model: pin.Model, q: Array, frames: Sequence[int]) -> Array:
 def _mix(parent: Array, translation: Array, rotation: Array) -> Array:
     """Return the axes x, y, z and the origin of a frame (4, 3) in the chosen axes of its parent.
 
-    `rotation` (3, 3) and `translation` (3,), metres, place the frame in its parent; the parent's own axes are turned by
-    the rotation `parent` (3, 3).
+    `rotation` (3, 3) and `translation` (3,), metres, place the frame in its parent; the rotation `parent` (3, 3) maps
+    the chosen axes of the parent to the parent's frame.
     """
     return np.vstack([rotation.T, translation]) @ parent
 

@@ -53,8 +53,8 @@ class Robot(Record):
     package_dirs : tuple of Path
         The only directories from which meshes are read.
     fixed_base : bool
-        Whether the root is fixed, as for an arm. Otherwise it moves freely, with the URDF's own floating joint if there
-        is one.
+        Whether the root is fixed, as for an arm. Otherwise the root has a floating joint, which is added if the URDF
+        has none.
     bodies : {"meshes", "capsules", "none"}
         Collision bodies. ``meshes`` are the bodies of the URDF. ``capsules`` replace its meshes, or lie along the limbs
         if the URDF has no bodies.
@@ -308,7 +308,7 @@ class Robot(Record):
     def velocities(self, q: Array, time: Array) -> Array:
         """Return the joint velocities (T - 1, nv) between configurations (T, nq) at times (T,): rad/s and m/s.
 
-        They are those of `pinocchio.difference`: a floating root has a twist in its own frame, linear part first.
+        The velocity of a floating root is a twist in the root's frame, linear part first, as in `pinocchio.difference`.
         """
         steps = [pin.difference(self.model, a, b) for a, b in pairwise(q)]
         return np.array(steps).reshape(-1, self.model.nv) / np.diff(time)[:, None]
@@ -365,7 +365,7 @@ class Robot(Record):
         return SelfCollision(self.model, self.geometry)
 
     def _limits(self, given: Array, none: float) -> Array:
-        """Return limits (nq,) in which only joints with one entry of q keep their limit; other entries have none."""
+        """Return limits (nq,) for joints with one entry of q; the entries of other joints have the limit `none`."""
         return read_only(np.where(np.repeat(self.model.nqs, self.model.nqs) == 1, given, none))
 
 

@@ -35,7 +35,7 @@ def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     Parameters
     ----------
     robot : Robot
-        A humanoid. Other robots are returned as they are.
+        A humanoid. Other robots are returned unchanged.
     joints : array (N, 14, 3) or (14, 3)
         Metres; NaN is unknown. Segments that are unknown in all postures keep the robot's length.
 
@@ -113,7 +113,7 @@ def _wanted(own: Array, joints: Array, source: str) -> Array:
     """Return positions (14, 3) of the joints at neutral with the segment lengths of postures, metres.
 
     Torso and hips have the median shape of the postures in which all their joints are known, aligned with the robot's
-    joints. Limbs keep the robot's directions.
+    joints. Limb segments keep the directions that they have on the robot.
     """
     lengths, kept = segment_lengths(joints), segment_lengths(own[None])
     ratio = lengths / kept

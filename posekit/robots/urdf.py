@@ -63,7 +63,8 @@ _SINGLES: Final = (
 #: Elements whose numbers are coordinates or sizes, and all elements with numbers.
 _PLACED: Final = ("origin", "axis", *SIZES)
 _NUMERIC: Final = ("limit", "mimic", "mass", *_PLACED)
-#: Children of links and joints that the model is built from. Others, such as those of simulators, are removed.
+#: Children of links and joints that the model is built from. Other children, such as elements of simulators, are
+#: removed.
 _KEPT: Final = {
     "link": ("inertial", "collision", "visual", "collision_checking"),
     "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),

@@ -1,11 +1,11 @@
 r"""Joint ranges and their couplings as arrays of numbers, which the solver and the check of joint ranges share.
 
 A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball joint in the parent's
-frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. Up to four sets of angles give the same two
-directions. The limb is within its limits if every angle of one set is between its bounds. A bound is a constant or a
-piecewise linear function of another angle (a coupling). A range may also shrink if other angles of the joint are near
-their limits (a joint sinus). If the table has a bound of elevation, an arm is judged by elevation, plane of elevation
-and axial turn, because flexion and abduction are singular for an arm that points sideways.
+frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. Up to four sets of angles have the same two
+segment directions. The limb is within its limits if every angle of one set is between its bounds. A bound is a constant
+or a piecewise linear function of another angle (a coupling). A range may also shrink if other angles of the joint are
+near their limits (a joint sinus). If the table has a bound of elevation, an arm is judged by elevation, plane of
+elevation and axial turn, because flexion and abduction are singular for an arm that points sideways.
 """
 
 from __future__ import annotations

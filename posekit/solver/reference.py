@@ -345,7 +345,7 @@ def descend(
 
 
 def information(problem: Problem, which: Ints, x: Array, known: Array, parts: int = 31) -> Array:
-    """Return the information matrices (N, C, C): those of `evaluate`, plus weak priors of positions and turns.
+    """Return the information matrices (N, C, C): the normal matrices plus weak priors of positions and rotations.
 
     `known` (3,) has three numbers: the prior information on the position of a joint, and of a hidden joint, both in
     1/m^2; and the factor of the information on rotations (`posekit.solver.modes.TURN_INFORMATION`).

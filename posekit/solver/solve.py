@@ -65,7 +65,7 @@ def solve(
     problem : Problem
         F frames; each is solved alone.
     max_chi2 : float, optional
-        Largest chi2 of a mode. If not given, noise exceeds it with `REJECTION_PROBABILITY`.
+        Largest chi2 of a mode. By default noise alone exceeds it with probability `REJECTION_PROBABILITY`.
     most : int, optional
         Largest number of modes per frame, by lowest chi2; all modes if not given.
     pull : callable, optional

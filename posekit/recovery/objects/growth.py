@@ -30,7 +30,7 @@ MEASURED: Final = Tolerance(0.01, 0.02, 0.01)
 #: Depth of a segment, relative to the longest segment, below which both flips are the same posture.
 LEVEL: Final = 1e-6
 
-#: Largest residual of a minimum that satisfies the constraints exactly; other minima are used only if none does.
+#: Largest residual of a minimum that satisfies the constraints exactly; other minima are used only if no minimum does.
 CLOSED_RESIDUAL: Final = 1e-16
 
 #: Largest number of postures during the growth of a tree.

@@ -79,7 +79,8 @@ class ObjectRecovery(Record):
     distance : array (N,), optional
         Largest distance between a point of the configuration and the same point of the posture, metres or units.
     certified : bool array (N,), optional
-        True if a configuration within limits reaches the posture. False leaves it undecided.
+        True if a configuration within limits reaches the posture. False means undecided, because no such configuration
+        was found.
     frames : sequence of mapping
         ``time``, ``judged``, ``reason``, ``rejected`` and ``family`` (``how``, ``bound``, ``segment``, ``chosen``,
         ``minima``, ``curve``) of each frame.

@@ -186,7 +186,7 @@ def search(
     Parameters
     ----------
     family : LinkageFamily
-        The linkage in its image.
+        The linkage and its image points.
     weights : mapping
         Positive weight by kind of constraint: ``closure``, ``coplanar``, ``perpendicular``, ``collinear``.
     given : int array (S,), optional
