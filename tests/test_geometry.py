@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import posekit.geometry as g
 from posekit.errors import InputError, refusal, shown
+from posekit.geometry.least_squares import into_bounds
 
 N = 200
 
@@ -121,3 +122,42 @@ def test_a_refusal_is_one_line_that_names_everything():
     assert str(error).startswith("a\\nb.json: f: got")
     assert str(error).endswith("expected a number; give it")
     assert len(str(error)) < 300
+
+
+@pytest.mark.parametrize("strength", [0.5, 30.0])
+def test_smoothing_is_the_least_squares_of_whittaker(rng, strength):
+    """Values and their third differences, weighted; frames that are not loose are constants of the problem."""
+    values = rng.normal(size=(12, 3, 2))
+    loose = rng.uniform(size=(12, 3)) < 0.6
+    loose[:, 0], loose[:, 1] = True, False
+    found = g.smoothed(values, loose, strength)
+    np.testing.assert_array_equal(found[~loose], values[~loose])
+    third = np.diff(np.eye(12), n=3, axis=0)
+    for k in range(3):
+        free = loose[:, k]
+        A = np.concatenate([np.eye(12)[free], np.sqrt(strength) * third])
+        b = np.concatenate([values[free, k], np.zeros((len(third), 2))])
+        expected = np.linalg.lstsq(A[:, free], b - A[:, ~free] @ values[~free, k], rcond=None)[0]
+        np.testing.assert_allclose(found[free, k], expected, atol=1e-6)
+    parabola = np.arange(12.0)[:, None, None] ** 2 * np.ones((1, 3, 2))
+    np.testing.assert_allclose(g.smoothed(parabola, loose, strength), parabola, atol=1e-6)
+    np.testing.assert_array_equal(g.smoothed(values[:3], loose[:3], strength), values[:3])
+
+
+def test_the_shortest_steps_into_bounds_are_projections(rng):
+    """States on the wrong side of planes go to their edge, perpendicularly; free entries alone move."""
+    normals = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+    state = 0.05 * rng.normal(size=(40, 3))
+
+    def margins(one):
+        return one @ normals.T + 0.01
+
+    found = into_bounds(state, np.add, 3, range(3), margins)
+    wanted = state - np.minimum(margins(state), 0.0) @ normals
+    np.testing.assert_allclose(found, wanted, atol=1e-4)
+    inside = (margins(state) >= 0).all(axis=1)
+    assert inside.any() and not inside.all()
+    np.testing.assert_array_equal(found[inside], state[inside])
+    level = into_bounds(state, np.add, 3, [0, 2], margins)
+    np.testing.assert_array_equal(level[:, 1], state[:, 1])
+    assert (margins(level) > -1e-4).all()
