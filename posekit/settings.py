@@ -1,6 +1,6 @@
-"""Settings of a recovery and of a validation: one frozen record each, passed on as a whole.
+"""Settings of recoveries and validations as frozen records.
 
-The command line makes its options from the fields of these records. Lengths and pixels can be given as numbers or as
+The command-line options are made from the fields of these records. Lengths and image deviations can be numbers or
 text with a unit.
 """
 
@@ -17,7 +17,7 @@ from typing import Any, Final, Literal, Self, get_args
 from posekit.errors import nearest, refusal, shown
 from posekit.geometry import PER_METRE, UNIT_WORDS, Record
 
-#: Units of numbers given as text, and how many of each make one metre, pixel, degree, second or hertz; 100 % is one.
+#: Number of units in one metre, pixel, degree, second or hertz, for quantities given as text; 100 % is one.
 UNITS: Final = {
     **PER_METRE,
     "in": 1 / 0.0254,
@@ -79,18 +79,20 @@ def number(
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """Allowed differences between a posture and the body, for lengths and image points that are not exact.
+    """Tolerances of the checks of a posture, for lengths and image points that are not exact.
 
     Parameters
     ----------
     rigid : float
-        Distances within torso and hips, metres.
+                Tolerance of distances inside torso and hips, metres.
     tangent : float
-        Shortfall of a segment against its image, metres: its end is then put at the nearest point of the ray.
+        Largest distance by which a segment may miss the ray of its image point, metres. The joint is then placed at the
+        nearest point of the ray.
     angle : float
-        Directions of segments and joint angles, degrees.
+        Tolerance of segment directions and joint angles, degrees.
     hips : float
-        Allowed difference of the distance between the hips as a part of `rigid`, 0 to 1: the pelvis is bone.
+        Tolerance of the distance between the hips as a share of `rigid`, 0 to 1. It is smaller because the pelvis is
+        bone.
     """
 
     rigid: float
@@ -104,37 +106,38 @@ class Tolerance:
         return self.rigid <= EXACT.rigid
 
 
-#: Tolerance for exact image points: rounding only.
+#: Tolerance for exact image points: rounding errors only.
 EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9)
 
-#: For measured points and bodies: a real torso varies by centimetres (CMU motion capture, 16 clips).
+#: Tolerance for measured points. Distances inside a real torso vary by centimetres (CMU motion capture, 16 clips).
 MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, angle=2.0, hips=0.25)
 
-#: For uncalibrated pictures: the scale differs by some percent between near and far limbs.
+#: Tolerance for uncalibrated pictures. The true scale differs by some percent between near and far limbs.
 PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.05, angle=10.0)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Settings(Record):
-    """Settings that recoveries and validations share.
+    """Common settings of recoveries and validations.
 
     Parameters
     ----------
     checks : sequence of str or Check, optional
-        Checks by name, as ``module:Name``, or as objects; ``usual`` stands for the default ones.
+        Checks by name, as ``module:Name``, or as objects. ``usual`` selects the default checks.
     ranges : str
-        Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML table; ``auto``: anatomical, and for
-        configurations the limits of their URDF.
+        Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML file. ``auto`` selects ``urdf`` for
+        robot configurations and ``anatomical`` otherwise.
     rules : sequence of int
-        Rules of walking, 1 to 5, for the check ``walking``.
+        Numbers (1 to 5) of the walking rules that the check ``walking`` tests.
     walkers : {"paper", "people", "paper-printed"}
-        Source of the walking rules' thresholds: the paper, real walkers, or the paper as printed.
+        Thresholds of the walking rules: those of the paper or of real walkers. ``paper-printed`` also derives the
+        walking direction from the head, as printed.
     contact_margin : float
-        Distance that bodies must keep, metres; negative allows penetration.
+        Minimum distance between collision bodies, metres. A negative distance allows penetration.
     rigid_tolerance : float, optional
-        Allowed difference of distances within rigid parts, metres.
+        Tolerance of distances inside torso and hips, metres.
     angle_tolerance : float, optional
-        Allowed excess of joint angles beyond their range, degrees.
+        Tolerance of joint ranges, degrees.
     """
 
     checks: Sequence[Any] | None = None
@@ -166,7 +169,7 @@ class Settings(Record):
 
     @classmethod
     def of(cls, settings: Settings | None, **changes: Any) -> Self:
-        """Return the settings, the defaults if they are None, with the changes that are not None.
+        """Return the settings, or the defaults if None, with the changes that are not None.
 
         Raises
         ------
@@ -209,7 +212,7 @@ class Settings(Record):
         return (base or cls()).changed(**found)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields as JSON values; a check that is an object is given by its name."""
+        """Return the fields as JSON values; check objects are replaced by their names."""
         return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
 
     def _one_of(self, name: str, allowed: Sequence[str]) -> None:
@@ -219,7 +222,7 @@ class Settings(Record):
     def _number(
         self, name: str, lower: float | None, upper: float = math.inf, remedy: str = "correct it"
     ) -> None:
-        """Replace a quantity that is given as text by its number, and refuse one outside its bounds."""
+        """Convert a quantity from text to a number, and refuse a number outside the bounds."""
         given = getattr(self, name)
         if given is None:
             return
@@ -233,38 +236,41 @@ class Settings(Record):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RecoverSettings(Settings):
-    """Settings of a recovery: the fields of `Settings`, and those listed here.
+    """Settings of a recovery: the fields of `Settings` and the following fields.
 
     Parameters
     ----------
     tangent_tolerance : float, optional
-        Allowed shortfall of a segment against its image, metres.
+        Largest distance by which a segment may miss the ray of its image point, metres.
     deviation : float, optional
-        Standard deviation of the image points, pixels. The view's own by default.
+        Standard deviation of the image points, pixels. Default: the deviation that the view states.
     length_deviation : float, optional
-        Relative standard deviation of the body's size and of each length, 0 to 0.3; 0 means exact lengths.
+        Relative standard deviation of the person's size and of each segment length, 0 to 0.3. 0 means exact lengths.
     stature : float, optional
         Height of the person, metres.
     root : {"auto", "given", "head", "torso", "search"}
-        Source of the neck's place: the view, six head points, or the body. ``search`` is ``auto``.
+        Source of the neck's position: ``given`` uses the view's, ``head`` computes it from six head points, ``torso``
+        estimates it together with the body. ``auto`` selects the first known source; ``search`` means ``auto``.
     proportions : {"auto", "figure", "people", "taylor"}
-        Relative lengths of a person whose lengths are not given: the figure's; those of people's joints, the default
-        for key points and photographs; or, without a camera, Taylor's Table 1.
+        Relative segment lengths if none are given: ``figure`` (built-in human model), ``people`` (means of people, the
+        default for key points and photographs), or ``taylor`` (Taylor's Table 1, only without a camera).
     scale : str, optional
-        Scale of an uncalibrated view: ``min``, ``likely``, a number in pixels a metre, ``stature:PX`` or constraints
-        such as ``closure:1,coplanar:0.5``.
+        Scale of an uncalibrated view: ``min``, ``likely``, a number of pixels per metre, ``stature:PX``, or weighted
+        constraints such as ``closure:1,coplanar:0.5``.
     nearer : mapping or sequence of mapping, optional
-        Flips given by hand: segment to the name of its nearer end, for all frames or one mapping a frame.
+        For segments whose direction is known: segment name to the name of the joint nearer to the camera. One mapping
+        for all frames, or one mapping per frame.
     infer : bool
-        Infer the positions of unseen joints.
+        Infer the positions of joints without image points.
     refine : bool, optional
-        Treat image points as noisy. By default only if the points cannot be exact.
+        Treat image points as noisy. Default: only if the image points cannot be exact.
     coverage : float
-        Minimum share of the probability that the listed postures hold, 0 to 1.
+        Minimum total probability of the listed postures, 0 to 1.
     group : float, optional
-        Distance within which survivors form a group, metres.
+        Largest distance of any joint between a group's most probable survivor and its other survivors, metres.
+        Default: no groups.
     follow : int
-        Number of paths through the frames to follow; 0 for none.
+        Number of most probable paths through the frames to compute.
 
     Examples
     --------
@@ -302,7 +308,7 @@ class RecoverSettings(Settings):
         self._set("follow", int(self.follow))
 
     def tolerance(self, usual: Tolerance) -> Tolerance | None:
-        """Return the tolerance that is given, completed from the `usual` one; None if no part is given."""
+        """Return the given tolerances, completed from `usual`; None if no tolerance is given."""
         given = (self.rigid_tolerance, self.tangent_tolerance, self.angle_tolerance)
         if all(part is None for part in given):
             return None
@@ -315,28 +321,28 @@ class RecoverSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ValidateSettings(Settings):
-    """Settings of a validation: the fields of `Settings`, and those listed here.
+    """Settings of a validation: the fields of `Settings` and the following fields.
 
     Parameters
     ----------
     noise : float, optional
-        Standard deviation of measured coordinates, metres. By default it is estimated from the limbs' lengths.
+        Standard deviation of measured coordinates, metres. Default: estimated from the variation of limb lengths.
     strict : bool
-        Judge postures as the model's own: with its lengths, and a tolerance for rounding only.
+        Check that postures have the lengths of the human model, with tolerances for rounding errors only.
     ground : float, optional
-        Height of the ground along the up axis, metres. By default it is estimated from each clip.
+        Height of the ground along the up axis, metres. Default: estimated from each clip.
     profile : str
-        Checks over time and their thresholds: ``posekit``, ``phuma``, ``protomotions``, ``holomotion`` or the path of
-        a TOML table.
+        Profile of checks over time and their thresholds: ``posekit``, ``phuma``, ``protomotions``, ``holomotion``,
+        ``skating`` or the path of a TOML file.
     bodies : {"auto", "meshes", "capsules", "none"}
-        Collision bodies of a robot: its URDF's, capsules, or none. ``auto`` takes capsules if no two bodies of the URDF
-        can touch.
+        Collision geometries of a robot: ``meshes`` (those of the URDF), ``capsules`` or ``none``. ``auto`` selects
+        capsules if no two geometries of the URDF can touch.
     srdf : str, optional
-        Path of the robot's SRDF, which lists pairs that are not checked.
+        Path of the robot's SRDF. The collision check ignores the pairs of links that it disables.
     package_dirs : sequence of str
         Folders that hold the packages of the robot's meshes.
     joint_map : str, optional
-        Name or path of the table of frames that stand for the joints.
+        Name or path of the joint map, which maps frames of the robot to the 14 joints.
 
     Examples
     --------
@@ -369,7 +375,7 @@ def stated(**given: Any) -> dict[str, Any]:
 
 
 def picture_size(size: Any) -> tuple[int, int] | None:
-    """Return a width and a height, given as two numbers or as ``"1280x720"``; None if nothing is given."""
+    """Convert a size, given as two numbers or as ``"1280x720"``, to width and height; return None if not given."""
     if size is None or size == "":
         return None
     text = size if isinstance(size, str) or not isinstance(size, Iterable) else "x".join(map(str, size))
