@@ -119,6 +119,49 @@ def test_tolerances_grow_with_the_angle_of_an_arm_alone(angle: str, degrees: flo
         assert (row.lower, row.upper) == pytest.approx((lower - gain, upper + gain), abs=1e-6)
 
 
+@pytest.mark.parametrize(("ball", "hinge"), [("shoulder", "elbow"), ("hip", "knee")])
+@pytest.mark.parametrize("bend", [30.0, 60.0, 90.0, 125.0])
+def test_a_rotation_is_as_uncertain_as_its_limb_is_straight(ball: str, hinge: str, bend: float) -> None:
+    settings = posekit.ValidateSettings(ranges="urdf", strict=True, angle_tolerance=1.0)
+    validator = posekit.Validator(settings=settings, checks=["joint-range"])
+    for side in ("right", "left"):
+        place = f"{side}_{ball}.rotation"
+        upper = (ends_of("urdf", place) or (0.0, 0.0))[1]
+        pose = {f"{side}_{ball}__rotation": upper + 12.0, f"{side}_{hinge}__flexion": bend}
+        (row,) = validator.check(posed(**pose)).to_pandas().itertuples()
+        assert (row.place, row.value) == (place, pytest.approx(upper + 12.0))
+        assert row.upper == pytest.approx(upper + 1 / math.sin(math.radians(bend)))
+
+
+def coupled(angle: str, end: str, at: float) -> float:
+    """Return an end of an angle by another one, degrees: interpolated, with the spread between people."""
+    (one,) = (each for each in PEOPLE["coupling"] if (each["angle"], each["end"]) == (angle, end))
+    spread = PEOPLE["spreads"] * one["spread"]
+    return float(np.interp(at, *np.array(one["points"]).T)) + (spread if end == "upper" else -spread)
+
+
+@pytest.mark.parametrize("raised", [10.0, 25.0, 40.0, 60.0, 90.0])
+def test_a_raised_arm_turns_inward_by_less(raised: float) -> None:
+    upper = coupled("shoulder.turn", "upper", raised)
+    validator = posekit.Validator(checks=["joint-range"], strict=True)
+    for side in ("right", "left"):
+        pose = {"abduction": raised, "rotation": upper + 5.0}
+        given = {f"{side}_shoulder__{name}": angle for name, angle in pose.items()}
+        found = validator.check(posed(**given, **{f"{side}_elbow__flexion": 80.0})).to_pandas()
+        (row,) = found[found.place == f"{side}_shoulder.rotation"].itertuples()
+        assert (row.value, row.upper) == pytest.approx((upper + 5.0, upper), abs=ROUNDING)
+
+
+def test_a_straight_knee_stops_the_hip() -> None:
+    validator, zeros = posekit.Validator(checks=["joint-range"], strict=True), []
+    for bend in (2.0, 5.0, 13.5, 20.0, 30.0):
+        upper = coupled("hip.flexion", "upper", bend)
+        found = validator.check(posed(left_hip__flexion=upper + 5.0, left_knee__flexion=bend)).to_pandas()
+        (row,) = found[found.place == "left_hip.flexion"].itertuples()
+        zeros.append(row.upper - upper)
+    assert np.ptp(zeros) < ROUNDING and zeros[0] < 0  # the zero of the hip is that of the pelvis
+
+
 @pytest.mark.parametrize("degrees", [70.5, 120.0])
 def test_an_arm_is_raised_by_less_backward_than_forward(degrees: float) -> None:
     validator = posekit.Validator(checks=["joint-range"], strict=True)
