@@ -167,3 +167,19 @@ def test_protocols_and_wrappings_of_pickles_read_alike(protocol: int, wrapped: s
     found = posekit.open(tmp_path / "clip.pkl")
     assert found.rate == pytest.approx(RATE)
     np.testing.assert_array_equal(found.points(POINTS), walking().points(POINTS))
+
+
+@pytest.mark.parametrize("rooted", [False, True])
+def test_joints_of_a_robot_may_begin_with_its_root(rooted: bool, tmp_path: Path) -> None:
+    """As MuJoCo's qpos does, with w first in the quaternion."""
+    robot = posekit.load_robot("g1", bodies="none")
+    names = robot.configuration_names[7:]
+    q = np.tile(robot.neutral, (6, 1))
+    q[:, :3] = [[0.1 * k, 0.0, 0.8] for k in range(6)]
+    q[:, 7:] += np.random.default_rng(0).uniform(-0.2, 0.2, (6, len(names)))
+    root = {} if rooted else {"root_pos": q[:, :3], "root_rot": q[:, 3:7]}
+    joints = q[:, [0, 1, 2, 6, 3, 4, 5, *range(7, q.shape[1])]] if rooted else q[:, 7:]
+    np.savez(tmp_path / "a.npz", dof_pos=joints, dof_names=np.array(names), fps=RATE, **root)
+    found = posekit.open(tmp_path / "a.npz", urdf="g1")
+    order = [found.q_names.index(name) for name in robot.configuration_names]
+    np.testing.assert_allclose(found.q[:, order], q, atol=1e-12)

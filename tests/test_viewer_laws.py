@@ -564,3 +564,23 @@ def test_an_overlay_paints_the_rays_that_meet_a_capsule(folder: Path, parallel: 
                 met |= np.linalg.norm(across, axis=1) < capsule.radius
     both = (met & painted.ravel()).sum()
     assert met.mean() > 0.1 and both > 0.98 * met.sum() and both > 0.9 * (met | painted.ravel()).sum()
+
+
+@pytest.mark.parametrize("shift", [None, (0.3, -0.2, 2.0)])
+def test_a_motion_in_the_world_is_painted_as_its_camera_sees_it(folder: Path, shift: Any) -> None:
+    joints = random_views(2, np.random.default_rng(8)).truth
+    joints = joints - joints.mean(axis=1, keepdims=True) + [0.0, 0.0, 1.5]
+    R = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    t = np.zeros(3) if shift is None else np.array(shift)
+    K = np.array([[240, 0, 160], [0, 240, 120], [0, 0, 1.0]])
+    camera = PinholeCamera(K=K, size=(320, 240), R=R, t=None if shift is None else t, up="+z")
+    seen = posekit.View(camera=camera, image=camera.project(joints), truth=joints, time=np.arange(2) / 10)
+    world = Motion(joints=(joints - t) @ R, time=seen.time, up="+z")
+    Image.new("RGB", (320, 240), (80, 90, 90)).save(folder / "grey.png")
+    for name, source in (("truth", seen), ("world", world)):
+        for frame in (0, 1):
+            posekit.render(
+                source, folder / f"{name}{frame}.png", view=seen, over=folder / "grey.png", frame=frame
+            )
+    truth, moved = ([(folder / f"{name}{k}.png").read_bytes() for k in (0, 1)] for name in ("truth", "world"))
+    assert truth == moved and truth[0] != truth[1]
