@@ -46,9 +46,10 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
     held: list[Array] = []
     while len(rows):
         gain = np.bincount(one, rest[other], len(frame))[rows]
-        starts = np.flatnonzero(np.diff(frame[rows], prepend=-1))
+        new = np.concatenate([[True], frame[rows[1:]] != frame[rows[:-1]]])
+        starts = np.flatnonzero(new)
         most = np.maximum.reduceat(gain, starts)
-        each = np.repeat(most, np.diff(starts, append=len(rows)))
+        each = most[np.cumsum(new) - 1]
         equal = np.flatnonzero(gain > each - ROUNDED_PROBABILITY)
         best = rows[equal[np.searchsorted(equal, starts)]]  # the likeliest of equal gains
         chosen.append(best)

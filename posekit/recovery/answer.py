@@ -31,12 +31,11 @@ TAIL_SCALE: Final = 1.960 / 2.776
 
 
 def _tailed_draws() -> Array:
-    """Return fixed t-distributed numbers (64, 42); every row also occurs negated, so that the mean is zero."""
+    """Return fixed t-distributed numbers (32, 42); samples also have their negatives, so that their mean is zero."""
     rng = np.random.default_rng(1985)
     normal = rng.normal(size=(N_SAMPLES // 2, 42))
     spread = np.sqrt(TAIL_DEGREES_OF_FREEDOM / rng.chisquare(TAIL_DEGREES_OF_FREEDOM, len(normal)))
-    draws = TAIL_SCALE * spread[:, None] * normal
-    return np.concatenate([draws, -draws])
+    return np.asarray(TAIL_SCALE * spread[:, None] * normal)
 
 
 DRAWS: Final = _tailed_draws()
@@ -149,8 +148,9 @@ def joint_radius(covariance: Array) -> Array:
 
 def _drawn(covariance: Array, relative: Flags) -> Array:
     """Return S samples of the errors of N modes (N, S, 14, 3), metres; relative to the neck where `relative` (N,)."""
-    floor = ROUNDING * (1.0 + np.einsum("nii->n", covariance))
-    symmetric = (covariance + covariance.transpose(0, 2, 1)) / 2
-    root = np.linalg.cholesky(symmetric + floor[:, None, None] * np.eye(covariance.shape[1]))
-    off = (DRAWS @ root.transpose(0, 2, 1)).reshape(len(root), N_SAMPLES, -1, 3)
-    return np.asarray(off - np.where(relative[:, None, None, None], off[:, :, :1], 0.0))
+    regular = covariance.copy()
+    diagonal = np.einsum("nii->ni", regular)
+    diagonal += ROUNDING * (1.0 + diagonal.sum(axis=1, keepdims=True))
+    off = (DRAWS @ np.linalg.cholesky(regular).transpose(0, 2, 1)).reshape(len(regular), len(DRAWS), -1, 3)
+    off -= np.where(relative[:, None, None, None], off[:, :, :1], 0.0)
+    return np.concatenate([off, -off], axis=1)

@@ -226,10 +226,12 @@ class _Conductor:
     def _covariance(self, modes: Modes, rows: Ints) -> Array:
         """Return the covariances of the joints of selected modes (N, 42, 42), square metres."""
         found = modes.covariance(rows)
-        # In an uncalibrated picture a larger person at a larger distance looks the same, so size adds its own
-        # covariance.
-        x = self.lengths.common * modes.x[rows, :-1] if self.photograph else np.zeros((len(rows), 1))
-        return found + x[:, :, None] * x[:, None]
+        if self.photograph:
+            # In an uncalibrated picture a larger person at a larger distance looks the same, so size adds its own
+            # covariance.
+            x = self.lengths.common * modes.x[rows, :-1]
+            found += x[:, :, None] * x[:, None]
+        return found
 
     def _diagnose(self, sight: Sight, problem: Problem, empty: list[int]) -> None:
         """Store why frames `empty` have no posture: the largest residuals of a solution with larger deviations."""

@@ -264,6 +264,7 @@ inline int limb_at(int m, int i) { return 3 * (i < 3 ? MID[m] : END[m]) + i % 3;
 // inverse of the limb's factor), and of the trunk's block after the elimination of the limbs.
 struct Factor {
   double L[4][6][6], C[4][6][T], S[T][T];
+  int used[4][T], count[4] = {};  // a limb within its limits depends on three coordinates of the trunk, and the size
   unsigned parts;
 
   Factor(const Normal& n, double damping, unsigned which) : parts(which) {
@@ -281,57 +282,59 @@ struct Factor {
       }
       cholesky<6>(L[m]);
       if (!(parts & 1)) continue;
-      int used[T], count = 0;  // a limb within its limits depends on three coordinates of the trunk, and the size
       for (int c = 0; c < T; ++c)
-        for (int i = 0; i < 6; ++i)
-          if (C[m][i][c] != 0) {
-            used[count++] = c;
-            break;
-          }
-      for (int i = 0; i < 6; ++i) {
-        const double f = 1 / L[m][i][i];
-        for (int k = 0; k < i; ++k)
-          for (int c = 0; c < count; ++c) C[m][i][used[c]] -= L[m][k][i] * C[m][k][used[c]];
-        for (int c = 0; c < count; ++c) C[m][i][used[c]] *= f;
+        if (std::any_of(C[m], C[m] + 6, [&](const double* row) { return row[c] != 0; })) used[m][count[m]++] = c;
+      for (int a = 0; a < count[m]; ++a) {
+        const int c = used[m][a];
+        for (int i = 0; i < 6; ++i) {
+          for (int k = 0; k < i; ++k) C[m][i][c] -= L[m][k][i] * C[m][k][c];
+          C[m][i][c] /= L[m][i][i];
+        }
+        for (int b = 0; b <= a; ++b)
+          for (int k = 0; k < 6; ++k) S[used[m][b]][c] -= C[m][k][used[m][b]] * C[m][k][c];
       }
-      for (int c = 0; c < count; ++c)
-        for (int k = 0; k < 6; ++k)
-          for (int d = c; d < count; ++d) S[used[c]][used[d]] -= C[m][k][used[c]] * C[m][k][used[d]];
     }
     if (parts & 1) cholesky<T>(S);
   }
 
-  // The step x (N) for a gradient g.
-  void solve(const double g[N], double x[N]) const {
-    double t[T], l[4][6];
-    for (int i = 0; i < T; ++i) t[i] = -g[TRUNK_AT[i]];
+  // The steps x (N, K) for K gradients g.
+  template <int K>
+  void solve(const double g[N][K], double x[N][K]) const {
+    double t[T][K], l[4][6][K];
+    auto less = [](double* to, double times, const double* from) {
+      for (int k = 0; k < K; ++k) to[k] -= times * from[k];
+    };
+    auto divided = [](const double* from, double by, double* to) {
+      for (int k = 0; k < K; ++k) to[k] = from[k] / by;
+    };
+    for (int i = 0; i < T; ++i) divided(g[TRUNK_AT[i]], -1, t[i]);
     for (int m = 0; m < 4; ++m) {
       if (!(parts >> (m + 1) & 1)) continue;
       for (int i = 0; i < 6; ++i) {
-        l[m][i] = -g[limb_at(m, i)];
-        for (int k = 0; k < i; ++k) l[m][i] -= L[m][k][i] * l[m][k];
-        l[m][i] /= L[m][i][i];
-        if (parts & 1)
-          for (int c = 0; c < T; ++c) t[c] -= C[m][i][c] * l[m][i];
+        divided(g[limb_at(m, i)], -1, l[m][i]);
+        for (int k = 0; k < i; ++k) less(l[m][i], L[m][k][i], l[m][k]);
+        divided(l[m][i], L[m][i][i], l[m][i]);
+        for (int c = 0; c < count[m]; ++c) less(t[used[m][c]], C[m][i][used[m][c]], l[m][i]);
       }
     }
     if (parts & 1) {
       for (int i = 0; i < T; ++i) {
-        t[i] /= S[i][i];
-        for (int k = i + 1; k < T; ++k) t[k] -= S[i][k] * t[i];
+        divided(t[i], S[i][i], t[i]);
+        for (int k = i + 1; k < T; ++k) less(t[k], S[i][k], t[i]);
       }
       for (int i = T - 1; i >= 0; --i) {
-        for (int k = i + 1; k < T; ++k) t[i] -= S[i][k] * t[k];
-        x[TRUNK_AT[i]] = t[i] /= S[i][i];
+        for (int k = i + 1; k < T; ++k) less(t[i], S[i][k], t[k]);
+        divided(t[i], S[i][i], t[i]);
+        std::memcpy(x[TRUNK_AT[i]], t[i], sizeof t[i]);
       }
     }
     for (int m = 0; m < 4; ++m) {
       if (!(parts >> (m + 1) & 1)) continue;
       for (int i = 5; i >= 0; --i) {
-        if (parts & 1)
-          for (int c = 0; c < T; ++c) l[m][i] -= C[m][i][c] * t[c];
-        for (int k = i + 1; k < 6; ++k) l[m][i] -= L[m][i][k] * l[m][k];
-        x[limb_at(m, i)] = l[m][i] /= L[m][i][i];
+        for (int c = 0; c < count[m]; ++c) less(l[m][i], C[m][i][used[m][c]], t[used[m][c]]);
+        for (int k = i + 1; k < 6; ++k) less(l[m][i], L[m][i][k], l[m][k]);
+        divided(l[m][i], L[m][i][i], l[m][i]);
+        std::memcpy(x[limb_at(m, i)], l[m][i], sizeof l[m][i]);
       }
     }
   }
@@ -347,7 +350,7 @@ double descend(const Problem& p, const Limits* L, double* x, unsigned parts, int
   for (int steps = 0; steps < most && std::isfinite(chi2 + damping); ++steps) {
     const Normal& model = refused ? *ahead : *here;
     const Factor factor(model, damping, parts);
-    factor.solve(model.g, dx);
+    factor.solve<1>(reinterpret_cast<const double(*)[1]>(model.g), reinterpret_cast<double(*)[1]>(dx));
     double gain = 0;
     for (int i = 0; i < N; ++i) gain += dx[i] * ((damping + FLOOR) * dx[i] - model.g[i]);
     if ((gain <= PRECISION && damping <= ARRIVED_DAMPING) || damping > MOST_DAMPING ||
@@ -468,12 +471,10 @@ py::array_t<double> covariance(py::array problems, py::object limits, Longs whic
   py::array_t<double> found({which.size(), (py::ssize_t)SIZE, (py::ssize_t)SIZE});
   informed(problems, limits, which, at, known, [&](py::ssize_t k, const Normal& n) {
     const Factor factor(n, 0, 31);
-    for (int i = 0; i < SIZE; ++i) {
-      double unit[N] = {}, column[N];
-      unit[i] = -1;
-      factor.solve(unit, column);
-      std::memcpy(found.mutable_data(k, i), column, sizeof(double) * SIZE);
-    }
+    double units[N][SIZE] = {}, inverse[N][SIZE];
+    for (int i = 0; i < SIZE; ++i) units[i][i] = -1;
+    factor.solve<SIZE>(units, inverse);
+    std::memcpy(found.mutable_data(k), inverse, sizeof(double) * SIZE * SIZE);
   });
   return found;
 }
