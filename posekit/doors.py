@@ -178,14 +178,12 @@ def view_of(
         )
         raise refusal(name, "", kind_of(source), "a view or key points", remedy)
     known: CameraModel | None = opened_camera(camera, unit)
-    pixels = picture_size(size) or source.size
+    seen: Detections = replace(source, size=picture_size(size) or source.size)
     if known is None and fov is not None:
-        if pixels is None:
-            raise refusal(
-                "", "fov", shown(fov), "the pictures' size, too", "give it with --set size=1280x720"
-            )
-        known = camera_from_fov(pixels, fov, "horizontal")
-    return source.view(
+        if seen.size is None:
+            raise refusal("", "fov", shown(fov), "the pictures' size, too", "give a size, such as 1280x720")
+        known = camera_from_fov(seen.size, number(fov, "fov", "degrees"), "horizontal")
+    return seen.view(
         known or ScaledOrthographicCamera(scale=None),
         person=person,
         rate=rate,

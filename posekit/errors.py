@@ -31,6 +31,7 @@ MEANT: Final = {
     **dict.fromkeys(("out", "path", "filename"), ("output", "target")),
     **dict.fromkeys(("check", "judge"), ("checks", "validate")),
     **dict.fromkeys(("draw", "plot"), ("render",)),
+    "openpose": ("body_25",),
     "height": ("stature",),
     "floor": ("ground",),
     "limits": ("ranges",),
@@ -164,7 +165,9 @@ def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
         words.get("_".join(parts))
         or [one for one in valid if one == "-".join(reversed(parts))]
         or [one for one in valid if one in parts]
-        or dict.fromkeys(one for word in difflib.get_close_matches(given, words) for one in words[word])
+        or dict.fromkeys(
+            one for word in difflib.get_close_matches(given.lower(), words) for one in words[word]
+        )
     )
     return (
         f"did you mean {' or '.join(near)}?" if near else otherwise or f"valid names are {', '.join(valid)}"

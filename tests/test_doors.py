@@ -484,3 +484,50 @@ def test_findings_in_an_array_are_numbered_by_its_rows() -> None:
 def test_assert_valid_judges_a_file_by_its_own_robot(folder: Path) -> None:
     with pytest.raises(AssertionError, match="left_elbow_joint"):
         posekit.assert_valid(folder / "robot.npz")
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: posekit.Motion(joints=STANDING, joint_name=("neck",)), r"Motion: joint_name: .*joint_names"),
+        (lambda: posekit.ValidateSettings(tolerance=1), r"tolerance: .*rigid_tolerance"),
+        (lambda: posekit.Judgement(places=(), values=[]), r"Judgement: values: .*did you mean value\?"),
+        (lambda: posekit.Motion(joints=np.zeros((2, 17, 3))), "state their names"),
+        (lambda: posekit.validate(True), "bool|true|shape"),
+        (lambda: posekit.validate(np.zeros((5, 14, 3), complex)), "complex128"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), layout="COCO"), "did you mean coco_1"),
+        (lambda: posekit.recover(np.ones((1, 25, 2)), layout="openpose"), "did you mean body_25"),
+        (lambda: posekit.recover(np.ones((1, 17, 2)), layout="coco_17", fov="wide", size="9x9"), "fov"),
+        (
+            lambda: posekit.save(posekit.Motion(joints=STANDING), "x.csv", rate=30),
+            "rate: got an unknown argument",
+        ),
+        (lambda: posekit.validate(STANDING, checks=[len]), r"with @posekit\.check"),
+        (lambda: posekit.validate(STANDING, checks="joint_ranges"), "^checks: .*did you mean joint-range"),
+    ],
+)
+def test_a_slip_is_answered_by_what_is_meant(call: Any, says: str) -> None:
+    with pytest.raises(posekit.InputError, match=says):
+        call()
+
+
+def test_facts_of_pictures_are_used(folder: Path, tmp_path: Path) -> None:
+    """Points that are fractions of a picture need its size; a field of view may be text."""
+    found = posekit.open(folder / "keypoints")
+    parts = np.concatenate([found.points / (1280, 720), found.confidence[..., None]], axis=-1)
+    known: dict[str, Any] = {"names": found.names, "frame": found.frame, "film": True, "person": found.person}
+    fractions = posekit.Detections(points=parts[..., :2], confidence=parts[..., 2], **known)
+    with pytest.raises(posekit.InputError, match="give the size"):
+        posekit.recover(fractions, rate=10)
+    text = posekit.recover(fractions, rate=10, fov="60 degrees", size="1280x720")
+    pixels = posekit.recover(found, rate=10, fov=60, size=(1280, 720))
+    assert text.camera == pixels.camera
+    np.testing.assert_allclose(text.answer.joints, pixels.answer.joints, atol=1e-6)
+
+
+def test_a_stated_unit_is_the_unit_of_the_written_file(folder: Path, tmp_path: Path) -> None:
+    posekit.save(posekit.open(folder / "jump.bvh"), tmp_path / "jump.bvh", unit="inches")
+    offsets = [
+        line.split()[2] for line in (tmp_path / "jump.bvh").read_text().splitlines() if "OFFSET" in line
+    ]
+    assert 10 < max(abs(float(one)) for one in offsets) < 25  # a thigh in inches

@@ -304,17 +304,16 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
     found = found() if isinstance(found, type) else found
     what = getattr(found, "name", None) or type(found).__name__
     if not isinstance(found, Check):
-        missing = [name for name in ("name", "unit", "reads", "judge") if not hasattr(found, name)]
-        raise refusal(
-            "--checks", str(what), f"no {', no '.join(missing)}", "name, unit, reads and judge", "add them"
-        )
+        got = [f"no {name}" for name in ("name", "unit", "reads", "judge") if not hasattr(found, name)]
+        remedy = "make it with @posekit.check"
+        raise refusal("checks", str(what), ", ".join(got), "name, unit, reads and judge", remedy)
     if not CHECK_NAME.fullmatch(found.name):
         raise refusal(
-            "--checks", "name", repr(cut(found.name)), "lower-case words joined by -", "rename the check"
+            "checks", "name", repr(cut(found.name)), "lower-case words joined by -", "rename the check"
         )
     if wrong := [name for name in found.reads if name not in READABLE]:
         raise refusal(
-            "--checks", f"{what}: reads", repr(wrong[0]), f"some of {', '.join(READABLE)}", "correct it"
+            "checks", f"{what}: reads", repr(wrong[0]), f"some of {', '.join(READABLE)}", "correct it"
         )
     return found
 
@@ -329,7 +328,7 @@ def _named(given: str, known: Mapping[str, Any]) -> Any:
     entries = entry_points(group=ENTRY_POINTS)
     if name not in entries.names and ":" not in given:
         names = (*known, *sorted(entries.names))
-        raise refusal("--checks", "", repr(cut(given)), "a check", nearest(given, names))
+        raise refusal("checks", "", repr(cut(given)), "a check", nearest(given, names))
     entry = entries[name] if name in entries.names else EntryPoint(given, given, ENTRY_POINTS)
     here = str(Path.cwd())
     sys.path.insert(0, here)
@@ -337,6 +336,6 @@ def _named(given: str, known: Mapping[str, Any]) -> Any:
         return entry.load()
     except (ImportError, AttributeError) as error:
         got, remedy = cut(given), f"it cannot be imported ({error})"
-        raise refusal("--checks", "", got, "a module and a name in it", remedy) from None
+        raise refusal("checks", "", got, "a module and a name in it", remedy) from None
     finally:
         sys.path.remove(here)

@@ -81,7 +81,7 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
     if settings.checks is None:
         return usual
     if not settings.checks:
-        raise refusal("--checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
+        raise refusal("checks", "", "none", "one or more", f"choose among {', '.join(KNOWN)}")
     over_time = {**MOTION_CHECKS, **{one.name: one for one in profile}}
     asked = [one for given in settings.checks for one in (usual if given == "usual" else [given])]
     found = {one.name: one for one in (find_check(one, {**KNOWN, **over_time, **own}) for one in asked)}
@@ -425,8 +425,7 @@ class Validator:
                 robot = figure
             else:
                 motion = replace(motion, joints=figure.points(motion.q), joint_names=JOINTS)
-        report = validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
-        return report if isinstance(given, Motion) else replace(report, frame=np.arange(len(report)))
+        return validate_motion(motion, self.settings, robot=robot, figure=figure, tolerance=tolerance)
 
     def motion(self, given: ArrayLike, head: ArrayLike | None = None) -> Motion:
         """Return an array of postures as a motion whose frames are not successive in time.

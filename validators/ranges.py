@@ -54,7 +54,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
         return None
     if name == "table1-printed":
         return {**(load_ranges("table1") or {}), "kind": "projected"}
-    table = read_table("anatomical" if name == "auto" else name, "ranges", NAMED, RANGES_SCHEMA, "--ranges")
+    table = read_table("anatomical" if name == "auto" else name, "ranges", NAMED, RANGES_SCHEMA, "ranges")
     kind = table.get("kind")
     if kind not in KINDS:
         raise refusal(name, "kind", shown(kind), f"one of {', '.join(KINDS)}", "state it")

@@ -247,7 +247,7 @@ class Detections(Record):
         if known.size and np.median(known) <= FRACTIONS_UP_TO:
             if size is None:
                 got = "points that are fractions of the picture"
-                raise refusal(self.source, "size", got, "the picture's size", "give a camera with its size")
+                raise refusal(self.source, "size", got, "the picture's size", "give the size")
             points *= size
         if pinhole:
             check_pictures(pinhole, points, self.size)

@@ -28,8 +28,7 @@ def has_layout(given: Any, layout: str | None) -> bool:
     if not isinstance(given, list | tuple | np.ndarray):
         return False
     shape = numbers(given, "array").shape
-    known = len(shape) == 3 and shape[1] in (len(JOINTS), len(POINTS))
-    return bool(shape) and (bool(layout) or (len(shape) == 3 and not known))
+    return bool(layout) or (len(shape) == 3 and shape[1] not in (len(JOINTS), len(POINTS)))
 
 
 def motion_of(values: Any, options: Options) -> Motion:

@@ -278,7 +278,7 @@ def _check_depth(body: Array, source: str) -> None:
         for k in range(3):
             if np.ptp(known[:, k]) == 0:
                 got = f"{known[0, k]:g} for every joint in every frame"
-                remedy = "these are points in a picture: recover them, and give the result"
+                remedy = "these are points in a picture: give the array to posekit.recover"
                 raise refusal(source, f"{'xyz'[k]} coordinate", got, "three coordinates that vary", remedy)
 
 

@@ -250,7 +250,7 @@ def with_points(data: bytes, document: C3d, points: Array) -> bytes:
     return data[: document.start] + values.tobytes() + data[document.start + values.nbytes :]
 
 
-def write(path: str | Path, motion: Motion, **_: Any) -> None:
+def write(path: str | Path, motion: Motion) -> None:
     """Write the points of one recording as C3D: 32-bit floats in metres, with unchanged axes.
 
     The up axis is stored in ``POINT:Y_SCREEN``. A missing point has the residual -1. Times are stored as a rate.

@@ -10,7 +10,7 @@ same angles in the same order.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from posekit.formats.body_checks import METRES
 from posekit.formats.bvh import Bvh, holds
 from posekit.formats.layout import load_layout
 from posekit.formats.trc import even_step, one_recording
-from posekit.geometry import Array, rotation_from_quaternion, up_vector
+from posekit.geometry import UNIT_WORDS, Array, rotation_from_quaternion, up_vector
 from posekit.geometry.rotations import coordinate_rotation, rotation_between
 from posekit.skeleton import DOFS, POINT
 
@@ -160,7 +160,7 @@ def euler_angles(R: Array) -> Array:
     return ball_branch(flat).reshape(R.shape[:-1])
 
 
-def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -> None:
+def write_bvh(path: str | Path, motion: Motion, *, unit: str | None = None) -> None:
     """Write one recording as BVH, y up; a motion read from BVH keeps its hierarchy, names and channels.
 
     Joints of the figure have the channels Xrotation Zrotation Yrotation: flexion, abduction (or bending) and rotation.
@@ -171,15 +171,16 @@ def write_bvh(path: str | Path, motion: Motion, *, unit: str = "cm", **_: Any) -
     InputError
         If the motion has several recordings, uneven times, or no body.
     """
-    if isinstance(motion.document, Bvh) and holds(motion.document, motion):
+    if unit is None and isinstance(motion.document, Bvh) and holds(motion.document, motion):
         write_bytes(path, motion.document.text.encode())
         return
-    if unit not in METRES:
+    metres = METRES.get(UNIT_WORDS.get(str(unit or "cm").lower(), ""))
+    if metres is None:
         raise refusal(path, "unit", repr(unit), f"one of {', '.join(METRES)}", "state one of them")
     from posekit.body.angles import continuous
 
     figure, root, angles = figure_in_tree(motion, "BVH")
-    scale = 1.0 / METRES[unit]
+    scale = 1.0 / metres
     values = np.hstack([root * scale, np.degrees(continuous(angles)).reshape(len(root), -1)])
     values = np.round(values, 6) + 0.0  # no -0.000000
     hierarchy = "".join(_block(0, offsets(figure) * scale, 0))

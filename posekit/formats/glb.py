@@ -79,7 +79,7 @@ class _Glb:
         return head + b"".join(chunks) + bytes(self.data)
 
 
-def write(path: str | Path, motion: Motion, **_: Any) -> None:
+def write(path: str | Path, motion: Motion) -> None:
     """Write one recording as GLB: a body of capsules, and its animation.
 
     Raises

@@ -113,8 +113,8 @@ def _shaped(values: Any, path: str, key: str) -> Array:
         points = np.where(points[..., 3:] > 0, points[..., :3], np.nan)
     if points.ndim != 3 or points.shape[2] != 3 or not len(points):
         near = ", ".join(layout.name for count in points.shape[1:] for layout in by_order(count))
-        expected = "(frames, points, 3) with a frame or more"
-        remedy = f"name the points with --layout{f', as {near}' if near else ''}"
+        expected = "(frames, points, 3) with a frame or more" + (f", as in {near}" if near else "")
+        remedy = "name the points with --layout"
         if points.shape[-1:] == (2,):
             remedy = "these are points in pictures: recover them"
         elif points.shape[1:-1] == (3,):
@@ -216,7 +216,7 @@ def _caliscope(table: Table, path: str, count: int) -> tuple[Array, Ints]:
     return points, used[first]
 
 
-def write_npz(path: str | Path, motion: Motion, **_: Any) -> None:
+def write_npz(path: str | Path, motion: Motion) -> None:
     """Write all arrays of a motion as NPZ without pickles: points, configurations, times, clips, frames, axes."""
     arrays: dict[str, Any] = {
         "time": motion.time,
@@ -259,13 +259,13 @@ def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def write_csv(path: str | Path, motion: Motion, **_: Any) -> None:
+def write_csv(path: str | Path, motion: Motion) -> None:
     """Write a motion's points (or configurations) as CSV or TSV with one row per frame; metres, seconds, radians."""
     tabs = Path(path).name.lower().removesuffix(".gz").endswith(".tsv")
     write_bytes(path, csv_text(columns_of(motion), "\t" if tabs else ",").encode())
 
 
-def write_parquet(path: str | Path, motion: Motion, **_: Any) -> None:
+def write_parquet(path: str | Path, motion: Motion) -> None:
     """Write a motion's columns as Parquet, with its axes in the metadata."""
     from posekit.formats.parquet import packed_table
 

@@ -168,7 +168,7 @@ def open(  # the door's name, as in `gzip.open`
     names = [str(one) for one in (document if isinstance(document, dict) else getattr(document, "names", ()))]
     listed = ", ".join(shown(name) for name in names[:8] if name)
     held = f"the entries {listed}" if listed else f"nothing that is known in a {container} file"
-    remedy = "say which name is which joint in a TOML file, and give it with --layout"
+    remedy = "name the joints in a TOML file (--layout), or give the array to posekit.recover or validate"
     if container == "arrays" and all(isinstance(one, dict) for one in document.values()):
         held, remedy = f"{len(names)} recordings, {listed}", "write each into a file of its own"
     elif isinstance(document, dict) and {"images", "annotations"} <= document.keys():

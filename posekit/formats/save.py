@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from posekit.cameras import PinholeCamera
-from posekit.errors import refusal, shown
+from posekit.errors import names_checked, refusal, shown
 from posekit.formats.open import named, suffix_of
 
 if TYPE_CHECKING:
@@ -79,21 +79,18 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
         raise refusal(path, "", "a dict", "cameras by name", "save a motion, view, result or report")
     if kind == "Motion" and suffix in POINT_FORMATS and thing.joints is None and thing.document is None:
         thing = with_points(thing)
-    named(WRITERS[kind][suffix])(path, thing, **options)
+    names_checked(named(WRITERS[kind][suffix]))(path, thing, **options)
 
 
 def refuse_ending(kind: str, path: Path) -> None:
     """Refuse a file name with a suffix in which objects of a class cannot be written; a recovery is also a motion."""
     known = {**WRITERS.get(kind, {}), **(WRITERS["Motion"] if kind == "Recovery" else {})}
     if suffix_of(path) not in known:
-        expected = ", ".join(known) or "a motion, view, result or report"
+        expected = f"one that is written: {', '.join(known)}" if known else "a motion, view, result or report"
         got = f"the ending {shown(suffix_of(path))} for a {kind}"
-        remedy = (
-            "write one of these, and draw it with posekit render"
-            if suffix_of(path) in DRAWN
-            else "choose one of these"
-        )
-        raise refusal(path, "", got, f"one that is written: {expected}", remedy)
+        remedy = "choose one of these" if known else "recover the postures of key points first"
+        drawn = "write one of these, and draw it with posekit render"
+        raise refusal(path, "", got, expected, drawn if suffix_of(path) in DRAWN else remedy)
 
 
 def with_points(motion: Motion) -> Motion:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from posekit.errors import nearest, refusal
 from posekit.geometry.vectors import Array
 
 S = TypeVar("S", bound=np.generic)
@@ -24,6 +25,14 @@ class Record:
 
     A subclass is decorated with ``@dataclass(frozen=True, kw_only=True, eq=False, repr=False)``.
     """
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        """Make an instance; a name that is no field is refused with the field that was probably meant."""
+        known = getattr(cls, "__dataclass_fields__", given)
+        for name in given:
+            if name not in known:
+                raise refusal(cls.__name__, name, "an unknown field", "one that it has", nearest(name, known))
+        return super().__new__(cls)
 
     def __repr__(self) -> str:
         """Return the class's name and its fields on one line."""

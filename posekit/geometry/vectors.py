@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import refusal
+from posekit.errors import refusal, shown
 
 #: Numbers in double precision.
 Array = NDArray[np.float64]
@@ -27,11 +27,12 @@ def numbers(
     """
     try:
         found = np.asarray(values)
-        if found.dtype == object and found.ndim:
+        if found.ndim and found.dtype == object:
             return np.asarray(values, dtype=np.float64)
-        return found.astype(np.float64, casting="same_kind", copy=False)
+        return np.atleast_1d(found).astype(np.float64, casting="same_kind", copy=False)
     except (TypeError, ValueError):
-        raise refusal(source, field, f"a {type(values).__name__}", expected, remedy) from None
+        got = f"a {type(values).__name__} of {values.dtype}" if hasattr(values, "dtype") else shown(values)
+        raise refusal(source, field, got, expected, remedy) from None
 
 
 def dot(a: Array, b: Array) -> Array:

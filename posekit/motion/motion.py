@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError, refusal, shown
-from posekit.geometry import UP_AXES, Array, Record, numbers, rotation_between, up_vector
+from posekit.geometry import UP_AXES, UP_WORDS, Array, Record, numbers, rotation_between, up_vector
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, NAMES
 
 PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
@@ -113,6 +113,7 @@ class Motion(Record):
         if unknown or len(set(self.joint_names)) != len(self.joint_names):
             got = unknown[0] if unknown else "a name twice"
             raise self._refused("joint_names", got, f"each once of {', '.join(NAMES)}", "name the points so")
+        self._set("up", UP_WORDS.get(self.up.lower(), self.up))
         if self.up and self.up not in UP_AXES:
             raise self._refused("up", repr(self.up), f"one of {', '.join(UP_AXES)}", "give it with --up")
 
@@ -130,7 +131,7 @@ class Motion(Record):
         if not fits:
             wanted = " x ".join("any" if extent is None else str(extent) for extent in shape)
             got = " x ".join(map(str, values.shape))
-            raise self._refused(name, f"shape {got}", f"shape {wanted}", "give one row a frame")
+            raise self._refused(name, f"shape {got}", f"shape {wanted}", "state their names, a row a frame")
         if (wrong := np.isinf(values) if dtype is np.float64 else ~np.isfinite(values)).any():
             where = [int(index) for index in np.argwhere(wrong)[0]]
             raise self._refused(

@@ -93,9 +93,7 @@ def validate(
     judge = Judge(settings, urdf, stated(checks=checks, ranges=ranges, profile=profile, ground=ground))
     facts = facts_of(layout=layout, unit=unit, up=up, rate=rate, person=person)
     if not are_paths(given):
-        of_rows = not isinstance(given, Motion) and not hasattr(given, "survivors")
-        report = judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
-        return replace(report, frame=np.arange(len(report))) if of_rows else report
+        return judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
     report = _files(list(files_of(given)), judge, facts)
     if keep is not None:
         spans = None if keep_spans is None else number(keep_spans, "keep-spans", "seconds")

@@ -38,7 +38,7 @@ def load_profile(name: str) -> tuple[FunctionCheck, ...]:
     InputError
         If there is no such profile, or it does not follow the schema.
     """
-    asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "--profile").get("checks", {})
+    asked = read_table(name, "profiles", BUILT_IN, PROFILE_SCHEMA, "profile").get("checks", {})
     for check, thresholds in asked.items():
         if check not in MOTION_CHECKS:
             raise refusal(name, "checks", cut(check), "a check over time", nearest(check, MOTION_CHECKS))
