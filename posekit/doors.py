@@ -47,7 +47,7 @@ def recover(
     person: str = "",
     layout: str = "",
     rate: float | None = None,
-    fov: float | None = None,
+    fov: str | float | None = None,
     size: str | tuple[int, int] | None = None,
     checks: Any = None,
     ranges: str | None = None,
@@ -78,7 +78,7 @@ def recover(
         Name of the key points' layout, or the path of a TOML layout.
     rate : float, optional
         Frames a second of key points that have no times.
-    fov : float, optional
+    fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels, if no file has them; also as ``"1280x720"``.
@@ -133,7 +133,7 @@ def view_of(
     rate: float | None = None,
     stature: str | float | None = None,
     size: str | tuple[int, int] | None = None,
-    fov: float | None = None,
+    fov: str | float | None = None,
     min_confidence: float = 0.0,
 ) -> View:
     """Return the view of one person: as a file has it, or made from key points and a camera.
@@ -147,7 +147,7 @@ def view_of(
         As in `recover`; `unit` is that of the calibration.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels, if neither file has them; also as ``"1280x720"``.
-    fov : float, optional
+    fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     min_confidence : float
         Key points with a lower confidence count as not seen.

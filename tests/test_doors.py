@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 
 import posekit
 from posekit.batch import batch
+from posekit.doors import view_of
 from posekit.samples import samples
 from posekit.settings import RecoverSettings, ValidateSettings, number
 
@@ -486,12 +488,15 @@ def test_assert_valid_judges_a_file_by_its_own_robot(folder: Path) -> None:
         posekit.assert_valid(folder / "robot.npz")
 
 
+MADE: dict[str, Any] = {name: getattr(posekit, name) for name in ("Motion", "ValidateSettings", "Judgement")}
+
+
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: posekit.Motion(joints=STANDING, joint_name=("neck",)), r"Motion: joint_name: .*joint_names"),
-        (lambda: posekit.ValidateSettings(tolerance=1), r"tolerance: .*rigid_tolerance"),
-        (lambda: posekit.Judgement(places=(), values=[]), r"Judgement: values: .*did you mean value\?"),
+        (lambda: MADE["Motion"](joints=STANDING, joint_name=()), r"Motion: joint_name: .*joint_names"),
+        (lambda: MADE["ValidateSettings"](tolerance=1), r"tolerance: .*rigid_tolerance"),
+        (lambda: MADE["Judgement"](places=(), values=[]), r"Judgement: values: .*did you mean value\?"),
         (lambda: posekit.Motion(joints=np.zeros((2, 17, 3))), "state their names"),
         (lambda: posekit.validate(True), "bool|true|shape"),
         (lambda: posekit.validate(np.zeros((5, 14, 3), complex)), "complex128"),
@@ -511,18 +516,16 @@ def test_a_slip_is_answered_by_what_is_meant(call: Any, says: str) -> None:
         call()
 
 
-def test_facts_of_pictures_are_used(folder: Path, tmp_path: Path) -> None:
+def test_facts_of_pictures_are_used(folder: Path) -> None:
     """Points that are fractions of a picture need its size; a field of view may be text."""
     found = posekit.open(folder / "keypoints")
-    parts = np.concatenate([found.points / (1280, 720), found.confidence[..., None]], axis=-1)
-    known: dict[str, Any] = {"names": found.names, "frame": found.frame, "film": True, "person": found.person}
-    fractions = posekit.Detections(points=parts[..., :2], confidence=parts[..., 2], **known)
+    fractions = replace(found, points=found.points / (1280, 720))
     with pytest.raises(posekit.InputError, match="give the size"):
-        posekit.recover(fractions, rate=10)
-    text = posekit.recover(fractions, rate=10, fov="60 degrees", size="1280x720")
-    pixels = posekit.recover(found, rate=10, fov=60, size=(1280, 720))
-    assert text.camera == pixels.camera
-    np.testing.assert_allclose(text.answer.joints, pixels.answer.joints, atol=1e-6)
+        view_of(fractions, rate=10)
+    text = view_of(fractions, rate=10, fov="60 degrees", size="1280x720")
+    pixels = view_of(found, rate=10, fov=60, size=(1280, 720))
+    assert repr(text.camera) == repr(pixels.camera)
+    np.testing.assert_allclose(text.image, pixels.image, atol=1e-9)
 
 
 def test_a_stated_unit_is_the_unit_of_the_written_file(folder: Path, tmp_path: Path) -> None:

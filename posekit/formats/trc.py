@@ -58,9 +58,7 @@ def read(document: Table, path: str, options: Options) -> Motion:
 def _read_trc(table: Table, path: str, options: Options) -> Motion:
     lines = table.lines
     if len(lines) < 5:
-        raise refusal(
-            path, "", f"{len(lines)} of the lines", "five lines of header, and rows", "check the format"
-        )
+        raise refusal(path, "", f"{len(lines)} lines", "five lines of header, and rows", "check the format")
     fields = dict(zip(_title_cells(table, lines[1]), _title_cells(table, lines[2]), strict=False))
     titles = _title_cells(table, lines[3])
     first = [title.casefold() for title in titles[:2]]
