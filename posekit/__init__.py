@@ -1,6 +1,6 @@
-"""posekit: is a posture possible, what is wrong with a motion, and every posture behind one view.
+"""posekit validates postures, finds what is wrong with a motion, and recovers every posture behind one view.
 
-The names below are loaded when they are first used: importing posekit reads no file and loads no library.
+The names below are loaded on first use, so that importing posekit reads no file and loads no library.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""`batch`: an archive of views, key points and motion, every input once, on the cores of a machine or on Ray.
+"""`batch`: process every file of an archive of views, key points and motion once, on local cores or on Ray.
 
-A view or key points become a result, motion becomes a report. Each input has one output file, written whole, and one
-line in `MANIFEST` with the checksums of both: a run that was stopped goes on where it was, and a changed input or
-another setting is computed again.
+Views and key points are recovered to results; motion is validated to reports. Each input has one output file, which is
+written completely or not at all, and one line in `MANIFEST` with the checksums of input and output. A stopped run
+therefore continues where it stopped. An input is computed again if it or the settings have changed.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from posekit.motion import Motion
 from posekit.settings import RecoverSettings, Settings, ValidateSettings
 from posekit.validators.report import plural
 
-#: Name of the table of inputs in the output folder: a JSON object a line, the last one of an input counts.
+#: Name of the table of inputs in the output folder. Each line is a JSON object; the last line of an input is valid.
 MANIFEST: Final = "manifest.jsonl"
-#: Inputs that are handed out for each process: enough that none waits.
+#: Number of inputs submitted per process: enough that no process waits.
 IN_FLIGHT: Final = 2
 
 #: ``input``, ``key`` (checksum of input and settings), ``output``, ``sha256`` of the output, ``kind``, ``summary``; a
-#: failed input has ``error`` in place of the last four.
+#: failed input has ``error`` in place of the last four entries.
 Entry = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class BatchRun(Record):
-    """Outcome of a run.
+    """Outcome of a batch run.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class BatchRun(Record):
     kept : tuple of Entry
         Inputs whose output already existed.
     failed : tuple of Entry
-        Inputs that are broken, each with its error.
+        Inputs that cannot be processed, each with its error.
     """
 
     done: tuple[Entry, ...]
@@ -75,17 +75,17 @@ def batch(
     Parameters
     ----------
     inputs : path or sequence of path
-        Files, folders and patterns; a file that several of them name counts once.
+        Files, folders and patterns; a file that is named several times is processed once.
     output : path
-        Folder of results (``.npz``) and reports (``.json``); a run that was stopped goes on there.
+        Folder of results (``.npz``) and reports (``.json``). If it holds a stopped run, the run is continued.
     settings : RecoverSettings or ValidateSettings, optional
-        Motion is judged by the fields that both have.
+        Motion is validated with the fields that `RecoverSettings` and `ValidateSettings` share.
     jobs : int
-        Processes; 1 works in this one.
+        Number of processes; 1 uses the calling process.
     ray : str
-        Address of a Ray cluster, or ``local`` for one on this machine (extra ``ray``).
+        Address of a Ray cluster, or ``local`` for a cluster on this machine (extra ``ray``).
     say : callable, optional
-        Called with a line for each input.
+        Function that is called with one line of text for each input.
     camera, person, layout, rate
         As in `posekit.recover`.
 
@@ -96,7 +96,8 @@ def batch(
     Raises
     ------
     InputError
-        If a path does not exist, or the output is not a folder. A broken input is an entry of ``failed``.
+        If a path does not exist, or the output is not a folder. An input that cannot be processed is an entry of
+        ``failed``.
 
     Examples
     --------
@@ -139,12 +140,12 @@ def batch(
             if say is not None:
                 say(f"{entry['input']}: {entry.get('error') or entry['summary']}")
     if say is not None:
-        say(f"{len(done)} done, {len(kept)} there already, {len(failed)} failed in {folder}")
+        say(f"{len(done)} done, {len(kept)} kept, {len(failed)} failed in {folder}")
     return BatchRun(done=tuple(done), kept=tuple(kept), failed=tuple(failed))
 
 
 def _manifest(folder: Path) -> dict[str, Entry]:
-    """Return the last entry of each input; a line that was cut off is left out."""
+    """Return the last entry of each input; an incomplete line is ignored."""
     found: dict[str, Entry] = {}
     path = folder / MANIFEST
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
@@ -162,7 +163,7 @@ def _manifest(folder: Path) -> dict[str, Entry]:
 
 
 def _checksum(path: Path, about: str = "") -> str:
-    """Return the SHA-256 of a file, or of all files of a detector's folder, and of a text."""
+    """Return the SHA-256 of a text and a file, or of a text and all files of a detector's folder."""
     digest = hashlib.sha256(about.encode())
     for file in [path] if path.is_file() else sorted(one for one in path.rglob("*") if one.is_file()):
         with file.open("rb") as data:
@@ -175,12 +176,12 @@ def _is_whole(path: Path, entry: Entry) -> bool:
     return path.is_file() and _checksum(path) == entry.get("sha256")
 
 
-#: Entry, input, output folder, settings, options: all that a process needs.
+#: Arguments of a process: entry, input, output folder, settings, options.
 Task = tuple[Entry, str, str, Settings, dict[str, Any]]
 
 
 def _computed(task: Task) -> Entry:
-    """Compute one input, write its output, and return its entry; a broken input is named, not raised."""
+    """Compute one input, write its output, and return its entry; errors of the input are stored in the entry."""
     import posekit
 
     entry, path, folder, settings, options = task
@@ -206,7 +207,7 @@ def _computed(task: Task) -> Entry:
 
 
 def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Entry]:
-    """Compute in a pool of processes.
+    """Compute inputs in a pool of processes.
 
     Raises
     ------
@@ -218,12 +219,12 @@ def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Entry]:
             for future in as_completed([pool.submit(_computed, task) for task in tasks]):
                 yield future.result()
         except BrokenProcessPool:
-            remedy = "use fewer --jobs; a new run goes on"
+            remedy = "use fewer --jobs and run the command again"
             raise refusal("batch", "", "a process that died", "enough memory for all", remedy) from None
 
 
 def _on_ray(tasks: Sequence[Task], address: str) -> Iterator[Entry]:
-    """Compute on a Ray cluster.
+    """Compute inputs on a Ray cluster.
 
     Raises
     ------

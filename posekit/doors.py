@@ -1,4 +1,4 @@
-"""Functions that take a path, an array or an object: each opens its argument and hands it down."""
+"""Public functions that accept a path, an array or an object: `recover`, `convert` and `render`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Source = Any
 
 
 def opened(source: Source, layout: str = "", **facts: Any) -> Any:
-    """Return the content of a path, or an array of joints or configurations as motion; other objects unchanged."""
+    """Open a path, or return an array of joints or configurations as motion; return other objects unchanged."""
     from posekit.formats import open as open_file
     from posekit.formats.options import facts_of
     from posekit.motion import Motion
@@ -63,29 +63,29 @@ def recover(
     Parameters
     ----------
     source : path, View, Detections or array
-        A view; a detector's file or folder of key points; one of these objects; or key points (T, P, 2) in pixels, or
-        (T, P, 3) with confidences, in the order of the `layout`.
+        File of a view, file or folder of a detector's key points, `View`, `Detections`, or key points (T, P, 2) in
+        pixels, or (T, P, 3) with confidences, in the order of the `layout`.
     settings : RecoverSettings, optional
-        All settings at once; the arguments below override single ones.
+        All settings; the arguments below override single settings.
     camera : path or PinholeCamera, optional
-        Calibration of the camera that key points were seen by, as ``FILE`` or ``FILE:NAME``. Without one the view is
+        Calibration of the camera of the key points, as ``FILE`` or ``FILE:NAME``. Without a calibration the camera is
         scaled orthographic.
     stature : float or str, optional
         Height of the person: metres, or text with a unit such as ``"175cm"``.
     person : str
-        Which person of the key points: ``largest``, ``surest``, ``first`` or the number of a track.
+        Person among the key points: ``largest``, ``surest``, ``first`` or the number of a track.
     layout : str
         Name of the key points' layout, or the path of a TOML layout.
     rate : float, optional
-        Frames a second of key points that have no times.
+        Frames per second of key points without times.
     fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels, if no file has them; also as ``"1280x720"``.
     checks, ranges, deviation, length_deviation, coverage, group, follow : optional
-        As the fields of `RecoverSettings`.
+        See the fields of `RecoverSettings`.
     figure : Figure or path, optional
-        Body, or its URDF; the built-in figure by default.
+        Figure, or its URDF file; by default the built-in figure.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def recover(
     Raises
     ------
     InputError
-        If the source is no view or key points, or the view contradicts itself.
+        If the source is neither a view nor key points, or the view's data contradict each other.
 
     Examples
     --------
@@ -136,26 +136,26 @@ def view_of(
     fov: str | float | None = None,
     min_confidence: float = 0.0,
 ) -> View:
-    """Return the view of one person: as a file has it, or made from key points and a camera.
+    """Return the view of one person: the view of a file, or a view made from key points and a camera.
 
     Parameters
     ----------
     source : path, View, Detections or array
     camera : path or PinholeCamera, optional
-        ``FILE`` or ``FILE:NAME`` where a calibration has several cameras.
+        ``FILE``, or ``FILE:NAME`` if a calibration has several cameras.
     person, layout, unit, rate, stature
-        As in `recover`; `unit` is that of the calibration.
+        As in `recover`; `unit` is the calibration's unit of length.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels, if neither file has them; also as ``"1280x720"``.
     fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     min_confidence : float
-        Key points with a lower confidence count as not seen.
+        Key points with a lower confidence count as unseen.
 
     Raises
     ------
     InputError
-        If the source holds no view and no key points, or the calibration does not fit.
+        If the source is neither a view nor key points, or the calibration does not fit the pictures.
     """
     from posekit.cameras import ScaledOrthographicCamera, View
     from posekit.cameras.pinhole import camera_from_fov
@@ -181,7 +181,7 @@ def view_of(
     seen: Detections = replace(source, size=picture_size(size) or source.size)
     if known is None and fov is not None:
         if seen.size is None:
-            raise refusal("", "fov", shown(fov), "the pictures' size, too", "give a size, such as 1280x720")
+            raise refusal("", "fov", shown(fov), "the pictures' size as well", "give a size, such as 1280x720")
         known = camera_from_fov(seen.size, number(fov, "fov", "degrees"), "horizontal")
     return seen.view(
         known or ScaledOrthographicCamera(scale=None),
@@ -198,7 +198,7 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
     Raises
     ------
     InputError
-        If the file holds no camera, or several and none is named.
+        If the file has no camera, or has several cameras and no name is given.
     """
     from posekit.cameras import Camera
     from posekit.formats import open as open_file
@@ -226,7 +226,7 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
 
 
 def frame_range(frame: Any) -> int | tuple[int, int] | None:
-    """Return a frame, or the first and the last, given as numbers or as ``"3"`` or ``"0-9"``."""
+    """Return a frame, or the first and last frame, given as numbers or as ``"3"`` or ``"0-9"``."""
     if frame is None:
         return None
     ends = frame.split("-") if isinstance(frame, str) else list(np.ravel(frame))
@@ -248,7 +248,7 @@ def convert(
     rate: float | None = None,
     urdf: str = "",
 ) -> None:
-    """Convert a file, or write an object, in the format that the target's name says.
+    """Convert a file, or write an object, in the format of the target's suffix.
 
     Parameters
     ----------
@@ -257,14 +257,15 @@ def convert(
     layout : str
         Layout of the source; an array (T, J, 3) has its joints in this order.
     which : {"", "answer", "path", "all", "first"}
-        Postures of a result that motion files get; the followed path if there is one, else the answer.
+        Postures of a result that are written to motion files; by default the followed path if it exists, otherwise the
+        answer.
     unit, up, rate, urdf
         Facts that the source does not state, as in `posekit.open`.
 
     Raises
     ------
     InputError
-        If the source cannot be read or the target cannot hold it.
+        If the source cannot be read, or the target's format cannot store it.
 
     Examples
     --------
@@ -300,23 +301,23 @@ def render(
     Parameters
     ----------
     source : path, Motion, Recovery, View, Detections, Report, Robot or array
-        A robot is drawn at its neutral configuration. Of key points, and of a view without truth, the recovered
-        postures are drawn. An array is joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
+        A robot is drawn at its neutral configuration. For key points, and for a view without truth, the recovered
+        postures are drawn. An array has joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
     target : path
     layout, urdf, rate, unit, up
         As in `posekit.open`.
     view : path or View, optional
-        View of a result: its image is drawn, too.
+        View of a result, whose image points are drawn as well.
     frame : int, (int, int) or str, optional
         Frame, or first and last frame, from 0; also as ``"3"`` or ``"0-9"``.
     which : {"", "answer", "path", "all", "first"} or str
-        Postures of a result, or their numbers as ``0,4``.
+        Postures of a result, or numbers of postures such as ``0,4``.
     size : (int, int) or str
         Width and height, pixels; also as ``"1280x720"``.
     azimuth, elevation : float, optional
-        Direction of the look, degrees; from the front and slightly above by default.
+        Viewing direction, degrees; by default from the front and slightly above.
     over : path, optional
-        Picture, folder of pictures or film to draw over, through the view's camera.
+        Picture, folder of pictures or film over which the source is drawn, through the view's camera.
 
     Raises
     ------

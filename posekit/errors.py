@@ -1,4 +1,4 @@
-"""Errors, and the one line that refuses an input: source, field, value, expected values, remedy."""
+"""Errors, and their one-line messages about an input: source, field, value, expected values, remedy."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from typing import Final, ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Characters of a value or a name that a message shows before it is cut.
+#: Largest number of characters of a value or a name in a message.
 MAX_SHOWN_CHARACTERS: Final = 60
 
-#: Characters of a message before its middle is cut.
+#: Largest number of characters of a message; the middle of a longer message is cut.
 MAX_LINE_CHARACTERS: Final = 500
 
-#: Words of other programs, and the names here of options, arguments, fields and commands.
+#: Words of other programs, and posekit's names of the same options, arguments, fields and commands.
 MEANT: Final = {
     **dict.fromkeys(("fps", "framerate", "frame_rate", "frequency", "hz"), ("rate",)),
     **dict.fromkeys(("skeleton", "format", "joint_names", "keypoint_names"), ("layout",)),
@@ -41,7 +41,7 @@ MEANT: Final = {
 
 
 class PosekitError(Exception):
-    """Base of every error that posekit raises on purpose.
+    """Base class of all errors that posekit raises on purpose.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class PosekitError(Exception):
 
 
 class InputError(PosekitError):
-    """A file or an argument is not as its schema requires.
+    """A file or an argument violates its schema.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class InputError(PosekitError):
 
 
 class TooLargeError(InputError):
-    """An object is too large to be written: it could not be read again."""
+    """An object is too large to be written, because posekit could not read the file again."""
 
 
 class FigureError(InputError):
@@ -98,9 +98,9 @@ def refusal(
     Parameters
     ----------
     source : path or str
-        The file, or another origin of the value; empty if there is none.
+        The file, or another origin of the value; empty if the origin is unknown.
     field : str
-        Place in the source, as ``frames[3].image.left_elbow``; empty for the whole.
+        Place in the source, such as ``frames[3].image.left_elbow``; empty if the whole source is refused.
     got : str
         The value, as `shown` writes it.
     expected : str
@@ -120,12 +120,12 @@ def refusal(
 
 
 def one_line(text: str) -> str:
-    """Escape characters that do not print, line ends included."""
+    """Escape unprintable characters, including line ends."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def bounded(text: str) -> str:
-    """Cut a long line in its middle: it keeps the place at its start and the remedy at its end."""
+    """Cut a long line in its middle, so that it keeps the place at its start and the remedy at its end."""
     half = MAX_LINE_CHARACTERS // 2
     return text if len(text) <= MAX_LINE_CHARACTERS else f"{text[:half]} … {text[3 - half :]}"
 
@@ -152,9 +152,9 @@ def cut(text: str) -> str:
 
 
 def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
-    """Suggest the valid names closest to a misspelt one or meant by a word of another program.
+    """Suggest the valid names that are closest to a misspelt name, or that a word of another program means.
 
-    If none is close, return `otherwise` or a list of all.
+    If no valid name is close, return `otherwise`, or a list of all valid names if it is empty.
     """
     valid = list(names)
     given = name[:MAX_SHOWN_CHARACTERS]
@@ -175,7 +175,7 @@ def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
 
 
 def names_checked(function: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a public function: an unknown keyword argument is refused with the name that was probably meant."""
+    """Decorate a public function, so that an unknown keyword argument raises an error that suggests the right name."""
     known = inspect.signature(function).parameters
     public = function.__qualname__.removesuffix(".__init__")
 
@@ -184,7 +184,7 @@ def names_checked(function: Callable[P, T]) -> Callable[P, T]:
         for name in kwargs:
             if name not in known:
                 remedy = nearest(name, (one for one in known if one != "self"))
-                raise refusal(public, name, "an unknown argument", "one that it has", remedy)
+                raise refusal(public, name, "an unknown argument", "a known argument", remedy)
         return function(*args, **kwargs)
 
     return called

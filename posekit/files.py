@@ -1,4 +1,4 @@
-"""Whole files: read once under a size limit, unpacked if gzipped, and written completely or not at all."""
+"""Read files once, with a size limit and gzip decompression, and write files completely or not at all."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from posekit.errors import InputError, TooLargeError, cut, nearest, refusal, sho
 #: Folder of the data that comes with posekit: the figure, layouts, ranges, priors, profiles.
 DATA: Final = Path(__file__).resolve().parent / "urdf"
 
-#: Bytes of a file, packed and unpacked: a larger one is cut into clips first.
+#: Largest size of a file, packed and unpacked, bytes; a larger recording must be cut into clips.
 MAX_BYTES: Final = 2_000_000_000
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """Read a regular file and unpack it if it is gzipped.
+    """Read a regular file, and decompress it if it is gzipped.
 
     Raises
     ------
     InputError
-        If there is no such file, or it cannot be read or unpacked, or it is larger than `MAX_BYTES`.
+        If the file does not exist, cannot be read or decompressed, or is larger than `MAX_BYTES`.
     """
     try:
         with Path(path).open("rb") as file:
@@ -50,7 +50,7 @@ def read_bytes(path: str | Path) -> bytes:
         with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
             data = packed.read(MAX_BYTES + 1)
     except (OSError, EOFError, zlib.error):
-        raise refusal(path, "", "a damaged gzip file", "a whole one", "copy or download it again") from None
+        raise refusal(path, "", "a damaged gzip file", "a complete file", "copy it again") from None
     if len(data) > MAX_BYTES:
         raise _too_large(path)
     return data
@@ -62,14 +62,15 @@ def read_table(name: str, folder: str, built_in: Sequence[str], schema: str, opt
     Parameters
     ----------
     name : str
-        One of the names `built_in`, or the path of a file.
+        A name of `built_in`, or the path of a file.
     folder, schema, option : str
-        That folder, the schema that the table must state, and the option with which it is given, for errors.
+        Folder of the built-in tables, schema that the table must state, and option that names the table, for error
+        messages.
 
     Raises
     ------
     InputError
-        If there is no such table, or it is not TOML of the schema.
+        If the table does not exist, or is not a TOML table of the schema.
     """
     path = DATA / folder / f"{name}.toml" if name in built_in else Path(name)
     if not name or not path.is_file():
@@ -86,7 +87,7 @@ def parse_toml(data: bytes, source: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it is damaged; the error names the line.
+        If the text is not valid TOML; the error names the line.
     """
     try:
         return tomllib.loads(text(data, source))
@@ -95,7 +96,7 @@ def parse_toml(data: bytes, source: str) -> dict[str, Any]:
 
 
 def _names_beside(path: Path) -> list[str]:
-    """List the names in the folder of a file that is missing."""
+    """List the names of files in the folder of a missing file."""
     try:
         return [one.name for one in path.parent.iterdir()]
     except OSError:
@@ -103,7 +104,7 @@ def _names_beside(path: Path) -> list[str]:
 
 
 def text(data: bytes, source: str) -> str:
-    """Decode a text file: UTF-8, or UTF-16 with its mark; bytes of older encodings are kept as Latin-1."""
+    """Decode a text file: UTF-8, UTF-16 with a byte-order mark, or otherwise Latin-1."""
     if b"\x00" in data[:1000] and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
         raise refusal(source, "", "a binary file", "a text file", "check the file's name")
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
@@ -115,7 +116,7 @@ def text(data: bytes, source: str) -> str:
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file whole or not at all, gzipped if its name ends in ``.gz``: a new file takes its place at the end."""
+    """Write a file completely or not at all, by renaming a temporary file; gzip it if its name ends in ``.gz``."""
     path = Path(path)
     if len(data) > MAX_BYTES:
         raise _too_large(path)
@@ -123,7 +124,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         data = gzip.compress(data, mtime=0)
     new = path.with_name(f".{path.name}.{os.urandom(4).hex()}")
     try:
-        if path.exists() and not path.is_file():  # a device or a pipe is written to, not replaced
+        if path.exists() and not path.is_file():  # a device or a pipe must not be replaced
             path.write_bytes(data)
             return
         new.write_bytes(data)

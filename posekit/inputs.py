@@ -1,4 +1,4 @@
-"""Files that a user names by paths, folders and patterns; what they hold; names for files made from them."""
+"""Input files from paths, folders and patterns; descriptions of their content; names of output files."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def are_paths(given: Any) -> bool:
 
 
 def files_of(given: Any) -> Iterator[Path]:
-    """Yield the files that paths, folders and patterns stand for.
+    """Yield the files of paths, folders and patterns.
 
     Raises
     ------
     InputError
-        If a path does not exist or a folder or pattern has no file.
+        If a path does not exist, or a folder or pattern has no file.
     """
     for one in [given] if isinstance(given, str | os.PathLike) else given:
         path = Path(one)
@@ -44,7 +44,7 @@ def files_of(given: Any) -> Iterator[Path]:
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    """Yield the files below a folder; a detector's folder, with one file a picture, is one input."""
+    """Yield the files below a folder; a detector's folder, with one file per picture, is one input."""
     from posekit.formats.keypoints import looks_like
 
     inside = [one for one in sorted(folder.iterdir()) if not _is_hidden(one, folder)]
@@ -65,22 +65,22 @@ def _is_hidden(file: Path, folder: Path) -> bool:
 
 
 def names_below(files: Iterable[str]) -> dict[str, Path]:
-    """Return the name of each file below the folder that all of them are in."""
+    """Return the path of each file relative to the folder that contains all files."""
     absolute = {file: Path(os.path.normpath(Path(file).absolute())) for file in files}
     common = os.path.commonpath([path.parent for path in absolute.values()]) if absolute else ""
     return {file: path.relative_to(common) for file, path in absolute.items()}
 
 
 def new_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return the path of a new or empty folder; a folder that holds something is refused."""
+    """Return the path of a new or empty folder; refuse a folder that is not empty."""
     path = Path(folder)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise refusal(path, "", "something that exists", "a new or empty folder", "name another")
+        raise refusal(path, "", "existing content", "a new or empty folder", "name another")
     return path
 
 
 def kind_of(held: Any) -> str:
-    """Return what an opened file holds, in words."""
+    """Describe the content of an opened file in words."""
     words = {"dict": "cameras", "Recovery": "a result", "Detections": "key points", "Motion": "motion"}
     words |= {name: f"a {name.lower()}" for name in ("View", "Report", "Robot", "Figure")}
     name = type(held).__name__

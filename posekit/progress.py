@@ -1,4 +1,4 @@
-"""Progress of work that takes seconds: its loops are shown by whatever shows progress; nothing does by default.
+"""Progress of long loops: `show_with` sets a progress bar; by default no progress is shown.
 
 >>> import posekit.progress
 >>> from tqdm import tqdm  # doctest: +SKIP
@@ -16,18 +16,18 @@ _shown: list[Callable[[Iterable[object], str], Iterable[object]]] = []
 
 
 def show_with(bar: Callable[[Iterable[object], str], Iterable[object]] | None) -> None:
-    """Show the progress of all work that follows.
+    """Show the progress of all later loops with a progress bar.
 
     Parameters
     ----------
     bar : callable or None
-        Takes the items of a loop and a label, and returns the items, as ``tqdm`` does. None shows nothing.
+        Function of the items of a loop and a label that returns the items, such as ``tqdm``. None shows no progress.
     """
     _shown[:] = [] if bar is None else [bar]
 
 
 def watched(items: Iterable[Item], label: str) -> Iterator[Item]:
-    """Go through the items of a loop and show how far it is; loops within it are not shown."""
+    """Yield the items of a loop and show its progress; the progress of inner loops is not shown."""
     if not _shown:
         yield from items
         return

@@ -1,6 +1,6 @@
 """Files to try posekit with: a walk, a detector's key points of it, one photograph, and robots.
 
-All are made from the walker's gait and from seeds: they are the same every time.
+All files are made from the walker's gait and fixed seeds, so they are always the same.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SAMPLE_FILES: Final = {
     "robot.npz": "a squatting Unitree G1, with mistakes to be found",
 }
 
-#: Camera of Lee & Chen's SEQ2 (1985), metres, as the paper counts it.
+#: Camera position of Lee & Chen's SEQ2 (1985), metres, in the paper's convention.
 WALK_CAMERA: Final = (3.0, 0.0, 3.0)
 
 #: Height of the walking person, metres.
@@ -35,40 +35,40 @@ STATURE: Final = 1.75
 
 RATE, WALK_FRAMES, ROBOT_FRAMES = 30.0, 90, 90
 
-#: Height of the lowest ankle above the ground, metres: the figure has no feet.
+#: Height of the lowest ankle above the ground, metres, because the figure has no feet.
 ANKLE_HEIGHT: Final = 0.08
 
-#: Frames of `jump.bvh` whose right elbow is bent backward, and its angle.
+#: Frames of `jump.bvh` in which the right elbow is bent backward, and the angle of the elbow.
 ELBOW_BACK, ELBOW_DEGREES = slice(30, 36), -25.0
 
-#: From this frame on the walk of `jump.bvh` is further to the side: two takes, cut together.
+#: From this frame on, the walk of `jump.bvh` is moved to the side by this distance, as if two takes were joined.
 JUMP_FRAME, JUMP_METRES = 70, 0.3
 
 PICTURE_SIZE, FOCAL_LENGTH = (1280, 720), 1000.0
-#: Camera of the key points in the walk's world, metres: in front, to the right, at the height of the chest.
+#: Position of the key points' camera in the walk's world, metres: in front, to the right, at chest height.
 CAMERA_POSITION: Final = np.array([4.6, 1.3, 3.2])
 
 PICTURES, FRAMES_PER_PICTURE = 12, 3
-#: Standard deviation of key points and of points set by hand, pixels.
+#: Standard deviation of key points and of manually marked points, pixels.
 POINT_DEVIATION: Final = 2.0
 
 NOISE_SEED, PHOTO_SEED, GRIPPER_SEED = 175, 4, 1
 
-#: Rotation from the walk's world (y up) to the calibration's (z up), as Pose2Sim has it.
+#: Rotation from the walk's world (y up) to the calibration's world (z up), as in Pose2Sim.
 R_CALIBRATION_WALK: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: First points of OpenPose's BODY_25 by our names; the six of the feet are not seen.
+#: First points of OpenPose's BODY_25, with posekit's names; the six points of the feet are unseen.
 BODY_25: Final = (
     *("nose", "mid_shoulder", "right_shoulder", "right_elbow", "right_wrist"),
     *("left_shoulder", "left_elbow", "left_wrist", "mid_hip", "right_hip", "right_knee"),
     *("right_ankle", "left_hip", "left_knee", "left_ankle", "right_eye", "left_eye", "right_ear", "left_ear"),
 )
 
-#: Largest bend of the hips, radians.
+#: Largest flexion of the hips, radians.
 SQUAT_DEPTH: Final = 0.6
 
-#: Frames of `robot.npz`, the entry that changes, and by how much at most: the elbow bends beyond its range, the arm
-#: goes into the trunk, the feet go into the ground; radians and metres.
+#: Mistakes in `robot.npz`: frames, changed entry, and largest change (radians and metres). The elbow bends beyond its
+#: range, the arm penetrates the trunk, and the feet penetrate the ground.
 ROBOT_MISTAKES: Final = (
     (slice(10, 35), "left_elbow_joint", 2.6),
     (slice(46, 55), "left_shoulder_roll_joint", -0.75),
@@ -77,12 +77,12 @@ ROBOT_MISTAKES: Final = (
 
 
 def samples(folder: str | Path) -> list[str]:
-    """Write the files of `SAMPLE_FILES` into a folder, which is made if it is missing.
+    """Write the files of `SAMPLE_FILES` to a folder, which is created if it does not exist.
 
     Parameters
     ----------
     folder : path
-        Existing files of these names are replaced.
+        Existing files with these names are replaced.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def samples(folder: str | Path) -> list[str]:
 
 
 def _lengths_of_a_person() -> dict[str, float]:
-    """Draw the lengths of the walking person, metres, between the points that a detector sees."""
+    """Draw random lengths of the walking person, metres, between the points that a detector reports."""
     from posekit.recovery.person import PROPORTIONS, by_segment
 
     people, rng = PROPORTIONS["people"], np.random.default_rng(NOISE_SEED)
@@ -196,7 +196,7 @@ def _write_robots(folder: Path) -> None:
         q[:, column[f"{side}_shoulder_pitch_joint"]] = sign * swing
         q[:, column[f"{side}_shoulder_roll_joint"]] = sign * 0.3
     ankle = frame_places(robot.model, q, [robot.model.getFrameId("left_ankle_roll_link")])[:, 0]
-    q[:, [0, 2]] = -ankle[:, [0, 2]]  # the feet stay where they are, flat
+    q[:, [0, 2]] = -ankle[:, [0, 2]]  # the feet do not move
     for frames, name, change in ROBOT_MISTAKES:
         count = frames.stop - frames.start
         q[frames, column[name]] += change * np.sin(np.pi * np.arange(count) / count) ** 2

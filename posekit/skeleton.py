@@ -1,7 +1,7 @@
 """The names and the topology of the stick figure: joints, segments, rigid parts, degrees of freedom.
 
-Lengths are in `urdf/stick_figure.urdf` alone. Indices refer to `JOINTS`, the tree's order, or to `POINTS`: the joints
-followed by the head's five points, which are known before the tree is grown.
+Lengths are only in `urdf/stick_figure.urdf`. Indices refer to `JOINTS` (in the order of the tree) or to `POINTS`: the
+joints and then the five head points, which are known before the tree is grown.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ JOINT: Final = {name: index for index, name in enumerate(JOINTS)}
 POINT: Final = {name: index for index, name in enumerate(POINTS)}
 HEAD: Final = tuple(POINT[name] for name in HEAD_POINTS)
 
-#: The joint from which each joint is lifted (Lee & Chen 1985, §2.2); -1 for the root.
+#: Parent of each joint: the start of the segment that locates the joint (Lee & Chen 1985, §2.2); -1 for the root.
 PARENTS: Final = tuple(
     -1 if parent is None else JOINT[parent]
     for parent in (
@@ -58,13 +58,13 @@ PARENTS: Final = tuple(
     )
 )
 
-#: The 13 segments that lift a joint, in tree order.
+#: The 13 segments from a parent to its joint, in tree order.
 TREE_SEGMENTS: Final = tuple((PARENTS[child], child) for child in range(1, len(JOINTS)))
 
 TORSO: Final = ("neck", "right_shoulder", "left_shoulder", "pelvis")
 HIPS: Final = ("pelvis", "right_hip", "left_hip")
 
-#: The four segments that lift no joint: distances inside the rigid torso and hips (Lee & Chen 1985, §3.2.B).
+#: The four other segments: distances inside the rigid torso and hips (Lee & Chen 1985, §3.2.B).
 RIGID_SEGMENTS: Final = (
     (JOINT["right_shoulder"], JOINT["left_shoulder"]),
     (JOINT["right_shoulder"], JOINT["pelvis"]),
@@ -89,10 +89,10 @@ LIMB_SHARES: Final = {
     **{("hip", "knee"): 0.245, ("knee", "ankle"): 0.246},
 }
 
-#: Upper arms, forearms, thighs and shanks, limb by limb, by their two joints.
+#: Start and end joints of upper arms, forearms, thighs and shanks, limb by limb.
 LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
 
-#: Parts of the body with a limb or a trunk segment inside, named as the figure's links, and the joints at their ends.
+#: Body parts along a segment of limbs or trunk, by name of the figure's link, and the joints at both ends of each.
 PARTS: Final = {
     "torso": ("neck", "pelvis"),
     "hips": ("right_hip", "left_hip"),
@@ -108,12 +108,12 @@ PARTS: Final = {
     },
 }
 
-#: Number of joints of torso and hips: the first of the tree, from which limbs start.
+#: Number of joints of torso and hips, which come first in the tree.
 N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 
 
 def both(name: str) -> list[int]:
-    """Return the indices of the right and the left joint of a name as "hip"."""
+    """Return the indices of the right and the left joint of a name without side, such as "hip"."""
     return [JOINT[f"{side}_{name}"] for side in SIDES]
 
 
@@ -125,7 +125,7 @@ def segment_name(segment: tuple[int, int]) -> str:
 
 SEGMENT_NAMES: Final = tuple(segment_name(segment) for segment in SEGMENTS)
 
-#: The 22 angles of the figure, by their names in findings; their URDF joints are `urdf_joint_name(dof)`.
+#: Names of the figure's 22 angles, as used in findings; `urdf_joint_name` returns the URDF joint of each.
 DOFS: Final = tuple(
     f"{joint}.{angle}"
     for joint, angles in (
@@ -145,11 +145,11 @@ DOFS: Final = tuple(
 
 
 def urdf_joint_name(dof: str) -> str:
-    """Return the URDF joint of a degree of freedom: ``right_elbow_flexion`` of ``right_elbow.flexion``."""
+    """Return the URDF joint of a degree of freedom: ``right_elbow_flexion`` for ``right_elbow.flexion``."""
     return dof.replace(".", "_")
 
 
 def other_side(name: str) -> str:
-    """Return the name of the landmark on the other side; a landmark in the middle is its own."""
+    """Return the name of the landmark on the other side; for a landmark in the middle, its own name."""
     side, _, part = name.partition("_")
     return {"right": f"left_{part}", "left": f"right_{part}"}.get(side, name)
