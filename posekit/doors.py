@@ -181,7 +181,7 @@ def view_of(
     seen: Detections = replace(source, size=picture_size(size) or source.size)
     if known is None and fov is not None:
         if seen.size is None:
-            raise refusal("", "fov", shown(fov), "the pictures' size as well", "give a size, such as 1280x720")
+            raise refusal("", "fov", shown(fov), "the pictures' size, too", "give a size, such as 1280x720")
         known = camera_from_fov(seen.size, number(fov, "fov", "degrees"), "horizontal")
     return seen.view(
         known or ScaledOrthographicCamera(scale=None),
