@@ -1,1 +1,1 @@
-"""The `posekit` command: one command a file."""
+"""The subcommands of `posekit`, one in each module."""

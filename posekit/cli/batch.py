@@ -1,4 +1,4 @@
-"""`posekit batch`: an archive, every input once, resumable."""
+"""`posekit batch`: process an archive of inputs; a stopped run can be continued."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from posekit.settings import RecoverSettings
     "posekit batch views/*.json -o results --jobs 16",
 )
 @click.argument("inputs", nargs=-1, required=True, metavar="INPUT…", type=click.Path(path_type=Path))
-@output("DIR", "Folder of results; a run that was stopped goes on there.")
-@option("--jobs", default=None, type=click.IntRange(1), metavar="N", help="Processes. Default: one a core.")
+@output("DIR", "Folder of results; a stopped run continues there.")
+@option("--jobs", default=None, type=click.IntRange(1), metavar="N", help="Processes. Default: one per core.")
 @option("--cluster", "ray", default="", metavar="ADDRESS", help="Ray cluster, or local (extra ray).")
 @seeing()
 @settings_options(RecoverSettings, {"stature": "LENGTH", "deviation": "PX", "checks": "LIST"})
 def batch(inputs: tuple[Path, ...], output: Path, jobs: int | None, ray: str, **given: Any) -> None:
-    """Recover an archive: every input once. Exit code 1 if some inputs are broken; the others are done."""
+    """Recover or validate each input of an archive. Exit code 1 if some inputs fail; other inputs are processed."""
     from posekit.batch import batch as run
 
     settings = settings_from(RecoverSettings, given)

@@ -1,4 +1,4 @@
-"""Common parts of commands: options made from settings, panels in the help, suggestions, and one-line messages."""
+"""Shared code of commands: options made from settings, panels in the help, suggestions, and one-line messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import click
 from posekit.errors import InputError, nearest, one_line, refusal, shown
 from posekit.settings import Settings, stated
 
-#: Parameters that name what a command writes.
+#: Parameters with the path of an output.
 OUTPUTS: Final = frozenset({"output", "keep", "repair"})
 
 #: Names of the option for a layout.
@@ -22,7 +22,7 @@ LAYOUT: Final = ("--layout", "--skeleton", "--format")
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """Print lines without control characters: names in files may hold escapes and line ends."""
+    """Print text without control characters, because names in files may contain escape sequences and line breaks."""
     click.echo("\n".join(one_line(line) for line in text.split("\n")), err=err)
 
 
@@ -34,7 +34,7 @@ class Command(click.Command):
         self.examples = examples
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments; an option without its output, or an output that is an input, is refused."""
+        """Parse the arguments; refuse unknown options with a suggestion, and outputs that are also inputs."""
         try:
             rest = super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -74,7 +74,7 @@ class Option(click.Option):
 
 
 def command(name: str, *examples: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Make a function the command `name`, with examples at the end of its help."""
+    """Return a decorator that makes a function the command `name`, with examples at the end of its help."""
     return click.command(name, cls=Command, examples=examples)
 
 
@@ -95,7 +95,7 @@ def output(
 
 
 def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Join decorators; the first is listed first in the help."""
+    """Combine decorators; the option of the first is listed first in the help."""
 
     def joined(function: Any) -> Any:
         for one in reversed(decorators):
@@ -106,13 +106,13 @@ def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options that turn key points into a view."""
-    calibration = "Calibration of the camera. Default: none is known."
+    """Declare the options for views made from key points."""
+    calibration = "Calibration of the camera. Default: the camera is unknown."
     return apply(
         option("--camera", default=None, metavar="FILE[:NAME]", help=calibration),
         option("--person", default="", metavar="WHO", help="largest, surest, first or a track's number."),
         option(*LAYOUT, default="", metavar="NAME|FILE.toml", help="Names of the key points."),
-        option("--rate", "--fps", default=None, metavar="HZ", help="Frames a second."),
+        option("--rate", "--fps", default=None, metavar="HZ", help="Frames per second."),
     )
 
 
@@ -120,9 +120,9 @@ def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 READING: Final = (
     (LAYOUT, "", "NAME|FILE.toml", "Names of the file's joints or columns. Default: recognised."),
     (("--unit",), None, "m|cm|mm|in", "Unit of length. Default: the file's."),
-    (("--up",), None, "AXIS", "Axis that points up, as +z. Default: found."),
-    (("--rate", "--fps"), None, "HZ", "Frames a second where the file has no times."),
-    (("--urdf",), "", "NAME|FILE", "Robot whose configurations the file holds."),
+    (("--up",), None, "AXIS", "Axis that points up, as +z. Default: detected."),
+    (("--rate", "--fps"), None, "HZ", "Frames per second if the file has no times."),
+    (("--urdf",), "", "NAME|FILE", "Robot whose configurations the file contains."),
 )
 
 
@@ -140,14 +140,14 @@ def reading(*, urdf: bool = True) -> Callable[[Callable[..., Any]], Callable[...
 def settings_options(
     kind: type[Settings], shown_in_help: Mapping[str, str], panel: str = "Settings"
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare an option for every field of a settings record.
+    """Declare an option for every field of a class of settings.
 
     Parameters
     ----------
     kind : type of Settings
-        The record.
+        Class of settings.
     shown_in_help : mapping of str to str
-        Fields that the help lists, with the metavar of each. The others work as options, too; `posekit settings`
+        Fields that the help lists, with their metavars. Fields that are not listed are options, too; `posekit settings`
         lists them.
     panel : str
         Panel of the help.
@@ -188,7 +188,7 @@ def settings_options(
 
 
 def descriptions(kind: type[Settings]) -> dict[str, str]:
-    """Return the description of each field, from the numpydoc sections of a record and its bases."""
+    """Return the description of each field from the docstrings of a class of settings and its base classes."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         name = ""
@@ -202,9 +202,9 @@ def descriptions(kind: type[Settings]) -> dict[str, str]:
 
 
 def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
-    """Take the settings' options out of a command's parameters and make the record.
+    """Remove the options of settings from a command's parameters and return the settings.
 
-    A file is read first, then ``--set``, then the options.
+    Values from ``--set`` override the settings file, and options override both.
     """
     names = [one.name for one in fields(kind)]
     options = {name: given.pop(name) for name in names if name in given}
@@ -225,12 +225,12 @@ def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
 
 
 def _value(text: str) -> Any:
-    """Read the value of ``--set``: true, false, none, or text, which the settings convert to the field's type."""
+    """Convert a value of ``--set`` to true, false, none, or text, which the settings convert to the field's type."""
     return {"true": True, "false": False, "none": None}.get(text.lower(), text)
 
 
 def _refuse_overwriting(given: Mapping[str, Any]) -> None:
-    """Refuse an output that is also an input or in a folder that is read, and two outputs of one name."""
+    """Refuse an output that is also an input or is in an input folder, and two outputs with the same path."""
     written: list[Path] = []
     read: list[Path] = []
     for name, value in given.items():
@@ -255,7 +255,7 @@ def _refuse_overwriting(given: Mapping[str, Any]) -> None:
 
 
 def numbers(flag: str, text: str, count: int | None = None) -> list[float]:
-    """Read numbers between commas."""
+    """Parse numbers separated by commas."""
     try:
         found = [float(part) for part in text.split(",")]
     except ValueError:
@@ -267,6 +267,6 @@ def numbers(flag: str, text: str, count: int | None = None) -> list[float]:
 
 
 def progress_bar(items: Iterable[Any], label: str) -> Iterable[Any]:
-    """Go through items with a progress bar on the terminal."""
+    """Iterate over items with a progress bar on the terminal."""
     with click.progressbar(items, label=label, file=sys.stderr) as bar:
         yield from bar

@@ -1,4 +1,4 @@
-"""`posekit convert`: open, choose, save."""
+"""`posekit convert`: convert a file to another format."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from posekit.cli.command import command, option, reading, say
 )
 @reading()
 def convert(source: Path, output: Path, **given: Any) -> None:
-    """Convert a file; the suffix of the second name chooses the format."""
+    """Convert a file; the suffix of the second path determines the format."""
     from posekit.doors import convert as convert_file
 
     convert_file(source, output, **given)

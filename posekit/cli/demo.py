@@ -1,4 +1,4 @@
-"""`posekit demo`: each job on small built-in files."""
+"""`posekit demo`: run validation, recovery and reproduction on small built-in files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from posekit.cli.command import command, option, output, say
 @output("DIR", "Folder for the results.")
 @option("--pictures/--no-pictures", default=True, help="Draw the results, too.")
 def demo(output: Path, pictures: bool) -> None:
-    """Judge a motion, recover the built-in views, and reproduce the papers' tables; index.html links to all of it."""
+    """Validate a motion, recover built-in views, and reproduce the papers' tables; index.html links to the results."""
     from posekit.cli.demo_pages import write_demo
 
     for line in write_demo(output, pictures=pictures):

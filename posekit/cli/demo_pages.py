@@ -1,4 +1,4 @@
-"""Files of `posekit demo`: samples, a judged motion, recovered views, the papers' rows, and a page of links."""
+"""Files of `posekit demo`: samples, a report about a motion, recovered views, the papers' tables, a page of links."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-#: Built-in views that are recovered, and their titles: the walker of Lee & Chen 1985 before two cameras.
+#: Built-in views to recover, and their titles: the walker of Lee & Chen 1985 seen by two cameras.
 VIEWS: Final = {
     "seq1": "Every posture behind a view: a walker from the front",
     "seq2": "The same walker before another camera",
@@ -34,9 +34,9 @@ def write_demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     Parameters
     ----------
     folder : Path
-        Folder to write to; it is made if it does not exist.
+        Folder for the files; it is created if it does not exist.
     pictures : bool
-        Draw pictures and pages, which need a browser and Pillow.
+        Whether to draw pictures and pages, which need a browser and Pillow.
 
     Raises
     ------

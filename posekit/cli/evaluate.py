@@ -1,4 +1,4 @@
-"""`posekit evaluate`: the errors of results if the truth is known."""
+"""`posekit evaluate`: compute the errors of results whose true postures are known."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from posekit.settings import RecoverSettings
 def evaluate(
     source: Path, output: Path | None, truth: str | None, noise: str, views: int, seed: int, **given: Any
 ) -> None:
-    """Compare a result with the truth; or see a motion through virtual cameras, recover it, and compare."""
+    """Compare a result with the truth; or recover a motion from virtual cameras and compare the result with it."""
     from posekit.errors import refusal
     from posekit.evaluation import evaluate as compare
     from posekit.evaluation import evaluate_method

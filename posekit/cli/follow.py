@@ -1,4 +1,4 @@
-"""`posekit follow`: read lines of key points and write lines of postures, live."""
+"""`posekit follow`: read key points line by line and write postures line by line, live."""
 
 from __future__ import annotations
 
@@ -16,21 +16,19 @@ from posekit.settings import RecoverSettings
     "follow",
     "detector | posekit follow --stdin --layout coco_17 --size 1280x720 --stature 175cm | viewer",
 )
-@option("--stdin", is_flag=True, help="Read JSON lines from standard input and answer each at once.")
-@option("--keep-going", is_flag=True, help='Answer a line that cannot be read with {"error": …} and go on.')
+@option("--stdin", is_flag=True, help="Read JSON lines from standard input and answer each immediately.")
+@option("--keep-going", is_flag=True, help='Answer an unreadable line with {"error": …} and continue.')
 @option("--layout", "--skeleton", default="", metavar="NAME|FILE.toml", help="Names of the key points.")
 @option("--camera", metavar="FILE[:NAME]", default=None, help="Calibration. Default: a webcam of --size.")
 @option("--size", default=None, metavar="WxH", help="Width and height of the pictures, pixels.")
-@option(
-    "--lag", default=5, type=click.IntRange(0, 1000), metavar="N", help="Pictures that a path looks ahead."
-)
+@option("--lag", default=5, type=click.IntRange(0, 1000), metavar="N", help="Later pictures to wait for.")
 @settings_options(RecoverSettings, {"stature": "LENGTH", "deviation": "PX", "checks": "LIST"})
 def follow(
     stdin: bool, keep_going: bool, layout: str, camera: str | None, size: str | None, lag: int, **given: Any
 ) -> None:
     """Follow a person live.
 
-    A line is {"time": seconds, "points": [[x, y], …]} or {"time": …, "points": {"left_wrist": [x, y, confidence], …}}.
+    An input line is {"time": seconds, "points": [[x, y], …]}, or has named points: {"left_wrist": [x, y, confidence]}.
     """
     if not stdin:
         raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")

@@ -1,4 +1,4 @@
-"""`posekit inspect`: the content of a file, and the facts that posekit found."""
+"""`posekit inspect`: print the content of a file and the facts that posekit detects in it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from posekit.cli.command import command, reading, say
 
-#: Names that the table lists.
+#: Largest number of names that the table lists.
 MOST_NAMES: Final = 40
-#: Detections of a file whose people are told apart and listed: it takes some time.
+#: Largest number of detections whose people are tracked and listed, because tracking takes time.
 MOST_TRACKED: Final = 2000
 
 
@@ -31,7 +31,7 @@ def inspect(source: Path, **given: Any) -> None:
 
 
 def _facts(found: Any) -> list[tuple[str, str]]:
-    """Return the rows of an object; a row without a value is left out."""
+    """Return the rows (name, value) about an object, without rows whose value is empty."""
     if isinstance(found, dict):
         return [(str(name), repr(camera)) for name, camera in found.items()]
     rows = [(name, str(getattr(found, name, "") or "")) for name in ("layout", "unit")]

@@ -1,4 +1,4 @@
-"""The `posekit` command: its commands, its errors and its exit codes."""
+"""The `posekit` command: its subcommands, error messages and exit codes."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ TERMINATED: Final = 143
 
 #: Commands in the order of the help; each is a module of `posekit.cli` with a function of the same name.
 COMMANDS: Final = {
-    "validate": "Judge postures, motion and folders of it: what is wrong, where, and which clips to keep.",
+    "validate": "Judge postures, motion and folders of motion: what is wrong, where, and which clips to keep.",
     "recover": "Recover every posture behind a view, from exact points, key points or a photograph.",
     "render": "Draw postures, motion, results and reports: a picture, an animation or a page.",
-    "view": "Open the page of a file in the browser.",
-    "convert": "Convert between the files that the field exchanges.",
-    "inspect": "Tell what a file holds and how it was understood.",
+    "view": "Show a file as a page in the browser.",
+    "convert": "Convert a file to another format.",
+    "inspect": "Print the content of a file: kind, layout, frames, rate, axes, unit and names.",
     "follow": "Follow a person live: key points in, postures out, line by line.",
-    "batch": "Recover an archive: every file once, resumable.",
+    "batch": "Recover or validate all files of an archive; a stopped run can be continued.",
     "evaluate": "Compare results with the truth, or recover views whose truth is known.",
-    "synth": "Make views with truth: a walker, random postures, motion capture, an object.",
+    "synth": "Make synthetic views of known postures: a walker, random postures, motion capture, an object.",
     "reproduce": "Reproduce the papers' tables and figures.",
     "samples": "Write a folder of small files to try posekit with.",
     "settings": "List the settings of a command with defaults and units.",
-    "demo": "Run all of it on the built-in views.",
+    "demo": "Run validation, recovery and reproduction on built-in files.",
 }
 
 
 class Commands(click.Group):
-    """The commands, each loaded when it is called."""
+    """The group of commands; each command is imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the commands in the order of the help."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
-        """Load a command."""
+        """Import a command."""
         if name not in COMMANDS:
             remedy = nearest(name, COMMANDS, "see posekit --help")
             if name == "repair":
@@ -58,7 +58,7 @@ class Commands(click.Group):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands without loading them."""
+        """List the commands in the help without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
@@ -70,11 +70,11 @@ def posekit() -> None:
 
 
 class Terminated(BaseException):
-    """The process received SIGTERM; files that are half written are removed on the way out."""
+    """The process received SIGTERM; incomplete files are removed while this exception propagates."""
 
 
 def main() -> None:
-    """Run the command line: 0 done, 1 something is not valid, 2 bad input; errors are one line."""
+    """Run the command line. Exit codes: 0 success, 1 invalid postures or failed rows, 2 wrong input."""
     warnings.showwarning = _warn
     signal.signal(signal.SIGTERM, _terminate)
     show_with(progress_bar if sys.stderr.isatty() else None)
@@ -122,6 +122,6 @@ def _fail(message: str, code: int = BAD_INPUT) -> int:
 
 
 def _warn(message: Warning | str, category: type[Warning], *args: Any, **kwargs: Any) -> None:
-    """Print a warning for users as one line; warnings for developers are dropped."""
+    """Print a warning for users in one line; suppress warnings for developers."""
     if issubclass(category, UserWarning):
         say(f"posekit: warning: {' '.join(str(message).split())}", err=True)

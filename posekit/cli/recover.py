@@ -1,4 +1,4 @@
-"""`posekit recover`: every posture behind a view."""
+"""`posekit recover`: compute every posture behind a view."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 )
 @option("--size", default=None, metavar="WxH", hidden=True, help="Width and height of the pictures, pixels.")
 @option("--min-confidence", type=float, default=0.0, hidden=True, help="Minimum confidence of a key point.")
-@option("--linkage", default="", metavar="NAME|FILE", help="An articulated object other than a person.")
+@option("--linkage", default="", metavar="NAME|FILE", help="An articulated object in place of a person.")
 @option(
     "--explain", is_flag=True, help="Print the rejected branches and their reasons, and why frames are empty."
 )
 @settings_options(RecoverSettings, SHOWN)
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
-    """Recover every posture behind a view: each passes the checks and reprojects onto the image."""
+    """Recover every posture behind a view. Each passes the checks and reprojects onto the image."""
     from posekit.doors import view_of
     from posekit.formats.save import refuse_ending, save
     from posekit.recovery.conductor import recover as recover_view
@@ -66,7 +66,7 @@ def recover(source: Path, output: Path, explain: bool, linkage: str, **given: An
 
 
 def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: Path) -> list[str]:
-    """Recover an articulated object other than a person from an uncalibrated view, and print a summary."""
+    """Recover an articulated object, such as a robot, from an uncalibrated view; return lines of a summary."""
     import json
 
     from posekit.files import write_bytes
@@ -103,7 +103,7 @@ def recover_linkage(source: Path, name: str, settings: RecoverSettings, output: 
 
 
 def summary(recovery: Recovery, output: Path) -> list[str]:
-    """Print in a few lines the result, its probability, and the next step."""
+    """Return lines of text about the result, its probability, and the next step."""
     counts = np.bincount(recovery.survivors.frame, minlength=len(recovery))
     empty = int((counts == 0).sum())
     frames = f"{len(recovery)} frame{'s' * (len(recovery) != 1)}"
@@ -138,12 +138,12 @@ def summary(recovery: Recovery, output: Path) -> list[str]:
 
 
 def probability(value: float) -> str:
-    """Write a probability; a small one as a bound."""
+    """Write a probability with two decimals, or as a bound below 0.01."""
     return f"{value:.2f}" if value >= 0.01 else "less than 0.01"
 
 
 def explained(recovery: Recovery) -> list[str]:
-    """List rejected branches by reason over all frames, and the reason of each empty frame."""
+    """Return lines with the number of rejected branches by reason, and the reason of each empty frame."""
     from collections import Counter
 
     lost: Counter[str] = Counter()

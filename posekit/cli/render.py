@@ -1,4 +1,4 @@
-"""`posekit render`: a picture, an animation or a page."""
+"""`posekit render`: draw a file as a picture, an animation or a page."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from posekit.cli.command import command, option, output, reading, say
 )
 @option("--size", default="1280x720", metavar="WxH", help="Pixels.")
 @option("--azimuth", type=float, default=None, metavar="DEGREES", help="0 looks from the front.")
-@option("--elevation", type=float, default=None, metavar="DEGREES", help="Above the level.")
+@option("--elevation", type=float, default=None, metavar="DEGREES", help="Angle above the horizontal.")
 @option("--over", default=None, metavar="PICTURES", help="Picture, folder or film to draw over.")
 @reading()
 def render(source: Path, output: Path, **given: Any) -> None:
-    """Draw postures, motion, a result, a view or a report. Right limbs are orange, left ones blue."""
+    """Draw postures, motion, a result, a view or a report. Right limbs are orange, left limbs are blue."""
     from posekit.doors import render as draw
 
     draw(source, output, **given)

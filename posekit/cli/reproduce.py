@@ -1,4 +1,4 @@
-"""`posekit reproduce`: the papers' tables and figures."""
+"""`posekit reproduce`: compute the tables and figures of the papers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from posekit.cli.command import command, option, output, say
     help="Number of settings of the walker.",
 )
 def reproduce(paper: str, output: Path, pictures: bool, effort: str) -> None:
-    """Write the paper's printed values beside the computed ones, row by row. Exit code 1 if a row fails."""
+    """Compare the values printed in the papers with computed values, row by row. Exit code 1 if a row fails."""
     from posekit.papers import reproduce as write
 
     rows = write(paper, output, effort=effort, pictures=pictures)

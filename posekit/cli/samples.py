@@ -1,4 +1,4 @@
-"""`posekit samples`: small files to try posekit with."""
+"""`posekit samples`: write small files for first trials."""
 
 from __future__ import annotations
 

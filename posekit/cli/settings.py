@@ -1,4 +1,4 @@
-"""`posekit settings`: every setting of a command, with its default and unit."""
+"""`posekit settings`: list all settings of a command with defaults and units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KINDS = {"recover": RecoverSettings, "validate": ValidateSettings}
 @command("settings", "posekit settings recover", "posekit recover walk.json -o out.json --set coverage=1")
 @click.argument("name", metavar="COMMAND", type=click.Choice(list(KINDS)))
 def settings(name: str) -> None:
-    """List the settings that --set and --settings FILE.toml take, in the form of that file."""
+    """List the settings for --set and --settings FILE.toml, in the format of this file."""
     kind = KINDS[name]
     described = descriptions(kind)
     for one in fields(kind):
@@ -24,7 +24,7 @@ def settings(name: str) -> None:
 
 
 def _toml(value: object) -> str:
-    """Write a default as TOML; one that depends on the input is left open."""
+    """Write a default as TOML; empty for a default that depends on the input."""
     if value is None:
         return "…"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""`posekit synth`: views with truth."""
+"""`posekit synth`: make synthetic views that contain the true postures."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 @click.group("synth", no_args_is_help=True)
 def synth() -> None:
-    """Make synthetic views with truth: a walker, random legal postures, motion capture, or an object."""
+    """Make synthetic views of known postures: a walker, random valid postures, motion capture, or an object."""
 
 
 def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options of every kind of view."""
+    """Declare the options that all kinds of views share."""
     return apply(
         output("VIEW", "View file to write, .json."),
         option("--frames", default=frames, type=click.IntRange(1), metavar="N", help="Frames."),
@@ -40,7 +40,7 @@ def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Calla
 @shared(5, "CM")
 @option("--camera", default="400,0,0", metavar="X,Y,Z", help="Camera in the head's frame, cm.")
 @option("--dt", default=0.2, type=click.FloatRange(0), metavar="S", help="Seconds between frames.")
-@option("--velocity", default=1.0, help="Leg lengths a second, 0.5 to 1.3.")
+@option("--velocity", default=1.0, help="Leg lengths per second, 0.5 to 1.3.")
 @option("--lean", default=0.0, metavar="DEGREES", help="Additional forward lean of the back.")
 @option("--phase", default=0.0, metavar="CYCLES", help="Phase of the first frame.")
 def walker(
@@ -54,7 +54,7 @@ def walker(
     lean: float,
     phase: float,
 ) -> None:
-    """Make a person who walks past Lee & Chen's camera, with the gait of Boulic, Thalmann & Thalmann (1990)."""
+    """Make a view of a walking person by Lee & Chen's camera, with the gait of Boulic, Thalmann & Thalmann (1990)."""
     import math
 
     from posekit.synthesis import Walker, walker_view
@@ -70,7 +70,7 @@ def walker(
 @option("--distance", default="2.5,6", metavar="MIN,MAX", help="Distances of the cameras, m.")
 @option("--uncalibrated", is_flag=True, help="Write the view without its camera.")
 def random(output: Path, frames: int, noise: float, seed: int, distance: str, uncalibrated: bool) -> None:
-    """Draw random legal postures, each seen from anywhere on a sphere."""
+    """Make a view of random valid postures, each seen by a camera at a random point of a sphere."""
     import numpy as np
 
     from posekit.synthesis import random_views
@@ -111,7 +111,7 @@ def mocap(
     uncalibrated: bool,
     **facts: Any,
 ) -> None:
-    """See motion capture through a virtual camera that stands still."""
+    """Make a view of motion capture by a virtual camera at a fixed position."""
     import numpy as np
 
     from posekit.formats import open as open_file
@@ -131,7 +131,7 @@ def mocap(
 @click.argument("robot", metavar="NAME|URDF")
 @shared(1, "PX")
 def object_command(robot: str, output: Path, frames: int, noise: float, seed: int) -> None:
-    """Draw a robot within its limits, seen from anywhere by a camera without perspective."""
+    """Make a view of random robot configurations within limits, from random directions without perspective."""
     import json
 
     import numpy as np
@@ -149,7 +149,7 @@ def object_command(robot: str, output: Path, frames: int, noise: float, seed: in
 
 
 def write(view: View, output: Path, noise: float, seed: int, uncalibrated: bool = False) -> None:
-    """Add noise, forget the camera if that is requested, and write the view."""
+    """Add noise to a view, remove its camera if requested, and write it."""
     import numpy as np
 
     from posekit import save

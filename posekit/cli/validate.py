@@ -1,4 +1,4 @@
-"""`posekit validate`: what is wrong with postures and motion, and which clips to keep."""
+"""`posekit validate`: find defects of postures and motion, and decide which clips to keep."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def validate(
     repair: Path | None,
     **given: Any,
 ) -> None:
-    """Judge postures and motion. Exit code: 0 all valid, 1 some are not, 2 bad input."""
+    """Judge postures and motion. Exit code: 0 if all are valid, 1 if some are invalid, 2 for wrong input."""
     from posekit.errors import InputError, refusal
     from posekit.motion.validation import validate as judge
 
@@ -88,7 +88,7 @@ def validate(
 
 
 def write_page(report: Report, output: Path, facts: dict[str, Any]) -> None:
-    """Write the page of a report: the table of findings, and the bodies of the first clips in every frame."""
+    """Write the page of a report: the table of findings, and an animation of the first clips."""
     from posekit.formats import open as open_file
     from posekit.motion import Motion
     from posekit.viewer import draw

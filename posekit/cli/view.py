@@ -1,4 +1,4 @@
-"""`posekit view`: the page of a file, in the browser."""
+"""`posekit view`: show the page of a file in the browser."""
 
 from __future__ import annotations
 
