@@ -277,7 +277,7 @@ def test_pictures_without_the_person_keep_their_place():
     seen, frame, who = crowd()
     kept = (who == 1) & (frame != 4)
     person = np.zeros(kept.sum(), dtype=int)
-    one = Detections(points=seen[kept], names=NAMES, frame=frame[kept], person=person).view(person=0)
+    one = Detections(points=seen[kept], names=NAMES, frame=frame[kept], person=person).view(person=0, rate=30)
     assert len(one) == 20
     assert np.isnan(one.image[4]).all()
     assert np.isfinite(one.image[5, 0]).all()
