@@ -6,6 +6,7 @@ import gzip
 import io
 import os
 import pickle
+import re
 import sys
 import zipfile
 from dataclasses import replace
@@ -218,6 +219,18 @@ def test_position_channels_may_stand_in_place_of_offsets(tmp_path: Path, every: 
     assert np.abs(motion.joints - plain.joints).max() < 1e-12
     assert any("in place of the offsets" in note for note in motion.notes)
     assert not any("in place of the offsets" in note for note in plain.notes)
+
+
+def test_positions_of_a_root_alone_that_repeat_its_offset_are_not_noted(tmp_path: Path) -> None:
+    text = bvh_of(walking(4), tmp_path)
+    plain = posekit.open(tmp_path / "walk.bvh")
+    place = " ".join(text.strip().split("\n")[-2].split()[:3])
+    head, offset, rest = re.split(r"(OFFSET [^\n]*)", text, maxsplit=1)
+    assert set(map(float, offset.split()[1:])) == {0.0}
+    (tmp_path / "root.bvh").write_text(f"{head}OFFSET {place}{rest}")
+    motion = posekit.open(tmp_path / "root.bvh")
+    np.testing.assert_allclose(motion.joints, plain.joints, atol=1e-12)
+    assert motion.notes == plain.notes
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import posekit
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
-from posekit.settings import MEASURED
+from posekit.settings import EXACT, MEASURED
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, other_side
 from posekit.synthesis import forget_camera, random_views
 from tests.test_cli import folder, run
@@ -290,8 +290,9 @@ def test_looser_tolerances_keep_every_stricter_survivor_and_have_a_reason_where_
     assert len(posekit.recover(seen, other).survivors) < len(loose.survivors)
 
 
-def test_a_search_of_depths_is_the_default_and_rules_are_numbers_in_text() -> None:
+def test_a_search_of_depths_is_the_default_rules_are_numbers_and_rounding_is_exact() -> None:
     assert posekit.RecoverSettings(root="search") == posekit.RecoverSettings()
+    assert EXACT.exact and not replace(EXACT, rigid=1.01 * EXACT.rigid).exact
     assert posekit.RecoverSettings(rules="1, 3,5").rules == (1, 3, 5)
     with pytest.raises(posekit.InputError, match="expected some of 1, 2, 3, 4, 5"):
         posekit.RecoverSettings(rules=(0, 1))
