@@ -1,4 +1,4 @@
-"""The statements of both papers, row by row, beside our calculation."""
+"""Comparison of the statements of both papers with posekit's calculations, one row per statement."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ def reproduce(
     paper : {"all", "lee-chen", "taylor"}
         Lee & Chen 1985, Taylor 2000, or both.
     folder : path, optional
-        Folder for ``papers.md``, ``papers.html`` and ``papers.json``; it is made if it is missing.
+        Folder for ``papers.md``, ``papers.html`` and ``papers.json``; it is created if it does not exist.
     effort : {"quick", "fine"}
         Number of settings of the walker for Tables 3 and 4: 500 or 8,100.
     pictures : bool
-        Draw figures of the papers again into the folder, too; needs matplotlib.
+        Also draw the papers' figures again, into the folder; this needs matplotlib.
 
     Returns
     -------
     Rows
-        Place, printed statement, our result and the verdict of each.
+        Place in the paper, printed statement, posekit's result and verdict of each statement.
 
     Raises
     ------
     InputError
-        If a name is not known.
+        If `paper` or `effort` is unknown.
     ViewerError
         If pictures are requested without matplotlib.
     """

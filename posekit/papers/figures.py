@@ -24,7 +24,8 @@ def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
     folder : Path
         Existing folder.
     effort : str
-        As for `posekit.papers.reproduce`: the setting of the walker is the one closest to the print.
+        See `posekit.papers.reproduce`. Of all settings of the walker, the setting closest to the printed counts is
+        drawn.
     """
     paths = []
     setting = count_walks("seq1", effort).settings[closest(effort)]
@@ -44,7 +45,7 @@ def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
 
 
 def draw_taylor(folder: Path) -> list[Path]:
-    """Draw Figs. 7b and 8b: the residual of the constraint over the scale, flips given by hand."""
+    """Draw Figs. 7b and 8b: the residual of the constraint as a function of the scale, with stated flips."""
     paths = []
     for one in constrained_objects():
         s = scale_of(one.points)
@@ -71,7 +72,7 @@ def _sticks(axis: Any, postures: Array, title: str) -> None:
 
 
 def _figure(width: float, height: float) -> Any:
-    """Return an empty figure, inches."""
+    """Return an empty matplotlib figure; sizes are in inches."""
     try:
         from matplotlib.figure import Figure
     except ImportError:

@@ -1,4 +1,4 @@
-"""Lee & Chen 1985: the figure, the camera from the head (§2.1, Table 2), and the body of Table A.1."""
+"""Rows of Lee & Chen 1985 on the figure, the camera from the head (§2.1, Table 2), and the body of Table A.1."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ CAMERA: Final = np.array([4.0, 0.0, 0.0])
 #: Rotation from the head-centred frame to the camera of SEQ1, OpenCV's axes.
 R_CAM_HEAD: Final = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 
-#: Two more points of the head, head-centred frame, metres.
+#: Two additional head points, head-centred frame, metres.
 CHIN_AND_CROWN: Final = {"chin": (-0.292, 0.55, 0.0), "crown": (-0.34, 0.74, 0.0)}
 
 N_PICTURES: Final = 200
-#: Standard deviation on the image plane, metres: a tenth of a unit of Table A.2(b)'s fourth digit.
+#: Standard deviation on the image plane, metres: a tenth of a unit of the fourth digit in Table A.2(b).
 IMAGE_NOISE: Final = 1e-6
 
-#: Parts of Table 2, and the largest difference (cm) that counts as agreement: the printed values come from rounded
-#: data.
+#: Parts of Table 2, and the largest difference (cm) that counts as agreement, because printed values are computed from
+#: rounded data.
 TABLE_2_PARTS: Final = (
     ("(a), transformation matrix", "T", 0.03),
     ("(b), rotation matrix", "R", 1e-4),
@@ -92,7 +92,7 @@ def _figure_rows() -> Iterator[Row]:
     ordered = depth == sorted(depth)
     here = f"{', '.join(map(str, sizes))} joints, {'in' if ordered else 'out of'} order"
     yield row("classes", here, sizes == [3, 4, 4, 2] and ordered)
-    # Both frames from the printed digits: Table A.2(a), its eye corrected, mapped to Table 2(d).
+    # Both frames follow from the printed digits: Table A.2(a), with the corrected eye, is mapped to Table 2(d).
     affine = np.linalg.lstsq(np.column_stack([100 * TABLE_A2.points, np.ones(6)]), _tables()["head"])[0]
     determinant = float(np.linalg.det(affine[:3]))
     yield row("frames", f"determinant {determinant:.2f} from one to the other", abs(determinant + 1) < 0.01)
@@ -113,7 +113,7 @@ def _null_space_rows() -> Iterator[Row]:
 
 
 def _null_space(points: Array, image: Array) -> tuple[Array, Array]:
-    """Solve eqs. (2)-(5): the singular values, and the matrix (4, 3) of the smallest."""
+    """Solve eqs. (2)-(5); return the singular values, and the matrix (4, 3) of the smallest singular value."""
     rows = []
     for (x, y, z), (u, v) in zip(points, image, strict=True):
         rows.append([x, 0, -u * x, y, 0, -u * y, z, 0, -u * z, 1, 0, -u])
@@ -148,7 +148,7 @@ def _table_2_rows() -> Iterator[Row]:
 
 
 def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
-    """Return the error of the camera's position, centimetres, and the head point that does not fit the others."""
+    """Return the error of the refined camera position, centimetres, and the head point that does not fit the others."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the misfit is returned
         pose = solve_pose(head, image, LeeChenCamera(f=None))
@@ -157,7 +157,7 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
 
 
 def _linear(head: HeadPoints, image: Array) -> float:
-    """Return the error of the linear solution's camera position, centimetres; data are normalised (Hartley 1997)."""
+    """Return the error of the linear solution's camera position, centimetres, with normalised data (Hartley 1997)."""
     centre, middle = head.points.mean(axis=0), image.mean(axis=0)
     sizes = [np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean()) for at in (head.points, image)]
     P = _null_space((head.points - centre) / sizes[0], (image - middle) / sizes[1])[1].T

@@ -1,4 +1,4 @@
-"""Lee & Chen 1985: Table 1, the angles of §3.2.A, collisions and the rules of §3.3, on bodies bent with Pinocchio."""
+"""Rows of Lee & Chen 1985 on Table 1, angles of §3.2.A, collisions and rules of §3.3, with postures from Pinocchio."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from posekit.validators.collision import Collision
 from posekit.validators.joint_range import JointRange
 from posekit.validators.walking import WalkingRules
 
-#: Distance from a bound of Table 1 at which a body is judged, either side.
+#: Distance from a bound of Table 1, inside and outside, at which a posture is judged.
 PROBE_DEGREES: Final = 0.3
 
 #: Flexion of the knee for hip flexion beyond 90 degrees, degrees (Table 1, footnote a).
@@ -31,14 +31,15 @@ HIP_FLEXIONS: Final = (80.0, 100.0, 119.0)
 
 N_COLLISIONS, N_FORMULAS = 300, 200
 
-#: Largest difference from the formulas written out; arc cosines lose a tenth of it near 0 and 180 degrees.
+#: Largest accepted difference from the written-out formulas; the rounding error of arc cosines near 0 and 180 degrees
+#: is a tenth of it.
 FORMULA_DEGREES: Final = 1e-5
 
-#: Rules of §3.3: angles (degrees) of a posture that the rule's words forbid, and the changes that make it allowed.
+#: Rules of §3.3: angles (degrees) of a posture that a rule forbids, and changes of the angles that make it allowed.
 RULES: Final[dict[int, tuple[dict[str, float], dict[str, float]]]] = {
     1: ({"right_shoulder.flexion": 30, "left_shoulder.flexion": 30}, {"left_shoulder.flexion": -30}),
     2: ({"right_shoulder.flexion": 30, "right_hip.flexion": 30}, {"right_hip.flexion": -30}),
-    # Turned by -20 degrees, the right hip is in front and the left behind.
+    # At a rotation of -20 degrees, the right hip is in front and the left hip behind.
     3: (
         {"pelvis.rotation": -20, "right_hip.flexion": -30, "left_hip.flexion": 30},
         {"right_hip.flexion": 30, "left_hip.flexion": -30},
@@ -64,9 +65,9 @@ def constraint_rows() -> Iterator[Row]:
 
 
 def posed(angles: Mapping[str, float]) -> Array:
-    """Return the points (1, 19, 3) of a body that stands except for some angles of the URDF, degrees.
+    """Return the points (1, 19, 3) of a standing posture in which the given URDF angles (degrees) are changed.
 
-    If the pelvis alone is bent the legs hang: Table 1 counts their angles from the torso.
+    If only the pelvis is bent, the legs hang down, because Table 1 measures leg angles relative to the torso.
     """
     figure = load_figure()
     q = pin.neutral(figure.model)[None].copy()
@@ -82,7 +83,7 @@ def posed(angles: Mapping[str, float]) -> Array:
 
 
 def body_of(points: Array, tolerance: Tolerance = EXACT, **settings: Any) -> Body:
-    """Return bodies (N, 19, 3) of the built-in figure as checks see them, with fields of `ValidateSettings`."""
+    """Return postures (N, 19, 3) of the built-in figure as the input of checks, with fields of `ValidateSettings`."""
     return Body(
         joints=points[:, : len(JOINTS)],
         head=points[:, len(JOINTS) :],
@@ -94,7 +95,7 @@ def body_of(points: Array, tolerance: Tolerance = EXACT, **settings: Any) -> Bod
 
 
 def legal(check: Check, points: Array, **settings: Any) -> list[bool]:
-    """Return which bodies (N, 19, 3) pass a check."""
+    """Return which postures (N, 19, 3) pass a check."""
     violated = check.judge(body_of(points, **settings)).violated
     return [not any(row) for row in violated.tolist()]
 
@@ -176,7 +177,7 @@ def _named(angles: Mapping[str, float]) -> str:
 
 
 def _formula_rows() -> Iterator[Row]:
-    """Compare the angles of §3.2.A, written out as printed, with `table1-printed` on random bodies."""
+    """Compare the angles of §3.2.A, computed as printed, with `table1-printed` for random postures."""
     figure = load_figure()
     points = figure.forward_kinematics(random_postures(figure, N_FORMULAS, np.random.default_rng(32)))
     judgement = JointRange().judge(body_of(points, ranges="table1-printed"))
@@ -186,7 +187,7 @@ def _formula_rows() -> Iterator[Row]:
         own = {where: angle for where, angle in written.items() if where.split(".")[0].endswith(joints)}
         off = []
         for where, angle in own.items():
-            # The paper counts bending and rotation of pelvis and neck alike to both sides.
+            # The paper gives bending and rotation of pelvis and neck the same sign to both sides.
             ours = found[where] if where.startswith(SIDES) else np.abs(found[where])
             off.append(turned_near(ours - angle, 0.0, half_turn=180.0))
         decided = np.isfinite(off)
@@ -220,7 +221,7 @@ def _written_out(points: Array) -> dict[str, Array]:
     right, left = part("pelvis", "right_hip").T, part("pelvis", "left_hip").T
     middle_of_hips = (right + left) / 2
     planes = {"pelvis": (np.cross(middle_of_hips, left - right), middle_of_hips)}
-    # The head's axes, forward and up in Table A.2, where its points are.
+    # The head's forward and up axes are the axes of Table A.2.
     moved = points[:, [0, *range(14, 19)]] - points[:, :1]
     linear = np.array([np.linalg.lstsq(TABLE_A2.points - TABLE_A2.points[0], each)[0] for each in moved])
     ahead, up = (np.einsum("nij,nj->ni", axes, linear[:, k]) for k in (0, 1))

@@ -1,7 +1,8 @@
-r"""Lee & Chen 1985: the tree (§3.1) and Tables 3 and 4 with §4, over the open settings of the walker.
+r"""Rows of Lee & Chen 1985 on the tree (§3.1) and Tables 3 and 4 (§4), over the unprinted settings of the walker.
 
-The paper prints neither the walker's speed nor its lean nor the phase of frame 1. The survivors are counted over a grid
-of settings; a printed count is compared with the setting closest to all cells, and with the spread over all settings.
+The paper prints neither the walker's speed, nor its lean, nor the phase of frame 1. The survivors are counted over a
+grid of settings; a printed count is compared with the count at the setting closest to all cells, and with the counts at
+all settings.
 """
 
 from __future__ import annotations
@@ -33,37 +34,37 @@ from posekit.validators.joint_range import JointRange
 from posekit.validators.rigid_parts import RigidParts
 from posekit.validators.walking import WalkingRules
 
-#: Settings of the walker: speeds (leg lengths/s) of mid gait, additional leans (degrees) as large as the gait's own,
-#: and the number of phases of frame 1.
+#: Settings of the walker: speeds (leg lengths/s) of mid gait, additional leans (degrees) up to the lean of the gait
+#: model, and number of phases of frame 1.
 GRIDS: Final = {
     "quick": (np.linspace(0.5, 1.3, 5), np.linspace(-4.0, 4.0, 5), 20),
     "fine": (np.linspace(0.5, 1.3, 9), np.linspace(-4.0, 4.0, 9), 100),
 }
 
-#: Allowed error of distances inside the torso. The paper compares them and prints no number; with 1 cm, near-frontal
-#: torsos stay ambiguous, as they do in the paper.
+#: Allowed error of distances inside the torso. The paper prints no value. With 1 cm, nearly frontal torsos stay
+#: ambiguous, as in the paper.
 RIGID_METRES: Final = 0.01
 
 TANGENT_METRES: Final = 0.001
 #: Distance by which a segment may be too short for its image, in the tables and in the comparison of the shoulders.
 LOOSE_TANGENT_METRES: Final = 0.01
 
-#: Distance of every joint from its group's representative (§3.4); not printed.
+#: Largest distance of any joint from the representative of its group (§3.4); the paper does not print it.
 GROUP_METRES: Final = 0.05
 
-#: Largest distance of a joint between a survivor and the input that are the same posture.
+#: Largest distance of a joint between the input and a survivor that counts as the input.
 SAME_METRES: Final = 1e-6
 
-#: Distance of a body from the camera at which every wrong start still reaches the next ray, metres.
+#: Distance of a body from the camera at which every wrong start of a segment still reaches the next ray, metres.
 FAR_METRES: Final = 1e5
 
-#: Percentiles over all settings that bound the usual counts.
+#: Percentiles of the counts over all settings; counts between them are usual.
 PERCENTILES: Final = (5.0, 95.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walks:
-    """One sequence at S settings of the walker, counted as the paper counts it.
+    """Counts of survivors of one sequence at S settings of the walker, by the paper's definitions.
 
     Parameters
     ----------
@@ -72,9 +73,9 @@ class Walks:
     settings : array (S, 3)
         Velocity (leg lengths/s), lean (degrees), phase of frame 1 (cycles).
     levels : int array (S, 2, 3, 14)
-        Survivors after the physical checks, and after Rules 1 and 2 too; by frame 1, 3, 5 and level.
+        Number of survivors after the physical checks, and after Rules 1 and 2 as well; by frame 1, 3, 5 and level.
     final : int array (S, 2)
-        Groups of frame 1 after Rules 1-2, and after Rules 1-5.
+        Number of groups in frame 1 after Rules 1-2, and after Rules 1-5.
     truth : bool array (S,)
         Whether the input survives Rules 1-5.
     """
@@ -99,8 +100,8 @@ class Walks:
 
     @property
     def distance(self) -> Array:
-        """Distance of each setting from the print (S,): sum of |log2(here / print)| over all cells."""
-        # A count of zero is replaced by half a survivor: its logarithm must be finite.
+        """Distance (S,) of each setting from the printed counts: sum of |log2(count / printed)| over all cells."""
+        # A count of zero is replaced by half a survivor, so that its logarithm is finite.
         return np.asarray(np.abs(np.log2(np.maximum(self.cells, 0.5) / self.theirs)).sum(axis=1))
 
 
@@ -119,7 +120,7 @@ def walk_rows(effort: str = "quick") -> Iterator[Row]:
 
 
 def closest(effort: str = "quick") -> int:
-    """Return the row of the setting whose counts are closest to the printed cells of both sequences together."""
+    """Return the index of the setting whose counts are closest to the printed counts of both sequences together."""
     return int(np.argmin(np.sum([count_walks(name, effort).distance for name in SEQUENCES], axis=0)))
 
 
@@ -170,10 +171,10 @@ def _counted(
 
 
 def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -> tuple[Trees, Array]:
-    """Grow the trees of a walker's view as the paper does; return them, and the head points (F, 5, 3).
+    """Grow the trees of a walker's view by the paper's method; return the trees, and the head points (F, 5, 3).
 
-    Torsos are compared by their distances alone, which do not distinguish them from their mirror images; joint ranges
-    are ``table1-printed``.
+    Torsos are judged only by their distances, which do not distinguish a torso from its mirror image. Joint ranges are
+    ``table1-printed``.
     """
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
     pose = solve_pose(TABLE_A2, image, LeeChenCamera(f=None))
@@ -288,7 +289,7 @@ def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
 
 
 def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], place: dict[str, Any]) -> Row:
-    """Compare counts at the closest setting with the printed ones; a printed count that few settings reach differs."""
+    """Compare counts at the closest setting with printed counts; a printed count that few settings reach differs."""
     theirs, cells = walks.theirs[columns], walks.cells[:, columns]
     ours = cells[chosen]
     low, high = np.percentile(cells, PERCENTILES, axis=0, method="inverted_cdf")
@@ -350,9 +351,10 @@ def _remark_rows(walks: Sequence[Walks], chosen: int, effort: str) -> Iterator[R
 
 
 def _beyond(setting: Array) -> Array:
-    r"""Return by how much the elbows' rays pass the wrong shoulders of SEQ1's frame 1 out of reach (2,), metres.
+    r"""Return how much (2,), metres, the elbows' rays are out of reach of the wrong shoulders in SEQ1's frame 1.
 
-    The elbow lies on its ray d, an upper arm l from the shoulder S; there is none if :math:`|S - (S \cdot d) d| > l`.
+    The elbow lies on its ray d, an upper arm l from the shoulder S; such a point does not exist if
+    :math:`|S - (S \cdot d) d| > l`.
     """
     points, beyond = sequence("seq1", setting).truth[0], []
     for side in SIDES:

@@ -1,4 +1,4 @@
-"""Rows of the papers, each with the calculation beside it: one page that a reviewer can follow."""
+"""Rows that compare statements of the papers with calculations, and the page that lists them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VERDICTS: Final[dict[Verdict, str]] = {
 
 COLUMNS: Final = ("place", "printed", "here", "verdict", "check", "why")
 
-#: Reason of a row that differs although nothing in ``rows.toml`` explains it.
+#: Reason of a row that differs and has no explanation in ``rows.toml``.
 UNEXPLAINED: Final = "not explained"
 
 STYLE: Final = (
@@ -37,22 +37,22 @@ STYLE: Final = (
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One statement of a paper beside our calculation.
+    """One statement of a paper, compared with posekit's calculation.
 
     Parameters
     ----------
     paper : str
         Key of `PAPERS`.
     place, printed : str
-        Place in the paper, and the statement.
+        Place in the paper, and the printed statement.
     here : str
-        Our result.
+        posekit's result.
     verdict : {"agrees", "differs", "open"}
         See `VERDICTS`.
     check : str
-        Calculation of our result.
+        Description of posekit's calculation.
     why : str
-        Why it differs or is open; empty if it agrees.
+        Reason why the result differs or the comparison is open; empty if they agree.
     """
 
     paper: str
@@ -69,7 +69,7 @@ class Rows(list[Row]):
 
     @property
     def passed(self) -> bool:
-        """Whether every row that differs has its reason."""
+        """Whether every row that differs has an explanation."""
         return all(one.why != UNEXPLAINED for one in self)
 
     def counts(self) -> str:
@@ -99,18 +99,18 @@ def _texts() -> dict[str, dict[str, str]]:
 
 
 def row(key: str, here: str, fits: bool | None, **names: Any) -> Row:
-    """Make a row from its texts in ``rows.toml``.
+    """Build a row from its texts in ``rows.toml``.
 
     Parameters
     ----------
     key : str
         Table of ``rows.toml``.
     here : str
-        Our result.
+        posekit's result.
     fits : bool or None
         Whether the result agrees; None if the paper does not print a number that decides it.
     **names
-        Values of the words in braces.
+        Values of the placeholders in braces.
     """
     texts = {name: text.format(**names) for name, text in _texts()[key].items()}
     if fits:

@@ -1,4 +1,4 @@
-"""Taylor 2000: the family of postures behind one picture, the proportions of Table 1, and the accuracy of §3.2."""
+"""Rows of Taylor 2000 on the family of postures behind one picture, the proportions of Table 1, and §3.2's accuracy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DISTANCE: Final = (3.0, 6.0)
 #: Standard deviation of each coordinate of synthetic photographs, pixels.
 NOISE_PIXELS: Final = 2.0
 
-#: Joints of the markers of §3.2: a chain of five segments with four angles between them.
+#: Joints with markers in §3.2: a chain of five segments with four angles between them.
 MARKERS: Final = ("right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow", "left_wrist")
 
 LENGTHS: Final = {"figure": "the person's own lengths", "taylor": "the proportions of Table 1"}
@@ -78,9 +78,9 @@ def human(figure: Figure) -> Linkage:
 def taylor_figure(stature: float) -> Figure:
     """Return the figure of a person with the proportions of Table 1.
 
-    Limbs and the widths of both girdles are the table's. The table does not give the inner shape of the torso: it is
-    the built-in figure's, scaled across by the girdles, and along so that the path from the middle of the shoulders by
-    the pelvis to the middle of the hips has the length of the table's spine.
+    Limbs and the widths of both girdles are from the table. The table does not determine the inner shape of the torso.
+    The built-in figure's shape is used, scaled sideways by the girdles, and vertically so that the path from the middle
+    of the shoulders via the pelvis to the middle of the hips has the length of the table's spine.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def taylor_figure(stature: float) -> Figure:
 
 
 def placed(family: LinkageFamily, s: float, signs: NDArray[Any]) -> Array:
-    """Return postures (..., P, 3) at a scale; segments that are too short for their image lie flat."""
+    """Return postures (..., P, 3) at a scale; segments that are too short for their image are parallel to the image."""
     lengths = family.linkage.lengths
     depth = np.sqrt(np.maximum(lengths**2 - (family.extent / s) ** 2, 0.0))
     nodes = (signs * depth) @ family.incidence.depth.T
@@ -187,7 +187,7 @@ def _different(postures: Array) -> int:
 
 
 def _proportion_rows() -> Iterator[Row]:
-    """Measure Table 1 on the body that is made from it."""
+    """Compare Table 1 with the proportions of the figure that is made from it."""
     points = taylor_figure(STATURE).neutral_points
     for segment, given in printed()["taylor"]["lengths"].items():
         ends = [points[[JOINT[joint] for joint in joints]].mean(axis=0) for joints in given["chain"]]
@@ -235,7 +235,7 @@ def _by_hand(linkage: Linkage, camera: PinholeCamera, truth: Array, image: Array
     """Return the postures (F, 12, 3) of noisy pictures with the true flips."""
     rng = np.random.default_rng(0)
     noisy = image + NOISE_PIXELS * rng.standard_normal(image.shape)
-    # The stature is seen at the mean depth of the points, both its ends with noise.
+    # The image of the stature is at the mean depth of the points, with noise at both ends.
     pixels = camera.K[1, 1] * STATURE / truth[..., 2].mean(axis=1)
     stated = (pixels + NOISE_PIXELS * np.sqrt(2.0) * rng.standard_normal(len(truth))) / STATURE
     found = []

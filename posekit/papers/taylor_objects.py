@@ -1,6 +1,6 @@
-r"""Taylor 2000, Figs. 7 and 8: a closed chain and a flat one, whose shape fixes the scale (§2.1, §3.3).
+r"""Rows of Taylor 2000, Figs. 7 and 8: a closed chain and a flat chain, whose shape determines the scale (§2.1, §3.3).
 
-The paper prints neither lengths nor postures of its objects; these are posekit's own (`urdf/linkages`). Views from
+The paper prints neither lengths nor postures of its objects; the lengths here are from `urdf/linkages`. Views from
 random directions are compared with the angles' sensitivity to noise. The unknowns are the points :math:`X` (units of
 length, the first at depth 0) and the scale :math:`s`; the image shows :math:`u = s\,(X_x, X_y)`. The lengths and planes
 are equations :math:`c(X) = 0`, so that only motions along :math:`N = \ker \partial c` are free. The noise of the points
@@ -29,17 +29,17 @@ N_PICTURES, N_VIEWS, N_DRAWS = 200, 1000, 1000
 
 SEED: Final = 2000
 
-#: Distance between a and c of the four bars, over which they are folded, millimetres.
+#: Length of the diagonal from a to c along which the four bars are folded, millimetres.
 DIAGONAL: Final = 140.0
 
 TURNS: Final = (50.0, 110.0, 110.0, 80.0)
-#: Turns of the flat chain at its points, degrees, and largest random turn: beyond it segments overlap.
+#: Angles of the flat chain at its points, degrees, and largest random angle; larger angles make segments overlap.
 MAX_TURN: Final = 150.0
 
-#: Probability that every angle is within the print's bound from which a view counts as solvable.
+#: A view counts as solvable if every angle is within the printed bound with at least this probability.
 SOLVABLE: Final = 0.95
 
-#: Singular value of the equations, as a fraction of the largest, below which a motion is free.
+#: Smallest singular value of the equations, as a fraction of the largest, of a constrained motion.
 FREE_RATIO: Final = 1e-9
 
 #: Step of the angles' central differences, as a fraction of the object's size.
@@ -80,17 +80,17 @@ class Constrained:
         return [((k - 1) % n, k, (k + 1) % n) for k in joints]
 
     def random_posture(self, rng: np.random.Generator) -> Array:
-        """Return the object in a plane, folded over any diagonal that closes it, or laid with any turns."""
+        """Return the object in a plane, folded along a random possible diagonal, or with random angles."""
         lengths = self.linkage.lengths
         if self.constraint == "coplanar":
             return _laid(lengths, rng.uniform(-MAX_TURN, MAX_TURN, len(lengths) - 1))
         ab, bc, cd, da = lengths
-        # At either end a pair of bars is straight, and its height is the root of zero.
+        # At both limits a pair of bars is straight, and its height is the square root of zero.
         shortest, longest = max(abs(ab - bc), abs(cd - da)), min(ab + bc, cd + da)
         return _folded(lengths, shortest + rng.uniform(0.05, 0.95) * (longest - shortest))
 
     def recovered(self, truth: Array, s: float, image: Array) -> Array | None:
-        """Return the posture of least residual, flips given by hand; None if no scale has a minimum."""
+        """Return the posture with the smallest residual for stated flips; None if no scale is a minimum."""
         flips = LinkageFamily(linkage=self.linkage, image=truth[:, :2] * s).flips_of(truth)
         family = LinkageFamily(linkage=self.linkage, image=image)
         found = search(family, {self.constraint: 1.0}, flips)
@@ -123,7 +123,7 @@ def object_rows() -> Iterator[Row]:
 def joint_angles(points: Array, triples: Sequence[tuple[int, int, int]]) -> Array:
     """Return the angle (..., T) at b between the segments to a and c, for each triple (a, b, c), degrees.
 
-    The arc tangent of cross and dot product keeps its digits for parallel segments.
+    The arc tangent of cross and dot product is accurate for parallel segments.
     """
     a, b, c = np.array(triples).T
     u, v = points[..., a, :] - points[..., b, :], points[..., c, :] - points[..., b, :]
@@ -154,7 +154,7 @@ def _picture_rows(one: Constrained) -> Iterator[Row]:
 
 
 def _views_row(one: Constrained, *, posed: bool) -> Row:
-    """View an object from random directions, uniform over the sphere, in its posture or in a random one each."""
+    """View an object from random directions, uniform over the sphere, in its posture or in random postures."""
     rng = np.random.default_rng(SEED)
     chances, worst = np.empty(N_VIEWS), np.full(N_VIEWS, np.inf)
     for k, quaternion in enumerate(rng.normal(size=(N_VIEWS, 4))):
@@ -226,12 +226,12 @@ def _words(one: Constrained) -> dict[str, object]:
 
 
 def scale_of(points: Array) -> float:
-    """Return the scale, pixels per unit of length, that makes an object `SIZE_PIXELS` large."""
+    """Return the scale, pixels per unit of length, at which an object's image has the size `SIZE_PIXELS`."""
     return SIZE_PIXELS / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
 
 
 def _folded(lengths: Array, diagonal: float) -> Array:
-    """Return the four bars in a plane (4, 3), folded over their diagonal."""
+    """Return the four bars in a plane (4, 3), folded along their diagonal."""
     ab, bc, cd, da = lengths
     b = (ab**2 - bc**2 + diagonal**2) / (2 * diagonal)
     d = (da**2 - cd**2 + diagonal**2) / (2 * diagonal)
@@ -247,7 +247,7 @@ def _laid(lengths: Array, turns: Sequence[float] | Array) -> Array:
 
 
 def _turned(points: Array, *, tilt: float, spin: float) -> Array:
-    """Spin an object in its plane and tilt the plane away from the image's, by degrees."""
+    """Rotate an object in its plane and tilt the plane relative to the image, by angles in degrees."""
     x, z = np.radians([tilt, spin])
     tilted = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
     spun = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])

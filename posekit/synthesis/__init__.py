@@ -1,4 +1,4 @@
-"""Synthetic views with truth: a walker, random legal postures, motion capture; fixed seeds, and noise."""
+"""Synthetic views with true joints: of a walker, of random valid postures, and of motion capture."""
 
 from posekit.synthesis.cameras import default_camera as default_camera
 from posekit.synthesis.cameras import look_at as look_at

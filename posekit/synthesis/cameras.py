@@ -1,4 +1,4 @@
-"""Virtual cameras: their positions and rotations, and whether a body is inside their picture."""
+"""Virtual cameras: positions and rotations, and the test whether a body is inside a picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from posekit.geometry import Array, Flags, Ints, cross, unit
 #: Sine between line of sight and `up` below which no roll makes the camera upright.
 MIN_SINE_TO_UP: Final = 1e-6
 
-#: Draws of one camera before the distance and the focal length are refused.
+#: Largest number of draws for one camera; after that distance and focal length are refused.
 MAX_DRAWS: Final = 200
 
 #: Default distances of the optical centre from the middle of the body, metres.
@@ -26,15 +26,15 @@ def default_camera() -> PinholeCamera:
 
 
 def look_at(position: Array, target: Array, up: Array) -> Array:
-    """Turn cameras towards targets, upright.
+    """Return the rotations of upright cameras that look at targets.
 
     Parameters
     ----------
     position, target : array (..., 3)
         Optical centre and a point on the optical axis, world frame.
     up : array (3,)
-        The direction that points up in the image: y of OpenCV's camera frame points the other way. If the camera looks
-        along it, the world axis farthest from the line of sight takes its place.
+        World direction that points up in the image, i.e. along -y of OpenCV's camera frame. If the camera looks along
+        `up`, the world axis farthest from the line of sight is used instead.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
     forward = unit(target - position)
     if np.isnan(forward).any():
         raise refusal("", "camera", "a position equal to its target", "two points", "move one of them")
-    # Looking along `up`, no roll is upright: any axis across the line of sight will do, the farthest one is safest.
+    # If the camera looks along `up`, no roll is upright, so the axis farthest from the line of sight is used.
     spare = np.eye(3)[np.argmin(np.abs(forward), axis=-1)]
     right = cross(forward, unit(np.broadcast_to(up, forward.shape)))
     upright = np.linalg.norm(right, axis=-1, keepdims=True) > MIN_SINE_TO_UP
@@ -87,15 +87,15 @@ def place_cameras(
 ) -> tuple[Array, Array]:
     """Draw a camera for each of N bodies until its points are in front of it and inside the picture.
 
-    The direction is uniform on the sphere (Muller 1959: normalised Gaussians) and the distance uniform in its range.
-    The camera looks at the middle of the body's bounding box, upright.
+    Directions are uniform on the sphere (Muller 1959: normalised Gaussians), and distances are uniform in their range.
+    The upright camera looks at the middle of the body's bounding box.
 
     Parameters
     ----------
     points : array (N, P, 3)
         Points of each body, or all points of all frames of one camera, world frame, metres; NaN is ignored.
     up : array (3,)
-        The world's up.
+        Up direction of the world.
     rng : Generator
         Seeded by the caller.
     camera : PinholeCamera, optional
@@ -112,7 +112,7 @@ def place_cameras(
     Raises
     ------
     InputError
-        If the distances are impossible, or a body fits into none of `MAX_DRAWS` pictures.
+        If the distances are impossible, or a body is inside none of `MAX_DRAWS` drawn pictures.
     """
     camera = camera or default_camera()
     near, far = distance

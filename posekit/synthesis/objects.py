@@ -1,4 +1,4 @@
-"""Views of articulated objects: random configurations of a robot, seen by a scaled orthographic camera."""
+"""Views of articulated objects: random configurations of a robot in a scaled orthographic camera."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ PIXELS_PER_METRE: Final = 500.0
 
 
 def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Array:
-    """Draw configurations (n, nq) within the joint limits, at most one turn each; a free base has any rotation.
+    """Draw configurations (n, nq) within the joint limits; a free base has a random rotation.
 
     Parameters
     ----------
     robot : Robot
-        The robot; joints without limits are drawn from one turn.
+        The robot. Angles are drawn from at most one full turn, also for joints without limits.
     n : int
         Number of configurations.
     rng : Generator
@@ -39,7 +39,7 @@ def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Arr
         raise refusal("", "frames", str(n), "1 or more", "ask for more")
     model = robot.model
     q = np.tile(robot.neutral, (n, 1))
-    # One angle; cosine and sine; floating.
+    # Joints with one angle come first, then joints with cosine and sine, then floating joints.
     for j in sorted(range(1, model.njoints), key=lambda j: model.nqs[j]):
         at, size = model.idx_qs[j], model.nqs[j]
         if size == 1:
@@ -60,14 +60,14 @@ def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Arr
 def object_view(
     robot: Robot, points: Sequence[str], n: int, rng: np.random.Generator, *, noise: float = 0.0
 ) -> tuple[Array, Array]:
-    """Draw random configurations, each seen from anywhere by a scaled orthographic camera.
+    """Draw random configurations, each seen from a random direction by a scaled orthographic camera.
 
     Parameters
     ----------
     robot : Robot
         A robot with a free base.
     points : sequence of P str
-        Links or joints whose origins are seen.
+        Links or joints whose origins are the image points.
     n : int
         Number of frames.
     rng : Generator
@@ -110,7 +110,7 @@ def object_document(
     points : sequence of P str
         Names of the points.
     image, truth : array (F, P, 2) and (F, P, 3)
-        Pixels, and camera frame in metres.
+        Image points, pixels, and true positions, camera frame, metres.
     scale : float, optional
         Pixels per metre; not stated if None.
     """

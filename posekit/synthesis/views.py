@@ -1,6 +1,6 @@
-"""Views with truth: a walker, random legal postures, motion capture; noise with seeds, and the built-in views.
+"""Views with true joints: of a walker, of random valid postures, of motion capture, and the built-in views.
 
-Each function returns a `posekit.cameras.View` whose `truth` holds the true joints in the camera's frame.
+Each function returns a `posekit.cameras.View` whose `truth` has the true joints in the camera frame.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from posekit.synthesis.walker import Walker
 #: Distance of the image plane from the centre of projection, metres (Lee & Chen 1985, Table 2: 5 cm).
 PAPER_F: Final = 0.05
 
-#: Frames of a sequence, and seconds between them (Lee & Chen 1985, Appendix).
+#: Number of frames of a sequence, and seconds between frames (Lee & Chen 1985, Appendix).
 PAPER_FRAMES, PAPER_STEP = 5, 0.2
 
 #: Built-in sequences: camera position of the paper (origin of the image plane, head-centred frame, metres), and phase
@@ -44,15 +44,15 @@ SEQUENCES: Final = {"seq1": ((4.0, 0.0, 0.0), 0.11), "seq2": ((3.0, 0.0, 3.0), 0
 #: Velocity of the built-in sequences, leg lengths per second. The paper does not print it.
 SEQUENCE_VELOCITY: Final = 0.7
 
-#: Up in the walker's head-centred frame, and in the world of random postures.
+#: Up direction in the walker's head-centred frame, and in the world of random postures.
 UP_WALKER, UP_RANDOM = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
-#: Fraction of random draws that must be legal and free of collision; below it the limits are refused.
+#: Smallest fraction of random draws that are valid; below it the limits are refused.
 MIN_ACCEPTED: Final = 1e-3
 
 
 def builtin_view(name: str) -> View:
-    """Return a built-in view of the walker, in the manner of Lee & Chen 1985, §4.
+    """Return a built-in view of the walker, similar to the sequences of Lee & Chen 1985, §4.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def builtin_view(name: str) -> View:
     Raises
     ------
     InputError
-        If there is no view of that name.
+        If no built-in view has this name.
 
     Examples
     --------
@@ -78,10 +78,10 @@ def builtin_view(name: str) -> View:
 def view_of(
     figure: Figure, camera: PinholeCamera | LeeChenCamera, points_cam: Array, *, time: ArrayLike | None = None
 ) -> View:
-    """Project a figure's points exactly, and return the view with the truth.
+    """Project a figure's points without noise, and return the view with the true joints.
 
-    The view states the lengths and head points that differ from the built-in figure's. The neck is given as root in
-    frames whose head is not seen whole. A Lee-Chen camera's f is left open in the view, and its file unit is cm.
+    The view states lengths and head points that differ from the built-in figure's. The root is the neck in frames in
+    which a head point is unknown. For a Lee-Chen camera, the view has an unknown f and the file unit cm.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def view_of(
     camera : PinholeCamera or LeeChenCamera
         Intrinsics; f of a Lee-Chen camera must be given.
     points_cam : array (F, 19, 3)
-        Joints and head points, camera frame (OpenCV's convention), metres; NaN if absent.
+        Joints and head points, OpenCV camera frame, metres; unknown points are NaN.
     time : array (F,), optional
         Seconds; frame numbers if not given.
 
@@ -134,7 +134,7 @@ def view_of(
 
 
 def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
-    """Add Gaussian noise to every image point; the truth stays, and the view states the deviation if it is in pixels.
+    """Add Gaussian noise to every image point; the view states the standard deviation if it is in pixels.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
 
 
 def forget_camera(view: View) -> View:
-    """Return the same pictures as photographs by an unknown camera: scaled orthographic, without a scale."""
+    """Return the same image points with an unknown camera, which is scaled orthographic and has no scale."""
     names = ("time", "image", "truth", "lengths", "shoulders", "stature", "unit", "deviation")
     known = {name: getattr(view, name) for name in names}
     return View(camera=ScaledOrthographicCamera(scale=None), **known)
@@ -187,8 +187,8 @@ def walker_view(
     walker : Walker
         The person and the gait.
     camera : array (3,)
-        Camera position in the paper's sense: origin of the image plane, head-centred frame (x forward, y up, z right),
-        metres. The optical centre is f further back.
+        Camera position by the paper's definition: origin of the image plane, head-centred frame (x forward, y up, z
+        right), metres. The optical centre is f behind it.
     target : array (3,)
         Point on the optical axis, head-centred frame, metres.
     f : float
@@ -200,13 +200,13 @@ def walker_view(
     phase0 : float
         Phase of the first frame, cycles; at 0 the right foot strikes.
     carried : bool
-        Whether the camera moves with the walker's head, as on a treadmill and as in the paper. Otherwise the camera
-        stands, and the walker starts with the head at the place of Table A.2.
+        Whether the camera moves with the walker's head, as in the paper and as on a treadmill. Otherwise the camera is
+        static, and the walker starts with the head at the position of Table A.2.
 
     Raises
     ------
     InputError
-        If a number is impossible, or the walker passes the camera.
+        If a number is out of range, or the walker passes the camera.
     """
     place, aim = np.asarray(camera, dtype=np.float64), np.asarray(target, dtype=np.float64)
     if frames < 1 or not 0 < dt < np.inf or not np.isfinite(phase0):
@@ -226,7 +226,7 @@ def walker_view(
 
 
 def random_postures(figure: Figure, n: int, rng: np.random.Generator, ranges: str = "anatomical") -> Array:
-    """Draw configurations (n, nq), uniform inside the figure's limits, until legal and free of collision.
+    """Draw configurations (n, nq) uniformly inside the figure's limits, and keep those that pass the checks.
 
     The torso is at the origin, upright, facing +x.
 
@@ -239,12 +239,12 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator, ranges: st
     rng : Generator
         The same seed gives the same postures.
     ranges : str
-        Joint ranges that are kept besides the figure's limits; with ``urdf`` there are no others.
+        Joint ranges of the check, besides the figure's limits; ``urdf`` adds none.
 
     Raises
     ------
     InputError
-        If n is not positive, or hardly any draw is legal.
+        If n is not positive, or too few draws pass the checks (`MIN_ACCEPTED`).
     """
     if n < 1:
         raise refusal("", "frames", str(n), "1 or more", "ask for more")
@@ -286,7 +286,7 @@ def random_views(
     distance: tuple[float, float] = DISTANCE_RANGE,
     ranges: str = "anatomical",
 ) -> View:
-    """Draw random legal postures, each seen by a camera of its own; the frames are independent.
+    """Draw random valid postures, each seen by another random camera; the frames are independent.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def mocap_view(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> View:
-    """Project one clip into one static camera; the person has the median segment lengths of the chosen frames.
+    """Project one clip into one static camera; the view has the person's median segment lengths in the chosen frames.
 
     Parameters
     ----------
@@ -332,10 +332,10 @@ def mocap_view(
     rng : Generator
         Draws the camera if `position` is not given.
     clip : str
-        Name of the clip; the first if not given.
+        Name of the clip; by default the first clip.
     frames : int, optional
-        Number of frames, of those with a neck: from the first, every `dt`; without `dt`, evenly over the clip. All of
-        them if neither is given or the clip is shorter.
+        Number of frames, chosen among frames with a known neck: every `dt` from the first frame, or evenly over the
+        clip without `dt`. By default, and for shorter clips, all frames.
     dt : float, optional
         Seconds between frames, rounded to a whole number of the clip's frames.
     position : array (3,), optional
@@ -346,9 +346,9 @@ def mocap_view(
     Raises
     ------
     InputError
-        If there is no such clip or frame, up is not known, or the person does not fit into the picture.
+        If the clip does not exist or has no frame, the up axis is unknown, or the person does not fit into the picture.
     FigureError
-        If no torso or hips have lengths near the medians.
+        If no possible torso or hips have lengths near the medians.
     """
     camera, up = camera or default_camera(), motion.up_vector
     if up is None:
@@ -381,14 +381,14 @@ def mocap_views(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> tuple[View, ...]:
-    """Draw n frames evenly over all clips, each seen by a camera of its own; one view a clip, named after it.
+    """Choose n frames evenly over all clips, each seen by another random camera; return one named view per clip.
 
     Parameters
     ----------
     motion : Motion
         Motion capture of one or several clips, with a known up axis.
     n : int
-        Number of frames with all 14 joints; clips give equal shares, and a shorter clip all it has.
+        Number of frames with all 14 joints. Clips have equal numbers of frames; a shorter clip has all of its frames.
     rng : Generator
         Draws the cameras.
     camera, distance
@@ -427,7 +427,7 @@ def _clip_index(motion: Motion, name: str) -> int:
 
 
 def _frames_of(motion: Motion, clip: int, names: Sequence[str]) -> Ints:
-    """Return the rows of a clip that know the named joints."""
+    """Return the rows of a clip in which the named joints are known."""
     known = np.isfinite(motion.points(names)).all(axis=(1, 2)) & (motion.clip == clip)
     return np.flatnonzero(known)
 
@@ -439,7 +439,7 @@ def _seconds(motion: Motion, rows: Ints) -> Array:
 
 
 def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -> Ints:
-    """Choose among a clip's rows: from the first, every dt, or evenly from the first to the last."""
+    """Choose rows of a clip: every dt from the first row, or evenly from the first to the last row."""
     if len(known) == 0:
         raise refusal(motion.source or "motion", "clip", "no frame with a neck", "one", "choose another clip")
     if (frames is not None and frames < 1) or (dt is not None and not 0 < dt < np.inf):
@@ -455,7 +455,7 @@ def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -
 
 
 def _shares(n: int, available: Sequence[int]) -> list[int]:
-    """Distribute n evenly over clips; no clip gives more frames than it has."""
+    """Distribute n frames evenly over clips, at most as many as each clip has."""
     shares, left = [0] * len(available), n
     while left > 0:
         open_clips = [k for k, have in enumerate(available) if shares[k] < have]

@@ -1,15 +1,15 @@
 r"""A walking figure: the gait of Boulic, Thalmann & Thalmann 1990 (*The Visual Computer* 6:344-358) on the figure.
 
-Everything follows from the relative velocity v (leg lengths per second) and the phase t of the cycle. The phase is the
-right side's: at t = 0 the right foot strikes; the left side is half a cycle later.
+The posture is a function of the relative velocity v (leg lengths per second) and the phase t of the cycle. At t = 0 the
+right foot strikes; the left side is half a cycle later.
 
-The frame is the head-centred one of Lee & Chen 1985: x the moving direction, y up, z to the walker's right, and the
-head at the coordinates of their Table A.2. The frame moves with the walker, as on a treadmill. The head stays upright
-and faces forward, so its points rest.
+Coordinates are in the head-centred frame of Lee & Chen 1985: x is the direction of walking, y is up, z is to the
+walker's right, and the head is at the coordinates of their Table A.2. The frame moves with the walker, as on a
+treadmill. The head stays upright and faces forward, so its points do not move.
 
-The gait model leaves some angles open; they are chosen here. The hips stay level and the back leans against them. The
-torso turns by the opposite of the hips' angle, and the neck compensates both. Arms swing in planes of the torso and
-legs in planes of the hips, without abduction and axial rotation.
+The gait model does not determine all angles; the others are chosen here. The hips stay level, and the back leans
+relative to them. The torso rotates by the opposite of the hips' angle, and the neck compensates both rotations. Arms
+swing in a plane of the torso and legs in a plane of the hips, without abduction and axial rotation.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from posekit.errors import refusal
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation
 from posekit.skeleton import DOFS, SIDES
 
-#: Relative velocities v of the hip, knee and elbow curves, leg lengths per second: mid gait.
+#: Range of relative velocities v for which the hip, knee and elbow curves of mid gait hold, leg lengths per second.
 VELOCITY_RANGE: Final = (0.5, 1.3)
 
-#: Largest additional lean of the back, radians, either way.
+#: Largest additional lean of the back, radians, forward or backward.
 MAX_LEAN: Final = np.radians(30.0)
 
 HIP_FLEXION: Final = ((0.5, -15.0), (0.9, 25.0))
-#: Flexion of mid gait: (phase, degrees) through which the curve passes.
+#: Knots (phase, degrees) of the flexion curve of mid gait.
 KNEE_FLEXION: Final = ((0.17, 3.0), (0.4, 3.0), (0.75, 70.0), (1.0, 3.0))
 
 #: Rotation from the URDF's axes (x forward, y left, z up) to the head-centred axes (x forward, y up, z right).
@@ -53,7 +53,7 @@ class Walker:
     velocity : float
         Leg lengths per second, 0.5 to 1.3.
     lean : float
-        Additional forward lean of the back, radians, at most `MAX_LEAN` either way.
+        Additional forward lean of the back, radians, at most `MAX_LEAN` forward or backward.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class Walker:
 
     @property
     def cycle_duration(self) -> float:
-        """Seconds of one cycle of two steps, which is 1.346 sqrt(v) leg lengths long."""
+        """Duration of one cycle of two steps, seconds; a cycle is 1.346 sqrt(v) leg lengths long."""
         return 1.346 * math.sqrt(self.velocity) / self.velocity
 
     @property
@@ -93,7 +93,7 @@ class Walker:
         return sum(lengths[f"{s}_hip-{s}_knee"] + lengths[f"{s}_knee-{s}_ankle"] for s in SIDES) / 2
 
     def phase(self, time: ArrayLike, phase0: float = 0.0) -> Array:
-        """Return the phases at times (s) of a walk that has `phase0` at time 0."""
+        """Return the phases, cycles, at times in seconds; `phase0` is the phase at time 0."""
         return phase0 + np.asarray(time, dtype=np.float64) / self.cycle_duration
 
     def flexion(self, phase: ArrayLike) -> dict[str, Array]:
@@ -122,7 +122,7 @@ class Walker:
         if phases.ndim != 1 or not np.isfinite(phases).all():
             raise refusal("", "phase", f"shape {phases.shape}", "finite phases (N,)", "give one a frame")
         torsion = self._torsion(phases)
-        # The torso turns against the hips, so that shoulders and hips swing in opposition.
+        # The torso rotates opposite to the hips, so that shoulders and hips swing in opposition.
         R_torso = R_HEAD_REP103 @ self._torso(phases)
         R_hips = R_HEAD_REP103 @ coordinate_rotation(2, torsion)
         neck = np.broadcast_to(TABLE_A2.points[0], (len(phases), 3))
@@ -139,9 +139,9 @@ class Walker:
         return q
 
     def travel(self, time: ArrayLike, phase0: float = 0.0) -> Array:
-        """Return how far the neck has moved over the ground since time 0.
+        """Return the displacement of the neck over the ground since time 0.
 
-        The pelvis follows the model's root; the torso's lean moves the neck relative to it.
+        The pelvis follows the gait model's root; the lean of the torso moves the neck relative to the pelvis.
 
         Parameters
         ----------
@@ -167,9 +167,9 @@ class Walker:
         return np.asarray(place[1:] - place[0])
 
     def _torsion(self, phase: Array) -> Array:
-        """Return the turn of the hips to the left, radians; positive brings the right hip forward.
+        """Return the rotation of the hips to the left, radians; a positive rotation moves the right hip forward.
 
-        The printed angle has the other sign: the hip of the leading leg leads, too.
+        The angle in the paper has the opposite sign; here the hip of the leading leg moves forward.
         """
         return np.asarray(np.radians(4 * self.velocity * np.cos(2 * np.pi * phase)))
 
@@ -188,6 +188,6 @@ def _curve(knots: Sequence[tuple[float, float]], phase: Array) -> Array:
     from scipy.interpolate import PchipInterpolator
 
     x, y = np.array(knots).T
-    # Three periods give each knot of the middle one two neighbours.
+    # With three periods, each knot of the middle period has neighbours on both sides.
     curve = PchipInterpolator(np.concatenate([x - 1, x, x + 1]), np.tile(y, 3))
     return np.asarray(curve(x[0] + np.mod(phase - x[0], 1.0)))
