@@ -1,4 +1,4 @@
-"""Quality of recovery if the truth is known: of one result, or of a method over views with noise."""
+"""Evaluation of recoveries whose true postures are known: of one result, or of many views with noise."""
 
 from posekit.evaluation.evaluate import Evaluation as Evaluation
 from posekit.evaluation.evaluate import evaluate as evaluate

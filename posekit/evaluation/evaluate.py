@@ -1,4 +1,4 @@
-"""Quality of one result if the truth is known: errors, retained truth, calibration and regions, frame by frame."""
+"""Evaluation of one result against the truth: joint errors, retained truth, calibrated probabilities and regions."""
 
 from __future__ import annotations
 
@@ -26,36 +26,37 @@ if TYPE_CHECKING:
 
 EVALUATION_SCHEMA: Final = "posekit.evaluation/2"
 
-#: Postures whose errors are measured: the best survivor by each measure, the most probable one, one drawn at random,
-#: the answer, and the first followed path.
+#: Postures whose errors are measured: the survivor with the smallest error, the most probable survivor, a random
+#: survivor, the answer, and the first followed path.
 ROLES: Final = ("best", "first", "random", "answer", "path")
 
-#: Mean joint errors of the best survivor within which the truth counts as retained: exact points, noisy points.
+#: Largest mean joint error of the best survivor at which the truth counts as retained, metres: for exact points and for
+#: noisy points.
 RETAINED_METRES: Final = (0.010, 0.035)
 
-#: Distance within which `Recovery.answer.sure` claims every joint, and depth difference of `nearer`, metres.
+#: Distance to the truth to which `Recovery.answer.sure` refers, and depth difference of `nearer`, metres.
 SURE_METRES: Final = 0.05
 
-#: Columns that name a condition, if the frames have any.
+#: Columns that describe the condition of a frame.
 KEYS: Final = ("clip", "yaw", "height", "noise")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Evaluation(Record):
-    """Measurements of F frames, a column each; errors in metres.
+    """Measurements of F frames in columns; errors in metres.
 
     Parameters
     ----------
     columns : mapping of str to array (F,)
-        ``frame``, ``time``, ``survivors``; ``{role}_{measure}`` of `ROLES` and `MEASURES`; ``branch`` (1 if a survivor
-        has the near-far code of the truth, NaN if not known); ``probability`` of the first survivor; ``sure`` and
-        ``sure_true`` (whether every joint of the answer is within 5 cm of the truth); ``regions`` (share of joints of
-        the best survivor inside their 95 % radius); ``nearer_true`` (share of segments whose near-far answer is right);
-        ``reason``; and any of `KEYS`.
+        ``frame``, ``time``, ``survivors``; errors ``{role}_{measure}`` for `ROLES` and `MEASURES`; ``branch`` (1 if a
+        survivor has the near-far code of the truth, NaN if unknown); ``probability`` of the first survivor; ``sure``
+        and ``sure_true`` (whether every joint of the answer is within 5 cm of the truth); ``regions`` (share of joints
+        of the best survivor whose 95 % region contains the truth); ``nearer_true`` (share of segments with a correct
+        near-far answer); ``reason``; and some of `KEYS`.
     nearer_sure, nearer_true : array (F, 13)
-        Stated probability of each segment's near-far answer, and whether it is right; NaN if not known.
+        Stated probability of each segment's near-far answer, and whether the answer is correct; NaN if unknown.
     settings : mapping
-        Everything that decided the numbers.
+        Settings of the recovery and of the evaluation.
 
     Examples
     --------
@@ -73,7 +74,7 @@ class Evaluation(Record):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """Count the frames."""
+        """Return the number of frames."""
         return len(self.columns["frame"])
 
     def with_keys(self, **keys: Any) -> Evaluation:
@@ -83,7 +84,7 @@ class Evaluation(Record):
 
     @staticmethod
     def joined(parts: Sequence[Evaluation], settings: Mapping[str, Any]) -> Evaluation:
-        """Put evaluations with the same columns one after another."""
+        """Concatenate evaluations with the same columns."""
         return Evaluation(
             columns={name: np.concatenate([one.columns[name] for one in parts]) for name in parts[0].columns},
             nearer_sure=np.concatenate([one.nearer_sure for one in parts]),
@@ -92,17 +93,17 @@ class Evaluation(Record):
         )
 
     def conditions(self, keys: Sequence[str]) -> Iterator[tuple[dict[str, Any], Ints]]:
-        """Yield each combination of some key columns, and its rows."""
+        """Yield each combination of values of the given key columns, and the rows with these values."""
         values = list(zip(*(self.columns[key].tolist() for key in keys), strict=True)) or [()] * len(self)
         for one in sorted(set(values)):
             rows = np.flatnonzero([each == one for each in values])
             yield dict(zip(keys, one, strict=True)), rows
 
     def summary(self, rows: Ints | None = None) -> dict[str, Any]:
-        """Return the numbers of some frames, all by default: shares from 0 to 1, errors in millimetres.
+        """Return a summary of the given frames, or of all frames: shares from 0 to 1, errors in millimetres.
 
-        Shares count all frames, those without survivors included. Errors are means, medians and 95th percentiles over
-        frames with at least one survivor.
+        Shares refer to all frames, including frames without survivors. Errors are means, medians and 95th percentiles
+        over frames with at least one survivor.
         """
         chosen = np.arange(len(self)) if rows is None else rows
         table = {name: values[chosen] for name, values in self.columns.items()}
@@ -135,7 +136,7 @@ class Evaluation(Record):
         }
 
     def table(self) -> str:
-        """Return a short table in Markdown: a line for each level of noise and each clip, medians of errors in mm."""
+        """Return a Markdown table with one line for each noise level and each clip; errors are medians in mm."""
         head = (
             "|frames|empty|within 10 mm|within 35 mm|postures|PA best, mm|PA first, mm|PA answer, mm".split(
                 "|"
@@ -161,12 +162,12 @@ class Evaluation(Record):
         return {**head, "conditions": conditions, "frames": frames}
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write ``.json`` (everything), ``.csv`` (a row a frame, errors in metres) or ``.md`` (the table).
+        """Write ``.json`` (all data), ``.csv`` (one row per frame, errors in metres) or ``.md`` (the table).
 
         Raises
         ------
         InputError
-            If the name ends otherwise, or the file cannot be written.
+            If the file name has another suffix, or the file cannot be written.
         """
         from posekit.files import write_bytes
         from posekit.formats.result_file import plain
@@ -184,7 +185,7 @@ class Evaluation(Record):
         write_bytes(target, f"{text}\n".encode())
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the columns as a table."""
+        """Return the columns as a data frame."""
         import pandas
 
         return pandas.DataFrame(dict(self.columns))
@@ -198,15 +199,15 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
     result : Recovery
         A result of F frames.
     truth : array (F, 14, 3), View or Motion
-        True joints, camera frame, metres, NaN if not known; a view with truth; or motion capture of the same seconds
-        (`truth_of`). Joints that the image does not show are left out.
+        True joints in the camera frame, metres, NaN if unknown; or a view with truth; or motion capture at the same
+        times (`truth_of`). Joints that the image does not show are excluded.
     seed : int
-        Seed of the survivor that is drawn at random.
+        Seed for the choice of the random survivor.
 
     Raises
     ------
     InputError
-        If the truth has other frames than the result, or no known joint.
+        If the frames of truth and result differ, or the truth has no known joint.
     """
     count, rng = len(result), np.random.default_rng(seed)
     truth, note = truth_of(result, truth)
@@ -247,7 +248,7 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
 
 
 def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
-    """Return `posture_errors`; a scaled orthographic camera gives no place in space, so joints are centred first."""
+    """Return `posture_errors`; for a scaled orthographic camera, whose depth is unknown, joints are centred first."""
     errors = posture_errors(joints, truth)
     if result.camera.get("model") == "scaled-orthographic":
         errors[:, MEASURES.index("mpjpe")] = errors[:, MEASURES.index("centred")]
@@ -256,10 +257,10 @@ def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
 
 
 def true_branch(truth: Array) -> list[str]:
-    """Return the near-far code of true postures (N, 14, 3), camera frame of a perspective camera.
+    """Return the near-far code of true postures (N, 14, 3) in the frame of a perspective camera.
 
-    A joint is the far one (``1``) of the two ends of its segment if it lies beyond the foot of the perpendicular from
-    its parent on its own ray. The code is empty if a joint is not known.
+    The code of a joint is ``1`` (far) if the joint lies, on its ray, beyond the foot of the perpendicular from its
+    parent. The code of a posture is empty if a joint is unknown.
     """
     rays = unit(truth)
     far = dot(truth[:, 1:] - truth[:, PARENTS[1:]], rays[:, 1:]) > 0
@@ -268,7 +269,7 @@ def true_branch(truth: Array) -> list[str]:
 
 
 def _branch_retained(result: Recovery, truth: Array) -> Array:
-    """Return whether a survivor has the truth's code (F,): NaN unless the frame was judged as exact."""
+    """Return whether a survivor has the near-far code of the truth (F,); NaN if image points are not exact."""
     codes = np.asarray(result.survivors.branch)
     exact = np.array([bool(levels) for levels in result.frames.levels], dtype=bool)
     if not exact.any() or result.camera.get("model") == "scaled-orthographic":
@@ -281,7 +282,7 @@ def _branch_retained(result: Recovery, truth: Array) -> Array:
 
 
 def _sure_true(result: Recovery, truth: Array) -> Array:
-    """Return whether every joint of the answer is where `sure` claims it (F,): NaN if not known."""
+    """Return whether every joint of the answer is within the distance that `sure` refers to (F,); NaN if unknown."""
     away = result.answer.joints - truth
     relative = np.array(["relative" in of for of in result.answer.sure_of], dtype=bool)
     away[relative] -= away[relative, :1]
@@ -292,13 +293,13 @@ def _sure_true(result: Recovery, truth: Array) -> Array:
 
 
 def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
-    """Return the share of joints of the nearest survivor inside their 95 % radius (F,): NaN without a region."""
+    """Return the share of joints of the nearest survivor whose 95 % region contains the truth (F,); NaN without one."""
     found = np.full(len(result), np.nan)
     chosen = np.flatnonzero(nearest >= 0)
     joints = result.survivors.joints[nearest[chosen]]
     radius = np.asarray(result.survivors.radius)[nearest[chosen]]
     away = joints - truth[chosen]
-    if result.camera.get("model") == "scaled-orthographic":  # the camera gives no place in space
+    if result.camera.get("model") == "scaled-orthographic":  # the camera determines no depth
         away -= np.nanmean(away, axis=1, keepdims=True)
     distance = np.linalg.norm(away, axis=-1)
     inside = np.where(np.isfinite(distance) & (radius > 0), distance <= radius, np.nan)
@@ -307,7 +308,7 @@ def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
 
 
 def _nearer(result: Recovery, truth: Array) -> tuple[Array, Array]:
-    """Return the stated probability (F, 13) of each segment's near-far answer, and whether it is right."""
+    """Return the stated probability (F, 13) of each segment's near-far answer, and whether the answer is correct."""
     start, end = np.array(TREE_SEGMENTS).T
     deeper = truth[:, end, 2] - truth[:, start, 2]
     true = np.where(deeper > SURE_METRES, -1, np.where(deeper < -SURE_METRES, 1, 0))
@@ -329,7 +330,7 @@ def _spread(values: Array) -> dict[str, float]:
 
 
 def _cells(found: Mapping[str, Any]) -> list[str]:
-    """Write the cells of a line of the table."""
+    """Return the cells of a line of the table."""
     errors = found["error_mm"]
     pa = [errors.get(role, {}).get("pa", {}).get("median") for role in ("best", "first", "answer")]
     sure = found["calibration"]["sure"]

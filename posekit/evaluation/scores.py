@@ -1,4 +1,4 @@
-"""Scores if the truth is known: errors of postures, calibration of probabilities, correct poses."""
+"""Scores of postures whose truth is known: joint errors, calibration of probabilities, correct-poses score."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from posekit.geometry import Array, Ints, align, mpjpe
 
-#: Mean error of the joints in the camera frame; after moving the middle of the joints onto the truth's; after a
-#: similarity (`posekit.geometry.align`); error of the worst joint in the camera frame, and after the similarity.
+#: Mean joint error in the camera frame; after alignment of the joints' mean positions; after alignment by a similarity
+#: (`posekit.geometry.align`); error of the worst joint in the camera frame; and after alignment by a similarity.
 MEASURES: Final = ("mpjpe", "centred", "pa", "worst", "worst_pa")
 
 #: Largest threshold of the correct-poses score, metres (Wandt et al. 2021).
 CPS_RANGE: Final = 0.3
 
-#: Bins of probability, of equal width.
+#: Number of bins of probability, with equal widths.
 N_BINS: Final = 10
 
-#: Postures that are measured together.
+#: Number of postures in one batch.
 POSTURES_AT_ONCE: Final = 50_000
 
 
@@ -28,12 +28,12 @@ def posture_errors(joints: Array, truth: Array) -> Array:
     Parameters
     ----------
     joints, truth : array (N, 14, 3)
-        Camera frame, metres; NaN if unknown.
+        Joint positions in the camera frame, metres; NaN if unknown.
 
     Returns
     -------
     array (N, 5)
-        Metres; NaN if no joint is known in both.
+        Errors, metres; NaN if no joint is known in both.
     """
     parts = range(0, len(joints), POSTURES_AT_ONCE)
     found = [_errors(joints[k : k + POSTURES_AT_ONCE], truth[k : k + POSTURES_AT_ONCE]) for k in parts]
@@ -51,15 +51,15 @@ def _errors(joints: Array, truth: Array) -> Array:
 
 
 def correct_poses_score(worst: Array) -> float:
-    """Return the correct-poses score in millimetres: 300 is perfect, 0 is no posture within 30 cm.
+    """Return the correct-poses score in millimetres, from 0 (no posture within 30 cm) to 300 (all are exact).
 
-    It is the area, from 0 to 300 mm, under the share of postures all of whose joints are nearer than the threshold
-    (Wandt et al. 2021, *CanonPose*, CVPR, §4.1).
+    A posture is correct if the error of every joint is below a threshold. The score is the integral of the share of
+    correct postures over thresholds from 0 to 300 mm (Wandt et al. 2021, *CanonPose*, CVPR, §4.1).
 
     Parameters
     ----------
     worst : array (F,)
-        Error of each posture's worst joint, metres; NaN if there is no posture, which is never correct.
+        Error of each posture's worst joint, metres; NaN for a missing posture, which counts as incorrect.
     """
     room = np.maximum(CPS_RANGE - np.where(np.isnan(worst), np.inf, worst), 0.0)
     return float(room.mean() * 1000) if len(worst) else float("nan")
@@ -71,16 +71,17 @@ def reliability(probability: Array, event: Array) -> dict[str, Any] | None:
     Parameters
     ----------
     probability : array (N,)
-        0 to 1; NaN entries are left out.
+        Stated probabilities, 0 to 1; NaN entries are excluded.
     event : array (N,)
-        1 if it happened, 0 if not; NaN entries are left out.
+        1 if the event happened, 0 otherwise; NaN entries are excluded.
 
     Returns
     -------
     dict or None
-        ``ece``: expected calibration error, the mean over entries of the distance between a bin's mean probability and
-        its share of events (Guo et al. 2017, ICML, eq. 3). ``brier``: mean squared difference (Brier 1950). ``bins``:
-        entries, mean probability and share of events of each bin that is not empty. None if nothing was stated.
+        ``ece``: expected calibration error, the mean absolute difference between a bin's mean probability and its share
+        of events, weighted by entries (Guo et al. 2017, ICML, eq. 3). ``brier``: mean squared difference between
+        probability and event (Brier 1950). ``bins``: number of entries, mean probability and share of events of each
+        bin that is not empty. The result is None without entries.
 
     Examples
     --------

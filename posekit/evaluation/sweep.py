@@ -1,4 +1,4 @@
-"""Evaluate a method: views with truth at levels of noise, each recovered and measured."""
+"""Evaluation of a method: recover views of known postures at several noise levels, and measure the errors."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ def evaluate_method(
     views: int = 24,
     seed: int = 0,
 ) -> Evaluation:
-    """Recover views whose truth is known, at levels of noise, and measure every frame.
+    """Recover views of known postures at several noise levels, and measure the errors of every frame.
 
-    The noise of a frame is drawn once and scaled by each level, so that levels differ only in scale. A view that cannot
-    be recovered counts as frames without survivors.
+    The noise of a frame is drawn once and multiplied by each level, so that levels differ only in scale. If the
+    recovery of a view fails, its frames count as frames without survivors.
 
     Parameters
     ----------
     source : View, Motion, or iterable of (dict, View)
-        A view with truth; motion capture, of which frames are drawn evenly, each seen by a camera of its own; or views
-        with the values of their key columns (`posekit.evaluation.evaluate.KEYS`).
+        A view with truth; or motion capture, from which frames are chosen evenly and each is projected by its own
+        random camera; or views with the values of their key columns (`posekit.evaluation.evaluate.KEYS`).
     settings : RecoverSettings, optional
         Settings of every recovery.
     noise : sequence of float
         Standard deviations of each coordinate of the image points, pixels.
     views : int
-        Number of frames of a motion.
+        Number of frames that are chosen from a motion.
     seed : int
         Seed of the noise and of the cameras.
 
     Raises
     ------
     InputError
-        If an argument is impossible, a view has no truth, or there is no view.
+        If an argument is invalid, a view has no truth, or there is no view.
     """
     if not noise or not all(0 <= level < np.inf for level in noise) or len(set(noise)) != len(noise):
         raise refusal("", "noise", shown(list(noise)), "different numbers, 0 or more", "correct them")
@@ -79,7 +79,7 @@ def evaluate_method(
 
 
 def noisy(view: View, level: float, draw: Array) -> View:
-    """Move image points by `level` pixels times a standard normal draw (F, 19, 2); a given neck stays.
+    """Add noise to image points: `level` pixels times standard normal numbers (F, 19, 2); a stated neck is unchanged.
 
     Raises
     ------

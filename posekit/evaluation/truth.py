@@ -1,4 +1,4 @@
-"""Truth from motion capture: its frames are matched to the pictures, and its axes to the axes of the camera's world."""
+"""Truth from motion capture: frames are matched to pictures, and axes to the axes of the camera's world."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from posekit.motion import Motion
 from posekit.recovery import Recovery
 from posekit.skeleton import JOINTS
 
-#: Fraction of the person's height in the image by which a truth may miss the image points (median); beyond it the truth
-#: is another person's, camera's or time's.
+#: Largest median distance between projected truth and image points, as a share of the person's height in the image;
+#: beyond it the truth belongs to another person, camera or time.
 REFUSED_SHARE: Final = 0.2
 
-#: The 24 rotations (24, 3, 3) that map axes to axes.
+#: The 24 rotations (24, 3, 3) that permute the coordinate axes.
 AXIS_TURNS: Final = np.array(
     [
         turn
@@ -33,7 +33,7 @@ AXIS_TURNS: Final = np.array(
 
 
 def with_truth(view: View, motion: Motion) -> tuple[View, str]:
-    """Give a view its truth from motion capture of the same seconds.
+    """Add truth to a view from motion capture at the same times.
 
     Parameters
     ----------
@@ -45,31 +45,31 @@ def with_truth(view: View, motion: Motion) -> tuple[View, str]:
     Returns
     -------
     view, note : View, str
-        The view with `truth`, and a sentence on how the truth was placed.
+        The view with `truth`, and a sentence about the matched frames and axes.
 
     Raises
     ------
     InputError
-        If the camera has no pose, no frame matches, or the truth misses the image points.
+        If the camera has no pose, no frame matches, or the projected truth is far from the image points.
     """
     truth, note = _placed(view.camera, view.image, view.time, motion)
     return replace(view, truth=truth), note
 
 
 def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str]:
-    """Return the truth (F, 14, 3) of a result's frames in its camera's frame, metres, and a note on its placement.
+    """Return the truth (F, 14, 3) of a result's frames in the camera's frame, metres, and a note about the matching.
 
     Parameters
     ----------
     result : Recovery
-        F frames; with motion as the truth, its camera must have a pose in the world.
+        Result of F frames. If the truth is a motion, the camera must have a pose in the world.
     given : array (F, 14, 3), View or Motion
-        True joints in the camera's frame, a view with truth, or motion capture of the same seconds.
+        True joints in the camera's frame, a view with truth, or motion capture at the same times.
 
     Raises
     ------
     InputError
-        If the truth has other frames than the view, or if the motion cannot be placed in front of the camera.
+        If the frames of truth and result differ, or the motion does not match the image.
     """
     if isinstance(given, Motion):
         camera = camera_from(Node(result.camera, result.source), result.unit) if result.camera else None
@@ -91,7 +91,7 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
 
 
 def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Array, str]:
-    """Place motion in front of a camera: frame by number or by second, and the turn of axes nearest to the image."""
+    """Match motion to pictures by frame or time, and choose the axes whose projection is nearest to the image."""
     source = motion.source or "truth"
     if not isinstance(camera, PinholeCamera) or camera.R is None or camera.t is None:
         raise refusal(source, "truth", "a camera without a pose", "R and t", "give a calibration")
@@ -116,7 +116,7 @@ def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Arr
 
 
 def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
-    """Return the joints (F, 14, 3) at pictures, frame by frame and by seconds from either's first."""
+    """Return the joints (F, 14, 3) at the pictures, matched by frame number, by time, and by time since the start."""
     joints, count = motion.figure_joints, len(time)
     by_number = np.full((count, *joints.shape[1:]), np.nan)
     by_number[: min(count, len(joints))] = joints[:count]
@@ -136,7 +136,7 @@ def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
 
 
 def _axes(turn: Array) -> str:
-    """Write which axes of the truth are x, y, z of the camera's world, as ``(z, x, y)``."""
+    """Return the axes of the truth that are x, y, z of the camera's world, as a text such as ``(z, x, y)``."""
     largest = np.abs(turn).argmax(axis=1)
     signs = ["-" if row[k] < 0 else "" for row, k in zip(turn, largest, strict=True)]
     return f"({', '.join(sign + 'xyz'[k] for sign, k in zip(signs, largest, strict=True))})"
