@@ -1,4 +1,4 @@
-"""The papers' figures drawn again: images and survivors of SEQ1 and SEQ2, and the residual over the scale."""
+"""Drawings of the papers' figures: images and survivors of SEQ1 and SEQ2, and the residual over the scale."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from posekit.synthesis.views import SEQUENCES
 
 
 def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
-    """Draw Fig. A.1 (images) and Figs. 6 and 8 (a survivor of each group of frame 1, from front and side).
+    """Draw Fig. A.1 (images) and Figs. 6 and 8 (one survivor of each group in frame 1, from front and side).
 
     Parameters
     ----------

@@ -27,10 +27,10 @@ from posekit.synthesis import random_postures
 #: Distance of the paper's image plane, metres (Table 2).
 F: Final = 0.05
 
-#: Camera position of SEQ1, head-centred frame, metres.
+#: Camera position of SEQ1 in the head-centred frame, metres.
 CAMERA: Final = np.array([4.0, 0.0, 0.0])
 
-#: Rotation from the head-centred frame to the camera of SEQ1, OpenCV's axes.
+#: Rotation from the head-centred frame to the camera of SEQ1 in OpenCV's axes.
 R_CAM_HEAD: Final = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 #: Two additional head points, head-centred frame, metres.
@@ -53,7 +53,7 @@ N_BODIES: Final = 20
 
 
 def camera_rows() -> Iterator[Row]:
-    """Yield the rows of the figure, the camera and the body."""
+    """Yield the rows about the figure, the camera and the body."""
     yield from _figure_rows()
     yield from _null_space_rows()
     six, eight = (_noisy_error(head) for head in (TABLE_A2, TABLE_A2.with_points(CHIN_AND_CROWN)))
@@ -64,7 +64,7 @@ def camera_rows() -> Iterator[Row]:
 
 
 def exact_image(head: HeadPoints = TABLE_A2) -> Array:
-    """Return the exact projections (H, 2) of head points into the camera of SEQ1, metres, y down."""
+    """Return the exact projections (H, 2) of head points by the camera of SEQ1, metres, y down."""
     points = head.points @ R_CAM_HEAD.T + [0.0, 0.0, CAMERA[0] + F]
     return np.asarray(LeeChenCamera(f=F).project(points[None])[0])
 

@@ -57,7 +57,7 @@ FORMULAS: Final = (
 
 
 def constraint_rows() -> Iterator[Row]:
-    """Yield the rows of the physical constraints and of the rules."""
+    """Yield the rows about the physical constraints and the rules."""
     yield from _formula_rows()
     yield from _table_1_rows()
     yield from _knee_and_collision_rows()
@@ -198,7 +198,7 @@ def _formula_rows() -> Iterator[Row]:
 
 
 def _written_out(points: Array) -> dict[str, Array]:
-    """Return the angles (N,) of §3.2.A by arc cosines, degrees."""
+    """Return the angles (N,) of §3.2.A, computed with arc cosines as printed, degrees."""
     place = {name: points[:, k] for name, k in JOINT.items()}
     y = unit(place["pelvis"] - place["neck"])
     z = unit(place["left_shoulder"] - place["right_shoulder"])
@@ -234,5 +234,5 @@ def _written_out(points: Array) -> dict[str, Array]:
 
 
 def _between(along: Array, across: Array) -> Array:
-    """Return the angle (N,) from an axis to a projection with these two components, degrees, 0 to 180."""
+    """Return the angle (N,) from an axis to a projection with the given two components, degrees, 0 to 180."""
     return np.asarray(np.degrees(np.arccos(np.clip(along / np.hypot(along, across), -1.0, 1.0))))

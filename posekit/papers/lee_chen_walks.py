@@ -46,7 +46,7 @@ GRIDS: Final = {
 RIGID_METRES: Final = 0.01
 
 TANGENT_METRES: Final = 0.001
-#: Distance by which a segment may be too short for its image, in the tables and in the comparison of the shoulders.
+#: Allowed shortfall of a segment relative to its image, metres, in the tables and in the comparison of the shoulders.
 LOOSE_TANGENT_METRES: Final = 0.01
 
 #: Largest distance of any joint from the representative of its group (§3.4); the paper does not print it.
@@ -88,7 +88,7 @@ class Walks:
 
     @property
     def cells(self) -> NDArray[np.int64]:
-        """All counts that the paper prints of the sequence (S, 86)."""
+        """All counts of the sequence that the paper prints, at each setting (S, 86)."""
         return np.concatenate([self.levels.reshape(len(self.levels), -1), self.final], axis=1)
 
     @property
@@ -106,7 +106,7 @@ class Walks:
 
 
 def walk_rows(effort: str = "quick") -> Iterator[Row]:
-    """Yield the rows of the tree and of §4; ``fine`` effort counts over 18 times as many settings."""
+    """Yield the rows about the tree and about §4; the effort ``fine`` uses about 16 times as many settings."""
     walks = [count_walks(name, effort) for name in SEQUENCES]
     chosen = closest(effort)
     setting = walks[0].settings[chosen]
@@ -135,7 +135,7 @@ def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRE
     effort : {"quick", "fine"}
         Key of `GRIDS`.
     tangent : float
-        Distance by which a segment may be too short for its image, metres.
+        Allowed shortfall of a segment relative to its image, metres.
     """
     velocities, leans, phases = GRIDS[effort]
     parts = [_counted(name, v, lean, phases, tangent) for v, lean in product(velocities, leans)]
@@ -204,13 +204,13 @@ def _judged(check: Check, points: Array) -> Judgement:
 
 
 def allowed(trees: Trees, head: Array, rules: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which survivors (N,) the rules of §3.3 allow, by the thresholds of `paper-printed`."""
+    """Return whether the rules of §3.3 allow each survivor (N,), with the thresholds of ``paper-printed``."""
     points = np.concatenate([trees.joints, head[trees.frame]], axis=1)
     return np.asarray(~_judged(WalkingRules(rules=tuple(rules)), points).violated.any(axis=1))
 
 
 def representatives(joints: Array) -> list[int]:
-    """Return representatives of postures (N, 14, 3): each posture is near one of them in every joint (§3.4)."""
+    """Return indices of representatives of postures (N, 14, 3): each posture is near one in every joint (§3.4)."""
     left, found = np.arange(len(joints)), []
     while len(left):
         found.append(int(left[0]))
@@ -257,7 +257,7 @@ def _tree_rows(setting: Array) -> Iterator[Row]:
 
 
 def _shoulders_row(view: View) -> Row:
-    """Measure the distance between all pairs of shoulders of SEQ2's frame 1."""
+    """Measure the distances of all pairs of shoulder candidates in frame 1 of SEQ2."""
     truth, lengths = view.truth[0], printed()["lee_chen"]["lengths"]
     places = []
     for joint in (1, 2):
@@ -306,7 +306,7 @@ def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], p
 
 
 def _in_columns(values: Sequence[Any]) -> str:
-    """Write frames 1, 3, 5 after the physical constraints; then after Rules 1 and 2."""
+    """Return counts as text: frames 1, 3, 5 after the physical constraints, then after Rules 1 and 2."""
     half = len(values) // 2
     return "; ".join(" / ".join(map(str, part)) for part in (values[:half], values[half:]) if len(part))
 
@@ -360,7 +360,7 @@ def _beyond(setting: Array) -> Array:
     for side in SIDES:
         shoulder, elbow = points[JOINT[f"{side}_shoulder"]], points[JOINT[f"{side}_elbow"]]
         ray, line = (each / np.linalg.norm(each) for each in (shoulder, elbow))
-        # Both shoulders lie on one ray, symmetric about the foot of the neck's perpendicular.
+        # Both shoulder candidates lie on one ray, symmetric about the foot of the perpendicular from the neck.
         other = (2 * (points[JOINT["neck"]] @ ray) - shoulder @ ray) * ray
         beyond.append(np.linalg.norm(other - (other @ line) * line) - np.linalg.norm(elbow - shoulder))
     return np.array(beyond)

@@ -73,12 +73,12 @@ class Rows(list[Row]):
         return all(one.why != UNEXPLAINED for one in self)
 
     def counts(self) -> str:
-        """Return the number of rows of each verdict in words."""
+        """Return a sentence with the number of rows of each verdict."""
         agree, differ, open_ = (sum(one.verdict == verdict for one in self) for verdict in VERDICTS)
         return f"{len(self)} rows: {agree} agree, {differ} differ, {open_} are open."
 
     def lines(self) -> list[str]:
-        """Return the page in Markdown."""
+        """Return the lines of the page in Markdown."""
         lines = ["# The two papers, row by row", "", self.counts(), ""]
         lines += [f"- *{verdict}*: {meaning}." for verdict, meaning in VERDICTS.items()]
         for paper in dict.fromkeys(one.paper for one in self):

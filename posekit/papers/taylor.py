@@ -25,7 +25,7 @@ STATURE: Final = 1.75
 
 N_BODIES, N_PICTURES = 200, 100
 
-#: Distances of the cameras of synthetic photographs, metres.
+#: Range of camera distances in synthetic photographs, metres.
 DISTANCE: Final = (3.0, 6.0)
 
 #: Standard deviation of each coordinate of synthetic photographs, pixels.
@@ -55,7 +55,7 @@ SIGNS: Final = np.array(list(product((-1, 1), repeat=11)))
 
 
 def taylor_rows() -> Iterator[Row]:
-    """Yield the rows of the method, of Table 1 and of §3.2."""
+    """Yield the rows about the method, about Table 1 and about §3.2."""
     yield from _method_rows()
     yield from _family_rows()
     yield from _proportion_rows()
@@ -64,7 +64,7 @@ def taylor_rows() -> Iterator[Row]:
 
 
 def human(figure: Figure) -> Linkage:
-    """Return Taylor's human, 12 points and 11 segments, with the lengths of a figure, metres; its spine is straight."""
+    """Return Taylor's human linkage (12 points, 11 segments, a straight spine) with the lengths of a figure, metres."""
     shape, points = load_linkage("taylor_human"), figure.neutral_points
     lengths = _measured(shape, points[[JOINT[name] for name in shape.points]])
     middles = [
@@ -93,8 +93,9 @@ def taylor_figure(stature: float) -> Figure:
     across = table["shoulder girdle"] / (torso[2, 1] - torso[1, 1])
     torso *= [across, across, 1.0]
     hips *= [1.0, table["pelvic girdle"] / (hips[2, 1] - hips[1, 1]), 1.0]
-    # With f forward and a along from the middle of the shoulders to the pelvis, and b from there to the hips, the
-    # factor z along the body is the smaller root of sqrt(f^2 + a^2 z^2) + b z = spine.
+    # Let f and a be the forward and the longitudinal distance from the midpoint of the shoulders to the pelvis, and b
+    # the distance from the pelvis to the hips. The longitudinal scale z is the smaller root of
+    # sqrt(f^2 + a^2 z^2) + b z = spine.
     above = (torso[1] + torso[2]) / 2 - torso[3]
     f, a, b = above[0], np.hypot(above[1], above[2]), np.linalg.norm((hips[1] + hips[2]) / 2)
     rest = table["spine"] ** 2 - f**2
@@ -121,7 +122,7 @@ def placed(family: LinkageFamily, s: float, signs: NDArray[Any]) -> Array:
 
 
 def _with_lengths(shape: Linkage, lengths: Array) -> Linkage:
-    """Return a linkage with other lengths, metres."""
+    """Return a linkage with the given lengths, metres."""
     return replace(shape, lengths=lengths, unit=1.0, height=None)
 
 
@@ -199,7 +200,7 @@ def _proportion_rows() -> Iterator[Row]:
 
 
 def _accuracy_rows() -> Iterator[Row]:
-    """Measure the error of six joints as in §3.2: with the true flips, after the best similarity."""
+    """Measure the error of six joints as in §3.2, with the true flips and after alignment by a similarity."""
     figure = load_figure().scaled(stature=STATURE)
     camera = default_camera()
     rng = np.random.default_rng(0)

@@ -10,13 +10,13 @@ from posekit.cameras import PinholeCamera
 from posekit.errors import refusal
 from posekit.geometry import Array, Flags, Ints, cross, unit
 
-#: Sine between line of sight and `up` below which no roll makes the camera upright.
+#: Sine between optical axis and `up`, below which no roll makes the camera upright.
 MIN_SINE_TO_UP: Final = 1e-6
 
 #: Largest number of draws for one camera; after that distance and focal length are refused.
 MAX_DRAWS: Final = 200
 
-#: Default distances of the optical centre from the middle of the body, metres.
+#: Default range of distances from the optical centre to the middle of the body, metres.
 DISTANCE_RANGE: Final = (2.5, 6.0)
 
 
@@ -39,12 +39,12 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
     Returns
     -------
     array (..., 3, 3)
-        R_cam_world; its rows are the camera's x, y, z in world coordinates.
+        R_cam_world, whose rows are the camera's axes x, y, z in world coordinates.
 
     Raises
     ------
     InputError
-        If a position is its own target.
+        If a position equals its target.
     """
     forward = unit(target - position)
     if np.isnan(forward).any():
@@ -58,12 +58,12 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
 
 
 def to_camera(points: Array, R_cam_world: Array, position: Array) -> Array:
-    """Express world points (..., P, 3) in the camera frame: ``R (p - position)``."""
+    """Transform world points (..., P, 3) to the camera frame: ``R (p - position)``."""
     return np.asarray(np.einsum("...ij,...pj->...pi", R_cam_world, points - position[..., None, :]))
 
 
 def in_picture(camera: PinholeCamera, points_cam: Array) -> Flags:
-    """Return which bodies (N, P, 3), camera frame, lie in front of the camera and inside its picture (N,).
+    """Return whether each body (N, P, 3), in the camera frame, is in front of the camera and inside its picture (N,).
 
     NaN points are ignored.
     """
@@ -73,7 +73,7 @@ def in_picture(camera: PinholeCamera, points_cam: Array) -> Flags:
 
 
 def middle_of(points: Array) -> Array:
-    """Return the middle (..., 3) of the bounding box of points (..., P, 3); NaN points are ignored."""
+    """Return the centre (..., 3) of the bounding box of points (..., P, 3); NaN points are ignored."""
     return np.asarray((np.nanmin(points, axis=-2) + np.nanmax(points, axis=-2)) / 2)
 
 

@@ -44,7 +44,7 @@ def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Arr
         at, size = model.idx_qs[j], model.nqs[j]
         if size == 1:
             lower, upper = max(model.lowerPositionLimit[at], -1e3), min(model.upperPositionLimit[at], 1e3)
-            if upper - lower > 2 * math.pi:  # the turn nearest to zero
+            if upper - lower > 2 * math.pi:  # the range of one turn nearest to zero
                 lower = min(max(lower, -math.pi), upper - 2 * math.pi)
                 upper = lower + 2 * math.pi
             q[:, at] = rng.uniform(lower, upper, n)
@@ -78,9 +78,9 @@ def object_view(
     Returns
     -------
     image : array (n, P, 2)
-        Pixels, y down, at `PIXELS_PER_METRE`.
+        Image points, pixels, y down, at the scale `PIXELS_PER_METRE`.
     truth : array (n, P, 3)
-        Camera frame, metres.
+        Positions of the points in the camera frame, metres.
 
     Raises
     ------

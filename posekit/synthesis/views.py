@@ -37,11 +37,11 @@ PAPER_F: Final = 0.05
 #: Number of frames of a sequence, and seconds between frames (Lee & Chen 1985, Appendix).
 PAPER_FRAMES, PAPER_STEP = 5, 0.2
 
-#: Built-in sequences: camera position of the paper (origin of the image plane, head-centred frame, metres), and phase
-#: of the first frame, cycles. The paper does not print the phase.
+#: Built-in sequences: the paper's camera position (origin of the image plane in the head-centred frame, metres), and
+#: the phase of the first frame, cycles, which the paper does not print.
 SEQUENCES: Final = {"seq1": ((4.0, 0.0, 0.0), 0.11), "seq2": ((3.0, 0.0, 3.0), 0.68)}
 
-#: Velocity of the built-in sequences, leg lengths per second. The paper does not print it.
+#: Velocity of the walker in built-in sequences, leg lengths per second. The paper does not print it.
 SEQUENCE_VELOCITY: Final = 0.7
 
 #: Up direction in the walker's head-centred frame, and in the world of random postures.
@@ -141,9 +141,9 @@ def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
     view : View
         An exact view.
     sigma : float
-        Standard deviation of each coordinate, in the image's unit: pixels, or metres on the paper's image plane.
+        Standard deviation of each coordinate: in pixels, or in metres on the image plane of a Lee-Chen camera.
     rng : Generator
-        Seeded by the caller.
+        Random number generator.
 
     Raises
     ------

@@ -49,7 +49,7 @@ class Walker:
     Parameters
     ----------
     figure : Figure
-        The body; the built-in figure (Lee & Chen 1985, Table A.1) by default.
+        Figure of the person; by default the built-in figure (Lee & Chen 1985, Table A.1).
     velocity : float
         Leg lengths per second, 0.5 to 1.3.
     lean : float
@@ -88,7 +88,7 @@ class Walker:
 
     @property
     def leg_length(self) -> float:
-        """Distance from hip to ankle, metres, mean of both sides; the figure has no feet."""
+        """Mean distance from hip to ankle of both legs, metres; the figure has no feet."""
         lengths = self.figure.lengths
         return sum(lengths[f"{s}_hip-{s}_knee"] + lengths[f"{s}_knee-{s}_ankle"] for s in SIDES) / 2
 
@@ -97,7 +97,7 @@ class Walker:
         return phase0 + np.asarray(time, dtype=np.float64) / self.cycle_duration
 
     def flexion(self, phase: ArrayLike) -> dict[str, Array]:
-        """Return the flexion of shoulder, elbow, hip and knee at phases (N,): (N, 2), right and left, radians."""
+        """Return the flexion (N, 2) of shoulder, elbow, hip and knee at phases (N,), right and left, radians."""
         t, v = np.asarray(phase, dtype=np.float64), self.velocity
         sides = np.stack([t, t + 0.5], axis=-1)
         u = (v - VELOCITY_RANGE[0]) / (VELOCITY_RANGE[1] - VELOCITY_RANGE[0])
@@ -111,12 +111,12 @@ class Walker:
         return {joint: np.radians(values) for joint, values in degrees.items()}
 
     def configurations(self, phase: ArrayLike) -> Array:
-        """Return the configurations (N, nq) at phases (N,), head-centred frame: metres, unit quaternion, radians.
+        """Return the configurations (N, nq) at phases (N,) in the head-centred frame: metres, unit quaternion, radians.
 
         Raises
         ------
         InputError
-            If the phases are not finite or not of shape (N,).
+            If the phases are not finite or do not have the shape (N,).
         """
         phases = np.asarray(phase, dtype=np.float64)
         if phases.ndim != 1 or not np.isfinite(phases).all():
@@ -146,14 +146,14 @@ class Walker:
         Parameters
         ----------
         time : array (N,)
-            Seconds.
+            Times, seconds.
         phase0 : float
             Phase at time 0, cycles.
 
         Returns
         -------
         array (N, 3)
-            Metres, axes of the head-centred frame.
+            Displacement, metres, in the axes of the head-centred frame.
         """
         times = np.concatenate([[0.0], np.asarray(time, dtype=np.float64)])
         t, v = self.phase(times, phase0), self.velocity
@@ -174,7 +174,7 @@ class Walker:
         return np.asarray(np.radians(4 * self.velocity * np.cos(2 * np.pi * phase)))
 
     def _torso(self, phase: Array) -> Array:
-        """Return the torso's rotations (N, 3, 3), URDF axes; the back flexes by minus the model's pelvis tilt."""
+        """Return rotations of the torso (N, 3, 3) in the URDF's axes; the back flexes opposite to the pelvis tilt."""
         tilt = np.radians(2 - 2 * _wave(2 * phase - 0.1))
         return coordinate_rotation(2, -self._torsion(phase)) @ coordinate_rotation(1, tilt + self.lean)
 
