@@ -11,9 +11,9 @@ from posekit.body.inertias import inertias
 from posekit.body.lengths import stature_from_lengths
 from posekit.following.tracking import COMPARED, FALLOFF
 from posekit.ranking import standing
-from posekit.recovery.scales import ANNOTATION_SIGMAS
+from posekit.recovery.scales import ANNOTATION_SIGMAS, DEPTH_RELIEF, DIMENSIONS
 from posekit.skeleton import JOINTS, LIMB_SHARES, POINTS
-from posekit.synthesis import Walker
+from posekit.synthesis import Walker, random_views
 from posekit.validators.motion import ground, trembling
 
 COCO = {
@@ -121,3 +121,11 @@ def test_limbs_swing_as_boulic_says(velocity: float) -> None:
     across = joints[:, JOINTS.index("right_hip")] - joints[:, JOINTS.index("left_hip")]
     turned = np.degrees(np.arctan2(across[:, 0], across[:, 2]))  # the hip of the leading leg leads
     assert turned == pytest.approx([4 * velocity, -4 * velocity], abs=1e-6)
+
+
+def test_parts_of_the_body_are_nearer_and_farther_by_less_than_in_random_postures() -> None:
+    joints = random_views(400, np.random.default_rng(0), distance=(4.0, 5.0)).truth
+    depth = joints[..., 2] - joints[..., 2].mean(axis=1, keepdims=True)
+    middles = [(depth[:, list(a)].mean(axis=1) + depth[:, list(b)].mean(axis=1)) / 2 for a, b in DIMENSIONS]
+    share = DEPTH_RELIEF / np.std(middles, axis=1)
+    assert (share > 0.5).all() and (share < 0.9).all()
