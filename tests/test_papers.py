@@ -17,7 +17,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.papers import lee_chen_walks, reproduce, taylor_objects
 from posekit.papers.figures import draw_lee_chen, draw_taylor
-from posekit.papers.lee_chen_walks import count_walks, grown
+from posekit.papers.lee_chen_walks import allowed, count_walks, grown, representatives
 from posekit.papers.rows import Row, Rows, printed, row, write_rows
 from posekit.papers.taylor import taylor_figure
 from posekit.skeleton import JOINTS, PARENTS
@@ -157,12 +157,17 @@ def test_walkers_are_counted_at_their_own_phase(name: str) -> None:
     walker = Walker(velocity=0.8, lean=np.radians(2.0))
     assert walks.settings[:, :2].tolist() == [[0.8, 2.0]] * 3
     assert walks.settings[:, 2] == pytest.approx([0, 1 / 3, 2 / 3])
-    for levels, phase in zip(walks.levels, walks.settings[:, 2], strict=True):
+    for levels, final, phase in zip(walks.levels, walks.final, walks.settings[:, 2], strict=True):
         view = walker_view(walker, camera=camera, frames=5, dt=0.2, phase0=phase)
         for number, frame in enumerate((0, 2, 4)):
-            code = grown(view.take([frame]))[0].code
-            alive = [len(np.unique(code >> (13 - level))) for level in range(14)]
-            assert levels[0, number].tolist() == alive
+            trees, head = grown(view.take([frame]))
+            ruled = allowed(trees, head, (1, 2))
+            for ruling, code in enumerate((trees.code, trees.code[ruled])):
+                alive = [len(np.unique(code >> (13 - level))) for level in range(14)]
+                assert levels[ruling, number].tolist() == alive
+            if frame == 0:
+                kept = [ruled, ruled & allowed(trees, head, (3, 4, 5))]
+                assert final.tolist() == [len(representatives(trees.joints[one])) for one in kept]
 
 
 def test_remarks_on_the_walks_are_shares_of_their_settings(rows: Rows) -> None:
