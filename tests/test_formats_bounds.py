@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -153,3 +154,52 @@ def test_rows_without_names_have_the_stated_order_of_joints(order: str, tmp_path
     motion = posekit.open(tmp_path / "rows.csv", layout=order)
     assert motion.q_names[7:] == tuple(load_layout(order).fields["joints"])
     np.testing.assert_allclose(motion.q[:, 7:], q[:, 7:], atol=1e-9)
+
+
+CHAIN = re.compile(r"longest chain of bones has (\S+) units")
+INCH = 0.0254
+UNITS = {"m": 1.0, "CMU's unit": INCH / 0.45, "inches": INCH, "cm": 0.01, "mm": 0.001}
+
+
+@pytest.mark.parametrize(
+    ("longest", "unit"),
+    [
+        *((0.89, ""), (0.91, "m"), (4.45, "m"), (4.55, "")),
+        *((15.8, ""), (16.1, "CMU's unit"), (52.3, "CMU's unit"), (53.3, "inches"), (124.8, "inches")),
+        *(
+            (126.0, "cm"),
+            (445.0, "cm"),
+            (455.0, ""),
+            (890.0, ""),
+            (910.0, "mm"),
+            (4450.0, "mm"),
+            (4550.0, ""),
+        ),
+    ],
+)
+def test_the_longest_chain_of_a_bvh_file_is_about_two_metres(
+    longest: float, unit: str, tmp_path: Path
+) -> None:
+    """The unit is the one in which the chain is nearest to 2 m; chains of 0.9 to 4.5 m are those of people."""
+    walk, path = replace(walking(3), q=None, q_names=(), robot=""), tmp_path / "walk.bvh"
+    posekit.save(walk, path)
+    usual = posekit.open(path)
+    factor = longest / float(next(filter(None, map(CHAIN.search, usual.notes)))[1])
+
+    def larger(words: list[str], first: int, stop: int) -> str:
+        return " ".join(
+            [*words[:first], *(str(factor * float(one)) for one in words[first:stop]), *words[stop:]]
+        )
+
+    lines = [line.split() for line in path.read_text().splitlines()]
+    head = next(k for k, words in enumerate(lines) if words[:2] == ["Frame", "Time:"])
+    scaled = [larger(words, 1, 4) if words[0] == "OFFSET" else " ".join(words) for words in lines[: head + 1]]
+    path.write_text("\n".join([*scaled, *(larger(words, 0, 3) for words in lines[head + 1 :])]) + "\n")
+    if not unit:
+        with pytest.raises(InputError, match="longest chain of bones has"):
+            posekit.open(path)
+        return
+    motion = posekit.open(path)
+    (note,) = (note for note in motion.notes if "longest chain" in note)
+    assert note.startswith(f"lengths are in {unit}") and f"{longest * UNITS[unit]:.2f} m" in note
+    np.testing.assert_allclose(motion.joints, 100 * UNITS[unit] * factor * usual.joints, rtol=1e-5, atol=1e-5)
