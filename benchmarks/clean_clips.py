@@ -1,9 +1,9 @@
-"""False alarms: what is rejected of clips that have no known fault.
+"""False alarms: findings in clips that have no known fault.
 
     python -m benchmarks.clean_clips [--data DIR] [--half 1]
 
-Prints the share of valid frames, the checks over time that reject any, and each clip with what is said of
-it: every exception is to be looked at, and is either a fault of the recording or a false alarm.
+Prints the share of valid frames, the checks over time that reject a clip, and each rejected clip with its findings.
+Every finding must be inspected: it is a fault of the recording or a false alarm.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What benchmarks share: clips of motion, folders of data, least times of ways that take turns, and tables."""
+"""Functions that benchmarks share: clips of motion, folders of data, least processor times, and tables."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DATA_VARIABLE = "POSEKIT_DATA"
 """Environment variable with folders and files of data, separated as in PATH."""
 
 KNOWN_FAULTS = {
-    # The legs whip about the pelvis, a metre a frame, in seven stretches; this one is sound.
+    # The legs whip about the pelvis by a metre per frame in seven spans; this span is sound.
     "train/directing_traffic_1": slice(520, 675),
     "train/basketball_1": slice(1, 160),  # held still from there to the end
 }
@@ -87,7 +87,7 @@ def recordings(paths: Sequence[Path], *, least: int = 60) -> list[Motion]:
 
 
 def walk(velocity: float, frames: int, rate: float = 30.0) -> Motion:
-    """Walk over the ground, up +y; velocity in leg lengths a second."""
+    """Return a walk over the ground, up +y; velocity in leg lengths per second."""
     walker = Walker(velocity=velocity)
     time = np.arange(frames) / rate
     points = walker.figure.points(walker.configurations(walker.phase(time)))
@@ -97,23 +97,23 @@ def walk(velocity: float, frames: int, rate: float = 30.0) -> Motion:
 
 @contextmanager
 def sampled() -> Iterator[Path]:
-    """Make the files of ``posekit samples`` in a folder that is removed afterwards."""
+    """Write the files of ``posekit samples`` to a folder that is removed afterwards."""
     with tempfile.TemporaryDirectory() as spare:
         samples(spare)
         yield Path(spare)
 
 
 def timed(way: Callable[[], object]) -> float:
-    """Return the processor's seconds of one call in this process."""
+    """Return the processor time of one call in this process, seconds."""
     start = time.process_time()
     way()
     return time.process_time() - start
 
 
 def least(ways: Mapping[str, Callable[[], object]], repeats: int = 5) -> dict[str, float]:
-    """Time ways that take turns, and return the least processor's time of each, seconds.
+    """Call functions in turn, several times, and return the least processor time of each, seconds.
 
-    What else runs on the machine only adds to a time, and taking turns lets it fall on all ways alike.
+    Other work on the machine only adds to a time, and in turns it affects all functions alike.
     """
     spent: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(repeats):

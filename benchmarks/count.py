@@ -1,6 +1,6 @@
 """Print the number of lines of code, classes, tests and words of documentation.
 
-Code is counted as Python's tokenizer sees it, without docstrings, comments and blank lines.
+Lines of code are counted with Python's tokenizer, without docstrings, comments and blank lines.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def code_lines(path: Path) -> int:
 
 
 def python_files(folder: str) -> list[Path]:
-    """List the Python files of a folder, each once: not through symlinks."""
+    """List the Python files of a folder, without symbolic links."""
     top = ROOT / folder
     return [
         path
@@ -51,7 +51,7 @@ def python_files(folder: str) -> list[Path]:
 
 
 def main() -> None:
-    """Print one line a folder."""
+    """Print one line per folder."""
     code = [*python_files("posekit"), *python_files("validators"), *python_files("viewer")]
     classes = sum(
         isinstance(node, ast.ClassDef) for path in code for node in ast.walk(ast.parse(path.read_text()))

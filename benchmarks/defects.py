@@ -2,10 +2,10 @@
 
     python -m benchmarks.defects [--data DIR] [--clips 25] [--seed 0] [--only KIND,KIND] [--half 1] [--missed]
 
-The benchmark plants each kind of defect into a span of each clip. A defect counts as found if the first and
-the last frame that the right check rejects are at most three frames from the ends of the span. Sliding,
-floating and sinking feet are planted into spans in which a foot stands. `--half 0` uses the clips with even
-numbers, `--half 1` the clips with odd numbers. `--missed` lists the defects that are not found.
+The benchmark plants each kind of defect into a span of each clip. A defect counts as found if the first and the last
+frame that the right check rejects are at most three frames from the ends of the span. Sliding, floating and sinking
+feet are planted into spans in which a foot is at rest. `--half 0` uses the clips with even numbers, `--half 1` the
+clips with odd numbers. `--missed` lists the defects that are not found.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ Span = tuple[int, int]
 class Kind:
     """A kind of defect.
 
-    `checks` are the right checks, or `warning` a word of the right warning. `plant` returns points with the
-    defect by points, span, up, seconds a frame and a generator; `frames` bounds the length of the span at 30 Hz.
+    `checks` are the right checks, or `warning` a word of the right warning. `plant` returns points with the defect,
+    given points, span, up, seconds per frame and a generator. `frames` bounds the length of the span at 30 Hz.
     """
 
     checks: tuple[str, ...]
@@ -165,7 +165,7 @@ def t_pose(points: Array, span: Span, up: Array, step: float, rng: np.random.Gen
     return np.concatenate([first[None], points[1:]]), (0, 0)
 
 
-#: Kinds by name. Slow floating and sinking are judged over the ground of the clean clip.
+#: Kinds by name. Slow floating and sinking are judged relative to the ground of the clean clip.
 KINDS = {
     "floating 5 cm": Kind(("floating", "support"), lifted(0.05), grounded=True),
     "sinking 5 cm": Kind(("penetration",), lifted(-0.05), grounded=True),
@@ -191,14 +191,14 @@ KINDS = {
 
 
 def named(report: Report, kind: Kind) -> Span | None:
-    """Return the first and the last frame that the right checks reject; None if there are none."""
+    """Return the first and the last frame that the right checks reject; None if they reject no frame."""
     which = [k for k, name in enumerate(report.checks) if name in kind.checks]
     rows = report.findings["row"][np.isin(report.findings["check"], which)]
     return (int(rows.min()), int(rows.max())) if len(rows) else None
 
 
 def standing(motion: Motion, points: Array, up: Array) -> NDArray[np.bool_]:
-    """Return whether a toe (or an ankle, if toes are unknown) stands in each frame: near the ground, below 0.1 m/s."""
+    """Return whether a toe (or an ankle, if toes are unknown) rests in each frame: near the ground, below 0.1 m/s."""
     toes = [NAMES.index(f"{side}_toe") for side in ("right", "left")]
     feet = points[:, toes]
     if np.isnan(feet).all():
@@ -209,7 +209,7 @@ def standing(motion: Motion, points: Array, up: Array) -> NDArray[np.bool_]:
 
 
 def spans_of(kind: Kind, stands: NDArray[np.bool_], rate: float, rng: np.random.Generator) -> Span | None:
-    """Return a random span for the kind, eight frames or more from the ends; None if none fits."""
+    """Return a random span for the kind, eight frames or more from the ends; None if no span fits."""
     count = len(stands)
     least, most = (max(1, round(one * rate / 30)) if one > 1 else one for one in kind.frames)
     if not most:

@@ -1,10 +1,9 @@
-"""Results written and read again, and files that are opened: seconds, bytes, and what is the same afterwards.
+"""Results that are written and read again, and files that are opened: seconds, bytes, and differences.
 
     python -m benchmarks.formats [--frames 1000] [--data DIR]
 
-A result of random exact views is written as JSON, NPZ and Parquet, read, and judged again; verdicts must be
-equal. With `--data` every file below the folders is opened, and the kinds are counted: what they were
-understood as, or refused.
+A result of random exact views is written as JSON, NPZ and Parquet, read, and judged again; verdicts must be equal. With
+`--data` every file below the folders is opened, and files are counted by recognised content, or as refused.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ NOT_DATA = (".md", ".txt", "", ".rst", ".py")
 
 
 def round_trips(result: Recovery, folder: Path) -> list[tuple[str, ...]]:
-    """Write and read a result in every container, beside Python's own pickle."""
+    """Write and read a result in every container, and as a pickle for comparison."""
     rows: list[tuple[str, ...]] = []
     paths = {ending: folder / f"result.{ending}" for ending in ENDINGS}
     spare, arrays = folder / "result.pickle", (result.survivors.joints, result.survivors.q)
@@ -55,7 +54,7 @@ def verdicts(result: Recovery, folder: Path) -> dict[str, NDArray[np.bool_]]:
 
 
 def opened(paths: list[Path]) -> list[tuple[str, str, int]]:
-    """Count the files of each ending by what they were understood as."""
+    """Count the files of each suffix by recognised content."""
     counts: Counter[tuple[str, str]] = Counter()
     for file in files_below(paths):
         if file.suffix not in NOT_DATA:

@@ -1,13 +1,12 @@
-"""Damaged files of every container through the command: only an answer, or one line that refuses.
+"""Damaged files of every container, given to the command: it must answer, or refuse the file in one line.
 
     python -m benchmarks.fuzz -o DIR [--seconds 600] [--seed 0] [--data DIR]
 
-Whole files are made by posekit: samples, and each motion and result container. A file is damaged in its
-bytes, or in the members of an archive, and given to `inspect`, `validate`, `convert` or `recover` in a fork
-with limits of time and memory. A case is clean if the command ends with 0 or 1, or with 2 after one
-printable line that starts with ``posekit: error:``, without writing a file, and if it never ends by an
-exception, a signal or the limits. What is not clean is kept in DIR with the damaged file, the arguments and
-what was printed.
+posekit writes intact files: samples, and each motion and result container. Bytes of a file, or of members of an
+archive, are damaged, and the file is given to `inspect`, `validate`, `convert` or `recover` in a forked process with
+limits of time and memory. A case is clean if the command ends with 0 or 1, or with 2 after one printable line that
+starts with ``posekit: error:``, without writing a file, and if it never ends by an exception, a signal or the limits.
+Other cases are kept in DIR with the damaged file, the arguments and the output.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ def _once(data: bytes, rng: random.Random) -> bytes:
 
 
 def _members_damaged(data: bytes, rng: random.Random) -> bytes:
-    """Damage, drop, exchange or rename a member of an archive, which stays a whole archive."""
+    """Damage, drop, exchange or rename a member of an archive, which stays a valid archive."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     name, other = rng.choice(sorted(members)), rng.choice(sorted(members))
@@ -146,7 +145,7 @@ def _members_damaged(data: bytes, rng: random.Random) -> bytes:
 
 
 def write_seeds(folder: Path, data: list[Path]) -> list[Path]:
-    """Write whole files of every kind, and take small files of the data."""
+    """Write intact files of every kind, and copy small files of the data."""
     samples(folder)
     walk = posekit.open(folder / "walk.npz")
     for ending in MOTION_ENDINGS:
@@ -211,7 +210,7 @@ def in_fork(arguments: list[str], said: Path) -> int | None:
 
 
 def outcome(code: int | None, said: str, written: list[str]) -> str:
-    """Return ``accepted`` or ``refused``, or in what way the case is not clean."""
+    """Return ``accepted`` or ``refused``, or the reason why the case is not clean."""
     if code is None or code in (-signal.SIGXCPU, -signal.SIGKILL):
         return "hangs"
     if code < 0:

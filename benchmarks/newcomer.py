@@ -2,10 +2,9 @@
 
     python -m benchmarks.newcomer [--here] [--folder DIR] [--only JOB]
 
-Three jobs: an array of postures of one's own is judged; configurations of a robot are judged; key points of
-a detector become postures. Each step is typed as README has it, in the environment that `make demo` made.
-pip keeps no cache, so all packages are fetched. `--here` skips the clone and runs the jobs with this
-Python. Prints seconds by the clock.
+The three jobs validate an array of postures, validate configurations of a robot, and recover postures from a detector's
+key points. Each step is a command of README, in the environment that `make demo` created. pip uses no cache, so all
+packages are downloaded. `--here` skips the clone and runs the jobs with this Python. Prints wall-clock seconds.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ JOBS = {
 
 
 def write_own(folder: Path) -> None:
-    """Write what a newcomer would have: joints of a walk as an array, and COCO key points of it seen from the side."""
+    """Write a newcomer's data: joints of a walk as an array, and COCO key points of the walk from the side."""
     joints = walk(0.8, 60).figure_joints
     np.save(folder / "mine.npy", joints)
     centre = joints.mean(axis=(0, 1)) + np.array([0.0, 0.2, 5.0])

@@ -1,11 +1,11 @@
-"""The same jobs by posekit and by what else one would use, in one run: verdicts, collisions, inverse kinematics.
+"""The same jobs with posekit and with other programs, in one run: verdicts, collisions, inverse kinematics.
 
     python -m benchmarks.peers [--states 2000] [--postures 200]
 
-Collisions of the figure: Pinocchio's batched call, MuJoCo if it is installed, and `Validator.check`, which
-also judges limits and names every finding. Inverse kinematics of the robot `human`: the batch of
-`Robot.configurations` beside a loop of damped least squares in Pinocchio, clipped to the limits, as scripts
-write it. Met: no point is 1 mm off.
+Collisions of the figure: Pinocchio's batched call, MuJoCo if it is installed, and `Validator.check`, which also judges
+limits and names every finding. Inverse kinematics of the robot `human`: the batch of `Robot.configurations`, and a loop
+of damped least squares in Pinocchio, clipped to the limits, as in usual scripts. A posture is met if every point is
+within 1 mm.
 """
 
 from __future__ import annotations

@@ -1,23 +1,21 @@
-"""How good answers are on people: errors, representatives, how sure, and whether 95 % regions hold the joints.
+"""Quality of answers on people: errors, representatives, stated probability, and coverage of 95 % regions.
 
     python -m benchmarks.people [--data DIR] [--views 600] [--noise 2] [--trial POSE2SIM_FOLDER] [--only NAME,NAME]
 
-Motion is read from files (`--data`), or it is a walker's. Every body has as many frames as every other one, drawn
-evenly over its clips: many clips of one data set have the same skeleton. Each frame is seen by a camera of its own
-2.5 to 6 m away. Lengths are the medians of each clip; the stated deviation is the root mean square of the clip's own
-lengths about them, because spines bend and shoulders move. Conditions:
+Motion is read from files (`--data`), or it is a walker's. Every body has the same number of frames, drawn evenly over
+its clips, because many clips of one data set have the same skeleton. Each frame has another random camera 2.5 to 6 m
+away. Lengths are the medians of each clip; the stated deviation is the root mean square deviation of the clip's lengths
+from them, because spines bend and shoulders move. Conditions:
 
-- neck: the neck is given exactly;
-- no neck: neither neck nor head points are given, depth comes from the lengths;
-- taped neck, taped no neck: the same with lengths that are 2 % off in common and 2 % each, and no deviation stated;
-- photograph: the camera is not known either, nor are the lengths;
-- a trial: key points of a detector, with the calibration (TOML) and the motion (TRC) of the same seconds.
-  The truth is the TRC's; the person is described by a stature alone, or by the lengths of the frames that
-  no picture shows.
+- neck: the neck is given exactly; - no neck: neither neck nor head points are given, depth comes from the lengths; -
+taped neck, taped no neck: the same with lengths that have a common error of 2 % and own errors of 2 %, and no stated
+deviation; - photograph: camera and lengths are unknown as well; - a trial: key points of a detector, with the
+calibration (TOML) and the motion (TRC) of the same seconds.
+  The truth is the TRC's; the person is described by a stature only, or by the lengths in frames that no picture shows.
 
-`60 mm` is the share of frames in which a representative is within 60 mm of the truth after alignment.
-`sure` is compared with how often every joint of the answer is within 5 cm of the truth (expected
-calibration error). The floor is the error that probabilities which are exactly right would show on as many frames.
+`60 mm` is the share of frames in which a representative is within 60 mm of the truth after alignment. `sure` is
+compared with the frequency at which every joint of the answer is within 5 cm of the truth (expected calibration error).
+The floor is the calibration error of exactly right probabilities for the same number of frames.
 """
 
 from __future__ import annotations
@@ -68,7 +66,7 @@ HEAD = (
 
 @dataclass(frozen=True)
 class Found:
-    """One view's evaluation, number of representatives and distance of the nearest one (F,), metres; seconds."""
+    """Evaluation of one view, number of representatives, distance (F,) of the nearest, metres, and seconds."""
 
     evaluation: Evaluation
     representatives: Array
@@ -110,7 +108,7 @@ def neck_unknown(view: View) -> View:
 
 
 def taped(view: View) -> View:
-    """Return a view with lengths as of a tape: `TAPE_DEVIATION` off in common, and each; none is stated."""
+    """Return a view with taped lengths: common and own errors of `TAPE_DEVIATION`, without a stated deviation."""
     rng = np.random.default_rng(int(1e6 * abs(view.image[0, 0, 0])))  # another tape for each view
     off = TAPE_DEVIATION * (rng.normal() + rng.normal(size=len(view.lengths)))
     lengths = {name: length * np.exp(x) for (name, length), x in zip(view.lengths.items(), off, strict=True)}
@@ -152,12 +150,12 @@ def length_deviation(joints: Array) -> float:
 
 
 def shares(count: int, parts: int) -> list[int]:
-    """Divide a number into parts that differ by one at most."""
+    """Divide a number into parts that differ by at most one."""
     return [count // parts + (k < count % parts) for k in range(parts)]
 
 
 def clips_by_body(motions: Iterable[Motion]) -> list[list[Motion]]:
-    """Return the clips of each body; clips with limbs of equal lengths are of one body."""
+    """Return the clips of each body; clips with equal limb lengths belong to one body."""
     bodies: list[tuple[Array, list[Motion]]] = []
     for clip in motions:
         lengths = segment_lengths(clip.figure_joints)
@@ -188,7 +186,7 @@ def trial_views(folder: Path, stature: float) -> Iterator[tuple[str, View]]:
 
 
 def least_error(sure: Array) -> float:
-    """Return the mean calibration error of events that happen exactly as often as stated, 200 draws."""
+    """Return the mean calibration error, over 200 draws, of events whose stated probabilities are exact."""
     rng = np.random.default_rng(0)
     draws = [reliability(sure, (rng.random(len(sure)) < sure).astype(np.float64)) for _ in range(200)]
     return float(np.mean([one["ece"] for one in draws if one is not None]))

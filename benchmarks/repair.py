@@ -1,12 +1,11 @@
-"""Faults planted in BVH files, repaired, and judged afresh: how many pass, and what is kept of the file.
+"""Faults that are planted in BVH files and repaired: number of files that pass, and unchanged contents of the files.
 
     python -m benchmarks.repair [--data DIR] [--clips 10] [--only KIND,KIND] [--seed 0]
 
-Faults are put into the text of the files, in a span of frames, so that nothing of posekit's own
-representation is used. Clips are those that pass without a fault; cases those that do not pass with it.
-Kept: the hierarchy with all names and channels, the number of frames, and the lines of frames outside of
-the span. A slide displaces all frames after it, so that at best the larger side of the span is kept. Without
-``--data`` the sample walk is used.
+Faults are written into the text of the files, in a span of frames, without posekit's representation of motion. The
+clips pass without a fault; the cases are clips that fail with the fault. Kept: the hierarchy with all names and
+channels, the number of frames, and the lines of frames outside of the span. A slide displaces all frames after it, so
+that at best the larger side of the span is kept. Without ``--data`` the sample walk is used.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ class Clip:
         return [[k for kind, k in own if kind.endswith("rotation")] for own in found]
 
     def text(self, values: Array) -> str:
-        """Write the file; frames that are as they were have the lines that they had."""
+        """Return the file's text; unchanged frames have their original lines."""
         own = self.head.rstrip("\n").split("\n")
         lines = [" ".join(f"{one:.6f}" for one in row) for row in values]
         return "\n".join([*own, *lines, ""])
@@ -173,7 +172,7 @@ KINDS: dict[str, tuple[Callable[..., Array], int]] = {
 
 
 def kept(clip: Clip, before: str, after: str, span: slice) -> tuple[bool, float]:
-    """Return whether hierarchy and number of frames are kept, and the share of outside lines that are."""
+    """Return whether hierarchy and number of frames are unchanged, and the share of unchanged outside lines."""
     old, new = before.splitlines(), after.splitlines()
     start = len(clip.head.splitlines())
     same = old[:start] == new[:start] and len([one for one in new if one.strip()]) == len(old)

@@ -1,11 +1,11 @@
-"""Validity of a robot's configurations, beside Pinocchio's own loops on the same states, in one run.
+"""Validation of a robot's configurations, compared with loops over Pinocchio's functions on the same states.
 
     python -m benchmarks.robots [--robot g1] [--states 2000] [--verdicts 20000] [--spread 0.5] [--data DIR]
 
-With `--data` states are those of files of motion; otherwise uniform in a share of the joints' ranges about
-their middle. Ways: `pin.computeCollisions` a state, stopped at the first contact; Pinocchio's broad phase
-over the meshes, and over their convex hulls; `Validator.check` with every finding. Verdicts on collision
-must be those of `pin.computeCollisions` in all states.
+With `--data` states are from files of motion; otherwise they are uniform in a share of the joints' ranges about the
+middle. Methods: `pin.computeCollisions` per state, stopped at the first contact; Pinocchio's broad phase over the
+meshes, and over their convex hulls; `Validator.check` with every finding. Verdicts on collision must equal those of
+`pin.computeCollisions` in all states.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from posekit.validators import Validator
 
 
 def states(robot: Robot, count: int, spread: float, rng: np.random.Generator) -> Array:
-    """Draw configurations (count, nq) in a share of each range about its middle; the root stays."""
+    """Draw configurations (count, nq) in a share of each range about its middle; the root does not move."""
     q = np.tile(robot.neutral, (count, 1))
     bounded = (
         np.isfinite(robot.lower) & np.isfinite(robot.upper) & (np.arange(q.shape[1]) >= 7 * robot.free_flyer)
@@ -52,14 +52,14 @@ def recorded(robot: Robot, name: str, paths: list[Path], count: int) -> Array:
 
 
 def pairwise(robot: Robot, geometry: pin.GeometryModel, q: Array) -> NDArray[np.bool_]:
-    """Ask `pin.computeCollisions` about each state, up to its first contact."""
+    """Call `pin.computeCollisions` for each state, up to its first contact."""
     model = robot.model
     data, geometry_data = model.createData(), geometry.createData()
     return np.array([pin.computeCollisions(model, data, geometry, geometry_data, row, True) for row in q])
 
 
 def broad_phase(robot: Robot, geometry: pin.GeometryModel, q: Array) -> NDArray[np.bool_]:
-    """Ask Pinocchio's dynamic tree of boxes over some bodies."""
+    """Test collisions with Pinocchio's dynamic tree of bounding boxes of some bodies."""
     model = robot.model
     data, geometry_data = model.createData(), geometry.createData()
     manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, geometry_data)

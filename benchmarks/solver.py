@@ -1,9 +1,9 @@
-"""Time of a noisy frame: batches and one frame a call, compiled solver beside the NumPy reference, exact frames beside.
+"""Time of a noisy frame, in batches and alone, with the compiled solver and the NumPy reference; time of exact frames.
 
     python -m benchmarks.solver [--frames 150] [--noise 2] [--one 30] [--reference 10]
 
-Random legal postures of the built-in figure seen from 2.5 to 6 m; the neck is given. The ways take turns;
-the least processor's time of each counts. Also prints whether frames alone and among others are equal, and
+Views are random valid postures of the built-in figure at 2.5 to 6 m, with a given neck. The methods run in turns, and
+the least processor time of each is printed. Also prints whether a frame has the same result alone and in a batch, and
 (`--many`) the peak memory of a call with few and with many frames.
 """
 
@@ -28,7 +28,7 @@ from posekit.synthesis import random_views, with_noise
 
 @contextmanager
 def reference() -> Iterator[None]:
-    """Solve with the NumPy reference, as where no compiler was found."""
+    """Solve with the NumPy reference, as in an installation without a compiler."""
     compiled: Any = engine.compiled
     engine.compiled = None
     try:
@@ -39,7 +39,7 @@ def reference() -> Iterator[None]:
 
 
 def some(view: View, rows: slice) -> View:
-    """Return some frames of a view."""
+    """Return selected frames of a view."""
     count = len(view)
     changed: dict[str, Any] = {
         one.name: value[rows]
@@ -50,7 +50,7 @@ def some(view: View, rows: slice) -> View:
 
 
 def noisy_view(frames: int, pixels: float, seed: int) -> View:
-    """View random legal postures whose neck is given."""
+    """Return a view of random valid postures with given necks."""
     rng = np.random.default_rng(seed)
     view = random_views(frames, rng)
     given = replace(view, root=view.truth[:, 0], head_image=np.full_like(view.head_image, np.nan))
@@ -62,7 +62,7 @@ def one_by_one(view: View, frames: int) -> list[Recovery]:
 
 
 def apart(whole: Recovery, alone: list[Recovery]) -> float:
-    """Return the largest difference of joints and probabilities, infinite where counts differ."""
+    """Return the largest difference of joints and probabilities; infinite if numbers of postures differ."""
     worst = 0.0
     for k, other in enumerate(alone):
         own = whole.survivors.take(whole.rows(k))

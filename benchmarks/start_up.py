@@ -1,9 +1,9 @@
-"""Start-up: commands in fresh processes beside `import pinocchio, numpy`, and what `inspect` loads and opens.
+"""Start-up time of commands relative to `import pinocchio, numpy`, and modules and files that `inspect` loads.
 
     python -m benchmarks.start_up [--runs 5] [--only NAME]
 
-Processes take turns, so that what else the machine does falls on all of them alike. Ratios are of the least
-wall time and of the least processor's time.
+Processes run in turns, so that other work on the machine affects all of them alike. Ratios are of the least wall time
+and of the least processor time.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ print("modules", len(own), "opens", sum(one == {path!r} for one in opened))
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a process that runs this posekit."""
+    """Return the environment variables of a process that runs this posekit."""
     root = str(Path(posekit.__file__).parents[1])
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return {**kept, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
 
 
 def spend(arguments: list[str], folder: Path) -> tuple[float, float]:
-    """Run Python once; return seconds of the clock and of the processor."""
+    """Run Python once; return wall time and processor time, seconds."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run(
         [sys.executable, *arguments], cwd=folder, env=environment(), capture_output=True, check=False

@@ -1,8 +1,8 @@
-"""The exact tree beside brute force on the same views: survivors, and the time of `recover`.
+"""The exact tree and brute force on the same views: survivors, and the time of `recover`.
 
     python -m benchmarks.tree [--views 20] [--batch 2000]
 
-Brute force lifts all 8192 leaves of a view in one NumPy batch and judges every leaf that has a solution with every
+Brute force computes all 8192 leaves of a view in one NumPy batch and judges every leaf that has a solution with every
 check. Pinocchio's pool tests the collisions of whole configurations, without the head, because the views show no head
 points. The survivors must equal those of `posekit.recover`. The neck is given. Times are processor times of one run.
 """

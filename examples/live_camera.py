@@ -1,4 +1,4 @@
-"""Follow a person before a camera: key points of MediaPipe, a posture a picture.
+"""Follow a person in front of a camera: MediaPipe's key points, one posture per picture.
 
 python examples/live_camera.py --stature 1.75
 python examples/live_camera.py --keypoints samples/keypoints    # recorded key points in place of a camera
@@ -54,7 +54,7 @@ def from_files(path: str, rate: float = 10.0) -> Iterator[Picture]:
 
 
 def line_of(found: Any) -> str:
-    """Say how far before the shoulders the hands are."""
+    """Return a line of text with the distance of the hands in front of the shoulders."""
     if found.reason:
         return f"{found.time:6.2f} s  {found.reason}"
     hands = []
@@ -65,7 +65,7 @@ def line_of(found: Any) -> str:
 
 
 def main() -> None:
-    """Follow until the camera ends, the files do, or Ctrl-C."""
+    """Follow the person until the camera or the files end, or until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--camera", type=int, default=0, help="number of the camera, from 0")
     parser.add_argument("--stature", type=float, default=1.75, help="height of the person, metres")

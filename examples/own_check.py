@@ -1,4 +1,4 @@
-"""Write a check of your own and use it through every door: files, arrays, robots, recoveries, and the command line.
+"""Write your own check and use it for files, arrays, robots, recoveries, and on the command line.
 
 In this folder: ``posekit validate jump.bvh --checks joint-range,own_check:FeetAboveGround``.
 """
@@ -21,7 +21,7 @@ class FeetAboveGround:
         self.ground = ground
 
     def judge(self, body: Body) -> Judgement:
-        """Measure the height of both ankles; an ankle that is not known is NaN, and undecided."""
+        """Measure the height of both ankles; an unknown ankle is NaN, and the check is undecided."""
         height = body.joints[:, [12, 13]] @ np.asarray(body.up) - self.ground
         return Judgement(self.points, height, lower=0.0, tolerance=0.01)
 
@@ -36,7 +36,7 @@ def main() -> None:
 
     view = posekit.builtin_view("seq1")
     physical = ["rigid-parts", "joint-range", "collision"]
-    # In the frame of a camera held level its height is below the origin, which is the camera.
+    # The origin is the camera. If the camera is level, the ground is below the origin by the camera's height.
     for checks in (physical, [*physical, FeetAboveGround(ground=-0.78)]):
         print([len(frame.joints) for frame in posekit.recover(view, checks=checks)])
 

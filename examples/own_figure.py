@@ -1,4 +1,4 @@
-"""Make the figure of another person, draw random legal postures of it, and judge them.
+"""Make the figure of another person, draw random valid postures of it, and judge them.
 
 python examples/own_figure.py
 """
@@ -10,7 +10,7 @@ from posekit.synthesis import random_postures
 
 
 def main() -> None:
-    """Judge sound postures, and one whose wrist was torn away."""
+    """Judge valid postures, and a posture with a displaced wrist."""
     figure = posekit.load_figure().scaled({"right_hip-right_knee": 0.45}, stature=1.82)
     print(f"upper arm {figure.lengths['right_shoulder-right_elbow'] * 100:.1f} cm")
 

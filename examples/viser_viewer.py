@@ -1,4 +1,4 @@
-"""Turn a robot's configurations in the browser with the viewer that Pinocchio ships: ``pip install viser``.
+"""Show a robot's configurations in the browser with Pinocchio's viewer for viser (``pip install viser``).
 
 Run: ``python examples/viser_viewer.py g1 samples/robot.npz``
 """
