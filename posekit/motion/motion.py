@@ -14,12 +14,12 @@ from posekit.geometry import UP_AXES, UP_WORDS, Array, Record, numbers, rotation
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS, NAMES
 
 PER_FRAME: Final = ("joints", "q", "time", "frame", "clip")
-"""Fields with one row a frame."""
+"""Fields with one row per frame."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Motion(Record):
-    """T frames of one body, in one recording or several. A posture is a motion of one frame.
+    """Motion of one body: T frames in one recording or several. A posture is a motion of one frame.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Motion(Record):
     robot : str
         Name or path of the robot's URDF; ``figure`` for the built-in figure; empty if unknown.
     time : array (T,), optional
-        Seconds; NaN if unknown. All NaN by default.
+        Time of each frame, seconds; NaN if unknown. By default all times are unknown.
     frame : int array (T,), optional
         Number of each row's frame within its recording, from 0. Rows with the same number are alternative postures of
         one frame. By default rows are numbered consecutively.
@@ -170,7 +170,7 @@ class Motion(Record):
 
     @property
     def in_time(self) -> bool:
-        """Whether frames follow each other in time: there are several, and none has alternative postures."""
+        """Whether the frames are successive in time: there are several, and no frame has alternative postures."""
         clip, frame = np.asarray(self.clip), np.asarray(self.frame)
         return len(self) > 1 and len(np.unique(clip * (frame.max() + 1) + frame)) == len(self)
 
@@ -216,12 +216,12 @@ class Motion(Record):
             yield name, self if np.all(rows) else replace(self.take(rows), clip=None, clips=(name,))
 
     def rotated(self, up: str) -> Motion:
-        """Return the motion in a world whose `up` axis points up; configurations are left out.
+        """Return the motion rotated so that the axis `up` points up; the result has no configurations.
 
         Raises
         ------
         InputError
-            If `up` is no axis, or the up axis of the motion is unknown.
+            If `up` is not an axis, or the up axis of the motion is unknown.
         """
         if up == self.up or self.joints is None:
             return self

@@ -58,12 +58,13 @@ def validate(
     ----------
     given : path, sequence of path, array, Motion or Recovery
         Files, folders, and patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
-        metres, NaN if unknown; configurations (T, nq) of `urdf`; or a motion or result from `posekit.open`. Checks over
-        time are applied to frames that follow each other in time; for an array this requires `rate`.
+        metres, NaN if unknown; configurations (T, nq) of `urdf`; or a motion or result from `posekit.open`. Checks of
+        motion are applied only to frames that are successive in time; for an array this requires `rate`.
     settings : ValidateSettings, optional
         Settings for the verdicts; for a result, by default the settings with which it was recovered.
     urdf : str, path, Figure or Robot
-        Body to judge with, as for `posekit.Validator`. By default the robot that a file names, else the figure.
+        Figure or robot of the postures, as in `posekit.Validator`. By default the robot that a file names, or the
+        figure.
     layout, unit, up, rate, person
         Facts that the files or the array do not state: see `posekit.open`. The points of an array (T, J, 3) with a
         `layout` are in the layout's order.
@@ -102,14 +103,14 @@ def validate(
 
 
 class Judge:
-    """The body and the settings that judge, loaded once for all files.
+    """Validator and settings, loaded once for all files.
 
     Parameters
     ----------
     settings : ValidateSettings or None
-        Settings that decide the verdicts.
+        Settings of the checks.
     urdf : str, path, Figure or Robot
-        The body that judges; empty for the robot that a file names, else the figure.
+        Figure or robot of the postures; empty for the robot that a file names, or the figure.
     changes : mapping
         Fields of the settings that replace those of `settings`.
     """
@@ -168,7 +169,7 @@ class Judge:
         return validator.check(given)
 
     def _of_recovery(self, recovery: Recovery) -> Report:
-        """Judge every survivor of a result by the lengths, ranges and tolerances with which it was recovered."""
+        """Judge all survivors of a result with the lengths, ranges and tolerances of its recovery."""
         fields = {name: value for name, value in recovery.settings.items() if name in SHARED}
         settings = self.settings or ValidateSettings(**fields)
         side = recovery.settings.get("shoulders", "")
@@ -244,18 +245,18 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
 
 
 def _of_file(report: Report) -> tuple[str, ...]:
-    """Return the notes of a report; each begins with the name of the file, except notes about the ground."""
+    """Return the notes of a report; except for notes about the ground, each starts with the name of the file."""
     name = Path(report.files[0]).name if report.files else ""
     return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
 
 
 def _is_view(path: Path) -> bool:
-    """Return whether a file is a view of an object, which holds no motion."""
+    """Return whether a file is a view of an articulated object, which contains no motion."""
     return path.suffix.lower() == ".json" and b"posekit.view/1" in path.read_bytes()[:200]
 
 
 def refuse_without_joints(held: Any, path: Path) -> None:
-    """Refuse motion whose points are not joints of a body."""
+    """Refuse a motion without joints of a body among its points."""
     if isinstance(held, Motion) and held.q is None and not np.isfinite(held.figure_joints).any():
         got = "no joint of a body among its points"
         remedy = "say which point is which joint with --layout FILE.toml"
@@ -273,7 +274,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     report : Report
         Report about files.
     folder : path
-        New or empty.
+        Folder that does not exist or is empty.
     spans : float, optional
         Minimum duration, seconds, of the longest valid span of a clip that does not pass; longer spans are kept.
 

@@ -397,8 +397,8 @@ def displaced(joints: Array) -> NDArray[np.intp]:
 def _without_sides(joints: Array) -> Array:
     """Return coordinates of postures that exchanged labels of right and left do not change (T, 20, 3), metres.
 
-    The coordinates are the positions of neck, pelvis and the midpoint of each pair. The others are the entries of
-    d dᵀ / |d|, where d is half the vector from left to right joint of a pair; they are the same for -d.
+    The coordinates are the positions of neck, pelvis and the midpoint of each pair, and entries of d dᵀ / |d|, where d
+    is half the vector from left to right joint of a pair. These entries are equal for d and -d.
     """
     right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
     across = (right - left) / 2.0

@@ -48,8 +48,8 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     A body is upside down if the ankles are above the pelvis, the pelvis is above the neck, and hands do not carry the
     body. There are two signs that another axis points up. First, trunk and legs are straight along this axis, as in
     standing, and the body travels or its lowest joint rises and sinks, unlike in lying. Second, the body does not stand
-    upright along the stated axis, and its lowest knee or ankle stays on the plane through the origin that is
-    perpendicular to the other axis, and does not stay on the plane perpendicular to the stated axis.
+    upright along the stated axis, and its lowest knee or ankle stays on a plane through the origin. This plane is
+    perpendicular to the other axis instead of the stated axis.
 
     The value is the angle between up and the trunk, or between up and the other axis.
 

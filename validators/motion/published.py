@@ -70,8 +70,8 @@ def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Ju
     least : float
         Minimum share of the frames.
     window : float
-        Height of the window of soles that are on the ground, metres. The ground is the window with the soles of most
-        frames.
+        Height of the interval in which soles count as on the ground, metres. It is placed where it contains the soles
+        of most frames.
     """
     level = _voted(body, window)
     touches = np.asarray((np.abs(_soles(body) - level) <= window / 2).any(axis=1), dtype=np.float64)
@@ -230,7 +230,7 @@ def _soles(body: Body) -> Array:
 
 
 def _voted(body: Body, window: float) -> float:
-    """Return the stated height of the ground, or the middle of the window that contains the soles of most frames."""
+    """Return the stated height of the ground, or the middle of the interval with the soles of most frames, metres."""
     if body.settings.ground is not None:
         return body.settings.ground
     lowest = np.sort(np.fmin.reduce(_soles(body), axis=1))

@@ -38,23 +38,23 @@ from posekit.validators.judge import Validator, chosen_checks
 from posekit.validators.report import Report
 from posekit.validators.robot import sole_points
 
-#: Times that the way from a posture that passes to one that does not is halved.
+#: Number of bisection steps between a posture that passes the checks and a posture that fails.
 HALVINGS: Final = 7
-#: Frames at an end of a clip, such as a T-pose in the first, up to which the motion beside them is continued.
+#: Largest number of bad frames at the start or end of a clip, such as a T-pose, that are extrapolated.
 MOST_CONTINUED: Final = 3
-#: Metres that a degree counts as: about the way of a limb's end.
+#: Length that one degree counts as, metres: about the displacement of a wrist or an ankle.
 METRES_A_DEGREE: Final = 0.3 * np.pi / 180
-#: Distance inside its bounds to which a posture is pushed, metres: files keep frames that move by less than 5e-6.
+#: Distance inside its bounds to which a posture is moved, metres, because changes below 5e-6 m are not written.
 INSIDE_METRES: Final = 2e-5
-#: Distance inside its limits to which a joint of a robot is brought, metres or radians: a file rounds.
+#: Distance inside its limits to which a robot's joint is moved, metres or radians, because files round numbers.
 INSIDE_LIMITS: Final = 5e-6
-#: Distance by which bodies of robots are moved apart beyond their margin, metres: depths of meshes are known to 1e-5.
+#: Additional distance by which bodies of robots are separated, metres; penetration depths of meshes are exact to 1e-5.
 DEPTH_METRES: Final = 5e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clip:
-    """One recording of points during a repair, with the frames and the remedies that were changed and applied so far.
+    """One recording of points during a repair, with its changed frames and the remedies applied so far.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Clip:
     state : array (T, …)
         Points (T, P, 3) in the order of `posekit.skeleton.NAMES`, metres, or a robot's configurations (T, nq).
     time : array (T,)
-        Seconds.
+        Time of each frame, seconds.
     rows : int array (T,)
         Index in `motion` of each frame; -1 for an inserted frame.
     filled : bool array (T,)
@@ -108,7 +108,7 @@ class Clip:
         return len(self.state)
 
     def following(self, first: Clip) -> Self:
-        """Return this clip with the history of `first`, whose result this clip started from."""
+        """Return this clip with the history of `first`, from whose result this clip was made."""
         return replace(
             self,
             motion=first.motion,
@@ -119,7 +119,7 @@ class Clip:
 
     @property
     def own_rows(self) -> Ints:
-        """Index in `motion` of each frame (T,); an inserted frame has the index of the frame before it."""
+        """Index in `motion` of each frame (T,); an inserted frame has the index of the previous frame."""
         return self.rows[np.maximum.accumulate(np.where(self.rows < 0, 0, np.arange(len(self))))]
 
     @property
@@ -140,13 +140,13 @@ class Clip:
         )
 
     def checks(self, *, over_time: bool) -> list[Check]:
-        """Return the chosen checks: those over time, or those of single postures."""
+        """Return the selected checks of motion, or the selected checks of postures."""
         of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
 
     def report(self, *, over_time: bool) -> Report:
-        """Return the report of the checks over time, or of those of single postures; some must be chosen."""
+        """Return the report of the checks of motion, or of the checks of postures; at least one must be selected."""
         validator = copy(self.validator)
         validator.settings = self.validator.settings.changed(checks=self.checks(over_time=over_time))
         return validator.check(self.as_motion())
@@ -171,7 +171,7 @@ class Clip:
         return replace(wide, rows=np.where(inserted, -1, wide.rows)).interpolated(inserted)
 
     def interpolated(self, bad: Flags) -> Self:
-        """Interpolate bad frames (T,) between good frames; up to three bad frames at an end continue the motion."""
+        """Interpolate bad frames (T,) between good frames; extrapolate up to three bad frames at the start or end."""
         bad = bad | ~self.placed()
         rows, before, after, share = between(bad)
         near = near_good(bad)[rows]
@@ -181,15 +181,15 @@ class Clip:
         return replace(self, state=out, filled=filled)
 
     def placed(self) -> Flags:
-        """Return whether each frame (T,) knows the joints of the trunk, without which no body can be placed."""
+        """Return whether the trunk joints are known in each frame (T,); without them the body has no position."""
         return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Turn postures `start` (n, P, 3) a share (n,) of the way to `end`; lengths stay those of `start`."""
+        """Interpolate segment directions from `start` to `end` (n, P, 3) by shares (n,); lengths are from `start`."""
         return carried(start, end, share)
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Return states (n, …) a share (n,) of the way from `start` to `end`; lengths change by the same share."""
+        """Interpolate states from `start` to `end` (n, …) by shares (n,), with interpolated segment lengths."""
         there = self.carried(start, end, share)
         back = self.carried(end, start, 1 - share)
         return there + share[:, None, None] * (back - there)
@@ -208,9 +208,9 @@ class Clip:
     def legal(self) -> Self:
         """Return the clip with rejected postures replaced by postures that pass the checks of postures.
 
-        Three goals are tried in turn: the posture pushed inside the bounds that it violates, a posture interpolated
-        between the nearest good frames, and the nearest good frame. The rejected posture moves toward the first goal
-        that passes, only as far as is necessary.
+        Three goals are tried in turn: the posture moved inside the bounds that it violates, a posture interpolated
+        between the nearest valid frames, and the nearest valid frame. The rejected posture is interpolated toward the
+        first goal that passes, only as far as necessary.
         """
         if not self.checks(over_time=False):
             return self
@@ -225,10 +225,10 @@ class Clip:
         return clip if self.motion.in_time else clip.restored(bad, self.state[bad])
 
     def pushed(self, rows: Ints, report: Report) -> Array:
-        """Push the postures of some frames (n,) inside their bounds.
+        """Move the postures of some frames (n,) inside the bounds of the checks.
 
-        Joints are moved until the rigid lengths are inside their bounds; then limbs are turned, and then all parts of
-        the body, until all other checks are satisfied. Elbows and knees that bend backward are first made straight.
+        First, elbows and knees that bend backward are straightened. Then joints are moved until rigid lengths are
+        inside their bounds. Then limbs are rotated, and finally all parts of the body, until all other checks pass.
         """
         vectors, found = vectors_of(self.state), report.findings
         for row, place, value in zip(found["row"], found["place"], found["value"], strict=True):
@@ -244,9 +244,9 @@ class Clip:
         return state
 
     def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
-        """Return margins (n, K) of postures (n, P, 3), metres: of lengths if `rigid`, else of all other checks.
+        """Return margins (n, K) of postures (n, P, 3), metres: of lengths if `rigid`, or of all other checks.
 
-        A margin is infinite where a check is undecided.
+        A margin is infinite if its check is undecided.
         """
         joints, head, feet = np.split(points, [len(JOINTS), len(POINTS)], axis=1)
         these = replace(body, joints=joints, head=head, feet=feet, motion=False)
@@ -261,7 +261,7 @@ class Clip:
         return np.where(np.isnan(every), np.inf, every)
 
     def eased(self, rows: Ints, goal: Array) -> Self:
-        """Move some frames (n,) toward goal states (n, …) until they pass; a frame with a rejected goal stays."""
+        """Move some frames (n,) toward goal states (n, …) until they pass; skip frames whose goal is rejected."""
         start = self.state[rows]
         low, high = np.zeros(len(rows)), np.full(len(rows), np.nan)
         share = np.ones(len(rows))
@@ -298,7 +298,7 @@ class Clip:
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
         """Return two valid states for some frames (n,): interpolated between valid frames, and the nearest one.
 
-        If fewer than two frames are valid, both states are the posture at rest.
+        If fewer than two frames are valid, both states are the neutral posture.
         """
         if not self.motion.in_time or passing.sum() < 2:
             rest = self.laid(np.repeat(self.rest()[None], len(rows), axis=0), rows)
@@ -338,8 +338,8 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
     """Return the n bad frames, the good frames before and after each, and its position (n,) between them, 0 to 1.
 
-    At an end of the clip the two nearest good frames are used, with shares below 0 or above 1. With fewer than two good
-    frames the result is empty.
+    At the start or end of the clip the two nearest good frames are used, with positions below 0 or above 1. With fewer
+    than two good frames the result is empty.
     """
     good, rows = np.flatnonzero(~bad), np.flatnonzero(bad)
     if len(good) < 2:
@@ -350,7 +350,7 @@ def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
 
 
 def near_good(bad: Flags) -> Flags:
-    """Return the bad frames (T,) that can be interpolated; at an end of the clip only if they are at most three."""
+    """Return the bad frames (T,) that can be interpolated; at the start or end of the clip at most three frames."""
     good = np.flatnonzero(~bad)
     found = bad.copy()
     if len(good) and good[0] > MOST_CONTINUED:
@@ -379,7 +379,7 @@ class RobotClip(Clip):
         return self._motion(q=self.state, joints=None)
 
     def points(self) -> Array:
-        """Return the points (T, P, 3) in the order of `NAMES`, metres; feet are the ends of the soles."""
+        """Return the points (T, P, 3) in the order of `NAMES`, metres; toes and heels lie on the soles."""
         head = np.full((len(self), len(POINTS) - len(JOINTS), 3), np.nan)
         robot = self.validator.robot
         return np.concatenate([robot.points(self.state), head, sole_points(robot, self.state)], axis=1)
@@ -389,7 +389,7 @@ class RobotClip(Clip):
         return np.asarray(np.isfinite(self.state).all(axis=1))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Return configurations (n, nq) a share (n,) of the geodesic from `start` to `end`."""
+        """Interpolate configurations from `start` to `end` (n, nq) along geodesics by shares (n,)."""
         model = self.validator.robot.model
         steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
         steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
@@ -397,15 +397,15 @@ class RobotClip(Clip):
         return np.asarray(self.validator.robot.with_mimics(np.array(out).reshape(start.shape)))
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Return configurations (n, nq) a share (n,) of the way from `start` to `end`."""
+        """Interpolate configurations from `start` to `end` (n, nq) by shares (n,)."""
         return self.carried(start, end, share)
 
     def restored(self, rows: Ints, given: Array) -> Self:
-        """Return the clip unchanged, because `pushed` moves no other joints than the rejected ones."""
+        """Return the clip unchanged, because `pushed` moves only joints that checks reject."""
         return self
 
     def shifted(self, by: Array) -> Self:
-        """Return the clip with the root moved by the vector `by` (T, 3), metres; a fixed root stays."""
+        """Return the clip with the root moved by the vector `by` (T, 3), metres; a fixed root does not move."""
         out = self.state.copy()
         if self.validator.robot.free_flyer:
             out[:, :3] += by
@@ -437,9 +437,10 @@ class RobotClip(Clip):
         return np.concatenate([self.state[rows, :root], state[:, root:]], axis=1)
 
     def pushed(self, rows: Ints, report: Report) -> Array:
-        """Bring joints within the limits of the URDF, and move bodies apart.
+        """Move joints inside the limits of the URDF, and separate bodies that penetrate each other.
 
-        The root stays. Joints that never move in the recording stay, too, because its file may have no column for them.
+        The root does not change. Joints that never move in the recording do not change either, because the file may
+        have no column for them.
         """
         robot, model = self.validator.robot, self.validator.robot.model
         lower, upper = robot.lower + INSIDE_LIMITS, robot.upper - INSIDE_LIMITS

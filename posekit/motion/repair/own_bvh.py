@@ -18,7 +18,7 @@ from posekit.motion.motion import Motion
 from posekit.motion.repair.clip import Clip, between
 from posekit.skeleton import JOINTS, LIMB_JOINTS, NAMES, SIDES
 
-#: Distance below which a node of the file's hierarchy and a point of the motion are the same.
+#: Largest distance at which a node of the file's hierarchy and a point of the motion count as equal, metres.
 SAME_METRES: Final = 1e-6
 #: Distance between repaired points and points of the file below which a frame keeps its channels: the positions of
 #: joints that a layout derives depend on medians over all frames, so they are not exact.
@@ -30,10 +30,10 @@ SIDE_WORDS: Final = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"
 
 
 def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
-    """Return a BVH file whose joints are turned such that its points are those of the clip.
+    """Return a BVH file with rotations such that its points equal the points of the clip.
 
-    Each rigid piece of the body is turned by the rotation that brings its points in the file to its points in the
-    clip; only the channels of the first node of a piece change. Frames whose points stay keep all channels.
+    Each rigid part of the body is rotated so that its points in the file coincide with its points in the clip. Only the
+    channels of the first node of each part change. Frames with unchanged points keep all channels.
     Interpolated frames of the clip are first interpolated channel by channel.
     """
     document = _renamed(document) if clip.mirrored else document
@@ -79,7 +79,7 @@ def _above(document: Bvh, node: int) -> list[int]:
 
 
 def _pieces(document: Bvh, nodes: Mapping[str, int]) -> tuple[Ints, int]:
-    """Return the rigid piece of each node (P,), -1 for ancestors of the body, and the first node of the body."""
+    """Return the index of each node's rigid part (P,), -1 for ancestors of the body, and the body's first node."""
     limbs = [[nodes.get(JOINTS[joint]) for joint in limb[:2]] for limb in LIMB_JOINTS]
     ways = [set(_above(document, start)[1:]) for start, _ in limbs if start is not None]
     common = set.intersection(*ways) if ways else {0}
@@ -199,7 +199,7 @@ def _renamed(document: Bvh) -> Bvh:
 
 
 def _twin(name: str, names: tuple[str, ...]) -> str:
-    """Return the name of the joint on the other side; the name itself if there is none."""
+    """Return the name of the joint on the other side of the body; for a joint without a side, the same name."""
     for words in SIDE_WORDS:
         for one, other in (words, words[::-1]):
             for match in re.finditer(one, name):

@@ -46,15 +46,15 @@ def in_own_file(
     """Return the user's table or arrays with the numbers that a repair changed.
 
     Columns are recognised by their numbers: a column, or the mean of the columns of two markers, equals an entry of the
-    motion times a factor. Such a column gets the change of its entry. All other columns and all names stay. Gaps of a
-    column are filled; gaps of the two markers of one joint are not.
+    motion times a factor. The change of the entry is added to this column. All other columns and all names are
+    unchanged. Gaps of a column are filled, but gaps of the two markers of one joint are not.
 
     Parameters
     ----------
     path : path
         File from which `before` was read.
     before, after : Motion
-        Before and after the repair, in the order of the file.
+        Motion before and after the repair, in the order of the file.
     rows : int array (T',)
         Index in `before` of each frame of `after`.
 
@@ -63,7 +63,7 @@ def in_own_file(
     data : bytes
         Contents of the file; empty if its container cannot be changed in place.
     notes : list of str
-        A sentence about arrays that may depend on the configurations and were not changed.
+        Sentences about unchanged arrays that may depend on the configurations.
     """
     groups = _groups(before, after)
     stale: list[str] = []
@@ -136,7 +136,7 @@ def _columns_of(
         off = _apart(values[..., None], entries[some, None])
         found: list[tuple[int, int]] = []
         for entry in range(entries.shape[1] if len(off) else 0):
-            place = int(np.argmin(off[:, entry]))  # of equal columns the first that is free
+            place = int(np.argmin(off[:, entry]))  # the first free column among equal columns
             if off[place, entry] < most:
                 found.append((place, entry))
                 off[place] = np.inf

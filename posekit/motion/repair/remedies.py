@@ -1,4 +1,4 @@
-"""Remedies for findings of checks; a remedy is kept only if it reduces the findings of checks over time."""
+"""Remedies for findings of checks; a remedy is kept only if it reduces the findings of checks of motion."""
 
 from __future__ import annotations
 
@@ -145,9 +145,9 @@ def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Undo sudden lasting displacements of the whole body, which interpolation cannot remove.
+    """Undo sudden permanent displacements of the whole body, which interpolation cannot remove.
 
-    The frames before or after the displacement are shifted, such that as many frames as possible stay.
+    The frames before or after the displacement are shifted, such that as many frames as possible are unchanged.
     """
     bad = _numbers(report, "teleport", "body") != 0
     if not bad.any():
@@ -188,9 +188,9 @@ def _interpolate(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Smooth points that tremble or are too fast; strengths start higher in clips that were smoothed before."""
+    """Smooth points that jitter or are too fast, more strongly in clips that were smoothed before."""
     checks = ["jitter", "speed", "acceleration", "jerk", "joint-velocity"]
-    if rejected(report, "teleport").sum() > 1:  # several jumps near each other are trembling
+    if rejected(report, "teleport").sum() > 1:  # several jumps near each other are jitter
         checks.append("teleport")
     loose = rejected(report, *checks, places=clip.entries)
     strengths = STRENGTHS[min(clip.done.count("smoothed"), len(STRENGTHS) - 1) :]
