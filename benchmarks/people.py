@@ -7,11 +7,14 @@ its clips, because many clips of one data set have the same skeleton. Each frame
 away. Lengths are the medians of each clip; the stated deviation is the root mean square deviation of the clip's lengths
 from them, because spines bend and shoulders move. Conditions:
 
-- neck: the neck is given exactly; - no neck: neither neck nor head points are given, depth comes from the lengths; -
-taped neck, taped no neck: the same with lengths that have a common error of 2 % and own errors of 2 %, and no stated
-deviation; - photograph: camera and lengths are unknown as well; - a trial: key points of a detector, with the
-calibration (TOML) and the motion (TRC) of the same seconds.
-  The truth is the TRC's; the person is described by a stature only, or by the lengths in frames that no picture shows.
+- neck: the neck is given exactly;
+- no neck: neither neck nor head points are given, and depth follows from the lengths;
+- taped neck, taped no neck: the same with lengths that have a common error of 2 % and own errors of 2 %, and no
+  stated deviation;
+- photograph: camera and lengths are unknown as well;
+- a trial: key points of a detector, with the calibration (TOML) and the motion (TRC) of the same seconds.
+  The truth is the TRC's; the person is described by a stature only, or by the lengths in frames that no picture
+  shows.
 
 `60 mm` is the share of frames in which a representative is within 60 mm of the truth after alignment. `sure` is
 compared with the frequency at which every joint of the answer is within 5 cm of the truth (expected calibration error).
