@@ -89,7 +89,7 @@ class HeadPose(Record):
         Root of the mean squared residual of the seen points.
     misfit : tuple of str or None
         For each frame, the point that does not fit the other points; None if all points fit. With normal errors, one
-        correct head in two hundred has a misfit by chance. There is a warning only if more heads have one.
+        correct head in two hundred has a misfit by chance. A warning is given only if the share of misfits is higher.
     """
 
     head: HeadPoints

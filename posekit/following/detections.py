@@ -205,7 +205,7 @@ class Detections(Record):
     ) -> View:
         """Make the view of one person.
 
-        A contradiction between the person and the calibration is a warning. Points outside the picture with little
+        A contradiction between the person and the calibration causes a warning. Points outside the picture with little
         confidence count as not seen.
 
         Parameters

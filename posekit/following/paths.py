@@ -225,7 +225,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
     The first path is the expected posture of each frame given all frames, smoothed and moved to the nearest posture
-    with the person's lengths. Each further path is the most probable one that passes, in one frame, through a survivor
+    with the person's lengths. Each further path is the most probable path that passes, in one frame, through a survivor
     with a joint at least 25 cm from all earlier paths. In an uncalibrated view, positions are relative to the neck.
 
     Parameters
@@ -237,7 +237,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     Returns
     -------
     Recovery
-        The same recovery with `path`.
+        A copy of the recovery with the paths as `path`.
 
     Raises
     ------

@@ -84,7 +84,7 @@ def answers_of(
     Returns
     -------
     dict
-        Columns of `posekit.recovery.Answer`; survivors are numbered from the first one of each frame.
+        Columns of `posekit.recovery.Answer`; survivors are numbered from the first survivor of each frame.
     """
     starts = np.flatnonzero(np.diff(frame, prepend=-1))
     weight = probability / np.add.reduceat(probability, starts)[frame]

@@ -39,7 +39,7 @@ def certified(
     reason : str array (N,)
         ``check/place`` of the worst violation of each posture; empty if the posture passes.
     margins : dict of str to array (N,)
-        Worst margin of each posture by check, in the check's unit; NaN if the check decided nothing.
+        Worst margin of each posture by check, in the check's unit; NaN if the check is undecided.
     """
     rows, worst, reason = np.arange(len(points)), np.zeros(len(points)), [""] * len(points)
     margins: dict[str, Array] = {}

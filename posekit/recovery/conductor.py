@@ -251,7 +251,7 @@ class _Conductor:
             self.found.close(k, judged="noisy", reason=why, rejected={"noise/no_mode": 1})
 
     def _problem(self, sight: Sight, *, sharp: bool) -> Problem:
-        """Return the solver's problem for some rows; if `sharp`, points and lengths are exact."""
+        """Return the solver's problem for the rows of a `Sight`; if `sharp`, points and lengths are exact."""
         problem = Problem.seen(
             sight.camera,
             sight.image,

@@ -65,7 +65,7 @@ def _person(
     shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
-    """Return the figure of a person; it is cached, because one person often comes in several views."""
+    """Return the figure of a person; it is cached, because one person often appears in several views."""
     if stature is None and not lengths and not shoulders and not head_points:
         return figure
     behind = None if shoulders is None else shoulders == "behind"
@@ -74,7 +74,7 @@ def _person(
 
 @lru_cache(maxsize=32)
 def sided(figure: Figure, lengths: LengthUncertainty) -> Figure:
-    """Return the figure with the side of its shoulders undecided if the uncertainty of the lengths allows both."""
+    """Return the figure with the side of its shoulders undecided if the uncertain lengths allow both sides."""
     return figure.with_side_within(lengths)
 
 

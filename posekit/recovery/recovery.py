@@ -100,7 +100,7 @@ class Survivors(Table):
     chi2 : array (N,), optional
         Chi-square of the residuals under noise; 0 in exact frames.
     margins : mapping of str to array (N,)
-        Worst margin of each survivor by check, in the check's unit; NaN if the check decided nothing.
+        Worst margin of each survivor by check, in the check's unit; NaN if the check is undecided.
     branch : str array (N,), optional
         Near-far code of an exact posture: 0 (near) or 1 (far) for each joint from the second; empty under noise.
     group : int array (N,), optional

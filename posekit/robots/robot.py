@@ -56,8 +56,8 @@ class Robot(Record):
         Whether the root is fixed, as for an arm. Otherwise the root has a floating joint, which is added if the URDF
         has none.
     bodies : {"meshes", "capsules", "none"}
-        Collision bodies. ``meshes`` are the bodies of the URDF. ``capsules`` replace its meshes, or lie along the limbs
-        if the URDF has no bodies.
+        Collision bodies. ``meshes`` are the bodies of the URDF. ``capsules`` replace the URDF's meshes, or lie along
+        the limbs if the URDF has no bodies.
     joint_map_file : str
         Name or TOML file of the joint map; see `joint_map`.
 

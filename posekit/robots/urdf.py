@@ -119,7 +119,8 @@ def check_urdf(text: str, source: str) -> Element:
     Returns
     -------
     Element
-        The element ``<robot>`` with only checked links, joints and materials. Pinocchio reads this tree, not the text.
+        The element ``<robot>`` with only checked links, joints and materials. Pinocchio reads these elements instead of
+        the text.
 
     Raises
     ------

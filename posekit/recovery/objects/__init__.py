@@ -1,4 +1,4 @@
-"""Any articulated object from an uncalibrated picture (Taylor 2000): every posture, with its configuration."""
+"""Recovery of every posture of any articulated object in an uncalibrated picture (Taylor 2000)."""
 
 from posekit.recovery.objects.family import LinkageFamily as LinkageFamily
 from posekit.recovery.objects.linkage import Linkage as Linkage

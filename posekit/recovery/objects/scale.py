@@ -195,7 +195,7 @@ def search(
     Raises
     ------
     InputError
-        If the linkage has no such constraint, too little of it is seen, or too many flips share constraints.
+        If the linkage has no such constraint, too few of its points are seen, or too many flips share constraints.
 
     Examples
     --------
