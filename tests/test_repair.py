@@ -187,6 +187,26 @@ def test_standing_feet_that_slide_are_held(
     np.testing.assert_array_equal(np.asarray(done.motion.joints)[kept], np.asarray(broken.joints)[kept])
 
 
+@pytest.mark.parametrize("start", [10, 60])
+def test_a_standing_robot_that_slides_comes_back(start: int) -> None:
+    robot = posekit.load_robot("g1")
+    names, t = list(robot.configuration_names), np.arange(FRAMES)
+    q = np.tile(robot.neutral, (FRAMES, 1))
+    q[:, 2] = 0.8
+    q[:, names.index("right_elbow_joint")] += 0.3 * np.sin(t / 8)
+    q[:, names.index("left_shoulder_pitch_joint")] += 0.3 * np.sin(t / 7)
+    slid = np.clip((t - start) / 20, 0, 1)[:, None] * [0.25, -0.1, 0.0]
+    broken = posekit.Motion(q=q, q_names=names, robot="g1", time=t / RATE, up="+z")
+    broken = replace(broken, q=np.c_[q[:, :3] + slid, q[:, 3:]])
+    settings = posekit.ValidateSettings(bodies="none")
+    assert set(posekit.validate(broken, settings).table()["check"]) == {"sliding"}
+    done = repair(broken, settings=settings)
+    assert done.motion is not None and done.report.ok.all() and "standing feet held" in done.notes
+    stay = slid[-1] if start < FRAMES // 2 else 0.0
+    np.testing.assert_allclose(np.asarray(done.motion.q)[:, :3], q[:, :3] + stay, atol=0.02)
+    np.testing.assert_array_equal(np.asarray(done.motion.q)[:, 3:], q[:, 3:])
+
+
 def test_several_recordings_are_repaired_each_by_itself(clean: posekit.Motion) -> None:
     joints = np.asarray(clean.joints)
     broken = {name: FAULTS[name](joints) for name in ("jump", "lengthened")}
