@@ -137,13 +137,15 @@ class Gathering:
         relative = np.full(len(found), not perspective)
         if covariance is not None:
             block = covariance.reshape(-1, len(JOINTS), 3, len(JOINTS), 3)
+            of_joint = np.einsum("njajb->njab", block)
             if perspective:
                 relative = ~self.sight.given[found]
             else:
                 # The position in space is unknown: radii are relative to the mean of the joints.
-                block = block - block.mean(axis=1, keepdims=True)
-                block = block - block.mean(axis=3, keepdims=True)
-            table["radius"] = joint_radius(np.einsum("njajb->njab", block))
+                with_mean = block.mean(axis=3)
+                of_mean = with_mean.mean(axis=1, keepdims=True)
+                of_joint = of_joint - with_mean - with_mean.swapaxes(2, 3) + of_mean
+            table["radius"] = joint_radius(of_joint)
             weight = probability / np.add.reduceat(probability, starts)[frame]
             depth, own = joints[:, 0, 2], table["radius"][:, 0] / 1.96
             mean = np.add.reduceat(weight * depth, starts)

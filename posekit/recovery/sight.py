@@ -227,7 +227,7 @@ def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
     """Return facts about the camera of frame k; for Lee & Chen's camera, rotation and position as in Table 2."""
     model = view.camera
-    record: dict[str, Any] = dict.fromkeys(("f", "rotation", "position", "residual"))
+    record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
     if isinstance(model, LeeChenCamera) and model.f is not None:
         record["f"] = float(np.broadcast_to(model.f, len(view))[k])
     if pose is not None and pose.found[k]:
