@@ -8,7 +8,7 @@ from typing import ClassVar, Final, NamedTuple
 import numpy as np
 
 from posekit.errors import CameraError, refusal, shown
-from posekit.geometry import FARTHEST_COORDINATE, Array, Flags, Record, read_only
+from posekit.geometry import FARTHEST_COORDINATE, Array, Flags, Record, dot, norm, read_only
 
 #: Half the distance (m) between the two candidates below which they count as one.
 #:
@@ -102,8 +102,8 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
         Distance by which the ray may miss the sphere and still count as tangent, metres.
     """
     offset = start - origin
-    along = np.einsum("...i,...i->...", offset, direction)
-    height = np.linalg.norm(offset - along[..., None] * direction, axis=-1)
+    along = dot(offset, direction)
+    height = norm(offset - along[..., None] * direction)
     half = np.sqrt(np.maximum((length - height) * (length + height), 0.0))
     tangent = half <= COINCIDENT_METRES
     half = np.where(tangent, 0.0, half)

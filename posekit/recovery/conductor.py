@@ -15,7 +15,7 @@ import posekit
 from posekit.body import Figure, with_head
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, View
 from posekit.errors import refusal
-from posekit.geometry import Array, Flags, Ints, up_vector
+from posekit.geometry import Array, Flags, Ints, norm, up_vector
 from posekit.progress import watched
 from posekit.ranking import Up, deviation_of_tolerance, log_terms
 from posekit.recovery.certify import certified, noisy_judge, solver_limits
@@ -184,7 +184,7 @@ class _Conductor:
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
         """Return the frames with exact image points: some branch satisfies all distances of torso and hips."""
         start, end = np.array(RIGID_SEGMENTS).T
-        apart = np.linalg.norm(joints[:, start] - joints[:, end], axis=2)
+        apart = norm(joints[:, start] - joints[:, end])
         off = np.abs(apart - self.found.lengths[-len(RIGID_SEGMENTS) :])
         closing = set(frame[(off <= 10 * EXACT.rigid).all(axis=1)].tolist())
         if "rigid-parts" in [check.name for check in self.checks]:

@@ -126,10 +126,13 @@ class Trees:
 
 
 def ancestors(frame: Ints, code: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return the number of nodes at each level (`count`, 14) above leaves (N,), which are by frame, then by code."""
-    key = (frame[:, None] << DEPTH | code[:, None]) >> (DEPTH - np.arange(DEPTH + 1))
-    new = np.diff(key, axis=0, prepend=-1) > 0
-    return np.stack([np.bincount(frame[one], minlength=count) for one in new.T], axis=1)
+    """Return the number of nodes at each level (`count`, 14) above leaves (N,), sorted by frame, then by code."""
+    # Each leaf adds a node at every level from the first branch that differs from the leaf before.
+    first = np.zeros(len(code), dtype=np.intp)
+    _, digits = np.frexp(code[1:] ^ code[:-1])
+    first[1:] = np.where(frame[1:] == frame[:-1], DEPTH + 1 - digits, 0)
+    added = np.bincount(frame * (DEPTH + 1) + first, minlength=count * (DEPTH + 1))
+    return added.reshape(count, DEPTH + 1).cumsum(axis=1)
 
 
 def grow(
