@@ -268,7 +268,7 @@ struct Factor {
   unsigned parts;
 
   Factor(const Normal& n, double damping, unsigned which) : parts(which) {
-    for (int i = 0; i < T; ++i) {
+    for (int i = 0; i < T && parts & 1; ++i) {
       for (int k = 0; k < T; ++k) S[i][k] = n.H[TRUNK_AT[i]][TRUNK_AT[k]];
       S[i][i] += damping + FLOOR;
     }
