@@ -41,5 +41,5 @@ html_title = f"posekit {release}"
 
 
 def setup(app):
-    """Write what is generated before the pages are read."""
+    """Write the generated tables before Sphinx reads the pages."""
     app.connect("builder-inited", lambda app: tables.write_generated())

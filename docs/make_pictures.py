@@ -26,14 +26,14 @@ SHOW_FINDING = """
 
 
 def write(name: str, picture: bytes) -> None:
-    """Write a picture in few colours, which keeps the repository small."""
+    """Write a picture with few colours, to keep the repository small."""
     image = Image.open(io.BytesIO(picture)).convert("RGB")
     image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
     image.quantize(256, Image.Quantize.FASTOCTREE).save(PICTURES / name, optimize=True)
 
 
 def main() -> None:
-    """Draw four postures behind one view, and the page of a motion at a finding."""
+    """Draw four postures recovered from one view, and the page of a motion with a selected finding."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         samples("samples")
         posekit.recover("samples/walk.json").save("postures.npz")

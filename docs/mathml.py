@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw without JavaScript, fonts or a network: an extension for Sphinx."""
+"""Sphinx extension that writes formulas as MathML, which browsers draw without JavaScript, fonts or a network."""
 
 from __future__ import annotations
 
@@ -23,6 +23,6 @@ def block(translator: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Any) -> dict[str, Any]:
-    """Make this the way in which HTML pages write formulas."""
+    """Register the writers of formulas for HTML pages."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""Tables of the documentation that are made from the code: formats, layouts, checks, settings, commands, the papers.
+"""Make tables of the documentation from the code: formats, layouts, checks, settings, commands, the papers.
 
 ``python docs/tables.py`` writes those that stand in the pages, between comments ``<!-- table: NAME -->``; a test makes
 sure that they are current. The longer ones are written to ``_generated/`` whenever Sphinx builds the pages.
@@ -19,7 +19,7 @@ PAPERS = DOCS.parent / "posekit" / "papers"
 
 
 def write_tables() -> list[Path]:
-    """Renew the tables within the pages, and return the pages that changed."""
+    """Update the tables in the pages, and return the changed pages."""
     changed = []
     for page in sorted(DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def write_tables() -> list[Path]:
 
 
 def with_tables(text: str) -> str:
-    """Return a page with its tables as they should be."""
+    """Return the text of a page with current tables."""
     for mark in re.findall(r"<!-- table: \w+ -->", text):
         start = text.index(mark) + len(mark)
         end = text.index("<!-- end of table -->", start)
@@ -41,7 +41,7 @@ def with_tables(text: str) -> str:
 
 
 def write_generated() -> None:
-    """Write the tables that are made when the pages are built; the papers' only where their code has changed."""
+    """Write the tables that are included when the pages are built; the papers' table only if its code has changed."""
     GENERATED.mkdir(exist_ok=True)
     for name, lines in (("settings", settings()), ("commands", commands())):
         (GENERATED / f"{name}.inc").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -68,7 +68,7 @@ def containers() -> Iterator[str]:
 
 
 def files_read() -> Iterator[str]:
-    """List what is recognised in files, and the containers that hold it."""
+    """List the recognised kinds of content, and their containers."""
     from posekit.formats.open import READERS
 
     holders: dict[str, list[str]] = {}
@@ -80,7 +80,7 @@ def files_read() -> Iterator[str]:
 
 
 def _content(reader: str) -> str:
-    """Return what a reader's module says that it reads."""
+    """Return the description of a reader's module."""
     path = DOCS.parent / "posekit" / "formats" / f"{reader}.py"
     first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
     return " ".join(first.split()).split(";")[0].rstrip(".").replace("``", "`")
@@ -164,7 +164,7 @@ def commands() -> Iterator[str]:
 
 
 def papers() -> Iterator[str]:
-    """List the statements of both papers beside what is computed."""
+    """Compare the statements of both papers with computed values."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from posekit.papers import reproduce
 

@@ -1,4 +1,4 @@
-"""posekit validates postures, finds what is wrong with a motion, and recovers every posture behind one view.
+"""posekit validates postures, finds defects in motion, and recovers every posture that fits one view.
 
 The names below are loaded on first use, so that importing posekit reads no file and loads no library.
 """

@@ -22,19 +22,19 @@ TERMINATED: Final = 143
 
 #: Commands in the order of the help; each is a module of `posekit.cli` with a function of the same name.
 COMMANDS: Final = {
-    "validate": "Judge postures, motion and folders of motion: what is wrong, where, and which clips to keep.",
-    "recover": "Recover every posture behind a view, from exact points, key points or a photograph.",
-    "render": "Draw postures, motion, results and reports: a picture, an animation or a page.",
+    "validate": "Check postures, motion and folders: report defects, and which clips to keep.",
+    "recover": "Recover every posture that fits a view: exact image points, key points or a photograph.",
+    "render": "Draw postures, motion, results and reports as a picture, an animation or a page.",
     "view": "Show a file as a page in the browser.",
     "convert": "Convert a file to another format.",
     "inspect": "Print the content of a file: kind, layout, frames, rate, axes, unit and names.",
-    "follow": "Follow a person live: key points in, postures out, line by line.",
+    "follow": "Recover the posture of a person live, one line of key points at a time.",
     "batch": "Recover or validate all files of an archive; a stopped run can be continued.",
-    "evaluate": "Compare results with the truth, or recover views whose truth is known.",
+    "evaluate": "Compare recovered postures with the true postures.",
     "synth": "Make synthetic views of known postures: a walker, random postures, motion capture, an object.",
-    "reproduce": "Reproduce the papers' tables and figures.",
-    "samples": "Write a folder of small files to try posekit with.",
-    "settings": "List the settings of a command with defaults and units.",
+    "reproduce": "Compute the tables and figures of Lee & Chen (1985) and Taylor (2000).",
+    "samples": "Write small sample files into a folder.",
+    "settings": "List the settings of a command with their defaults.",
     "demo": "Run validation, recovery and reproduction on built-in files.",
 }
 
@@ -66,7 +66,7 @@ class Commands(click.Group):
 @click.command(cls=Commands, no_args_is_help=True)
 @click.version_option(__version__, message="posekit %(version)s")
 def posekit() -> None:
-    """Validate human and humanoid postures and motion, and recover every posture behind one view."""
+    """Validate human and humanoid postures and motion, and recover every posture that fits one view."""
 
 
 class Terminated(BaseException):

@@ -1,4 +1,4 @@
-"""`posekit recover`: compute every posture behind a view."""
+"""`posekit recover`: compute every posture that fits a view."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SHOWN = {"stature": "LENGTH", "deviation": "PX", "checks": "LIST", "follow": "PA
 )
 @settings_options(RecoverSettings, SHOWN)
 def recover(source: Path, output: Path, explain: bool, linkage: str, **given: Any) -> None:
-    """Recover every posture behind a view. Each passes the checks and reprojects onto the image."""
+    """Recover every posture that fits the image points of a view and passes the checks."""
     from posekit.doors import view_of
     from posekit.formats.save import refuse_ending, save
     from posekit.recovery.conductor import recover as recover_view

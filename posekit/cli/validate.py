@@ -54,7 +54,7 @@ def validate(
     repair: Path | None,
     **given: Any,
 ) -> None:
-    """Judge postures and motion. Exit code: 0 if all are valid, 1 if some are invalid, 2 for wrong input."""
+    """Check postures and motion. Exit code: 0 if all are valid, 1 if some are invalid, 2 for wrong input."""
     from posekit.errors import InputError, refusal
     from posekit.motion.validation import validate as judge
 
