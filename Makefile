@@ -16,7 +16,7 @@ help: ## list the targets
 
 # --- set-up ---------------------------------------------------------------------------------------------
 
-# Debian keeps venv in a package of its own, named after the version: python3.11-venv.
+# On Debian, venv is in a separate package with the version in its name: python3.11-venv.
 define CREATE_VENV
 set -eu
 as_root() { if [ "$$(id -u)" = 0 ]; then "$$@"; else sudo "$$@"; fi; }
@@ -40,9 +40,9 @@ $(PYTHON) -m venv --clear $(VENV) >/dev/null 2>&1 || {
     apt_install "$$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
     $(PYTHON) -m venv --clear $(VENV)
 }
-# The solver is compiled where a compiler is found or may be installed; without one its NumPy reference is used.
+# The solver is compiled if a compiler exists or can be installed; otherwise its NumPy reference is used.
 command -v g++ >/dev/null || command -v c++ >/dev/null || apt_try g++ $$(dpkg -s python3 >/dev/null 2>&1 && echo python3-dev) || echo "make: no C++ compiler was found and none could be installed: the slower reference solver is used" >&2
-# Pinocchio's wheel links to GNU's OpenMP and does not bring it; a minimal Debian has none.
+# Pinocchio's wheel needs GNU's OpenMP library but does not contain it; a minimal Debian does not have it.
 $(PYTHON) -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || apt_install libgomp1
 endef
 export CREATE_VENV
@@ -50,7 +50,7 @@ export CREATE_VENV
 $(BIN)/python:
 	@bash -c "$$CREATE_VENV"
 
-# setuptools and pybind11 come from constraints.txt as well, hence no build isolation. A change of the C++ compiles anew.
+# There is no build isolation, because constraints.txt also pins setuptools and pybind11. Changed C++ is recompiled.
 COMPILED := setup.py $(wildcard posekit/*/*.cpp posekit/*/*.hpp)
 $(VENV)/runtime.stamp: pyproject.toml constraints.txt $(COMPILED) | $(BIN)/python
 	@echo "Installing posekit into $(VENV)"
@@ -64,14 +64,14 @@ $(VENV)/dev.stamp: $(VENV)/runtime.stamp
 	@touch $@
 
 .PHONY: venv
-venv: $(VENV)/dev.stamp ## set up .venv with everything
+venv: $(VENV)/dev.stamp ## create .venv with all dependencies
 
 .PHONY: hooks
-hooks: $(VENV)/dev.stamp ## let git run the quick checks before each commit
+hooks: $(VENV)/dev.stamp ## run the quick checks before each git commit
 	$(BIN)/pre-commit install
 
-# Resolved for 3.11.0, the oldest Python that is supported: what fits it fits the later ones too (Debian 12 has
-# 3.11.2, and there are packages that want 3.11.5).
+# Versions are resolved for Python 3.11.0, the oldest supported version, so that they also work with later versions.
+# Debian 12 has 3.11.2, but some packages need 3.11.5.
 LOCK_PYTHON ?= python3.11
 define WRITE_LOCK
 set -euo pipefail
@@ -94,11 +94,11 @@ endef
 export WRITE_LOCK
 
 .PHONY: lock
-lock: ## write constraints.txt anew: the newest versions that pyproject.toml allows
+lock: ## update constraints.txt to the newest versions that pyproject.toml allows
 	@bash -c "$$WRITE_LOCK"
 
-# Pictures are drawn by an installed Chromium or Chrome. Where there is none, Debian's is installed if that may be
-# done; without one everything but pictures works.
+# Pictures need Chromium or Chrome. If no browser is installed, Debian's Chromium is installed if possible; without a
+# browser everything except pictures works.
 define FIND_BROWSER
 for browser in $${POSEKIT_BROWSER:-} chromium chromium-browser google-chrome google-chrome-stable chrome; do
     if command -v "$$browser" >/dev/null; then exit 0; fi
@@ -114,7 +114,7 @@ endef
 export FIND_BROWSER
 
 .PHONY: browser
-browser: ## install Debian's chromium where no browser is found
+browser: ## install Debian's chromium if no browser is found
 	@bash -c "$$FIND_BROWSER"
 
 # --- the main job ---------------------------------------------------------------------------------------
@@ -128,7 +128,7 @@ dist: $(VENV)/dev.stamp ## build wheel and sdist into dist/
 	$(BIN)/python -m build --no-isolation --outdir dist .
 
 .PHONY: newcomer
-newcomer: $(VENV)/dev.stamp ## clone to first picture and to each tutorial's result, by the docs' own commands
+newcomer: $(VENV)/dev.stamp ## measure the time from a clone to the first picture and to each tutorial's result
 	$(BIN)/python -m benchmarks.newcomer
 
 # --- checks ---------------------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ types: $(VENV)/dev.stamp ## mypy --strict
 	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py examples/*.py)
 
 .PHONY: layers
-layers: $(VENV)/dev.stamp ## import-linter: who may import whom
+layers: $(VENV)/dev.stamp ## import-linter: allowed imports between packages
 	$(BIN)/lint-imports
 
 .PHONY: docs
@@ -173,11 +173,11 @@ bench: $(VENV)/dev.stamp ## measure quality and speed
 	@for name in $(BENCHMARKS); do echo "== $$name"; $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 .PHONY: fuzz
-fuzz: $(VENV)/dev.stamp ## attack every reader, command and option for an hour
+fuzz: $(VENV)/dev.stamp ## test every reader and command with damaged files for an hour
 	$(BIN)/python -m benchmarks.fuzz -o fuzz-results --seconds 3600
 
 .PHONY: clean
-clean: ## remove everything that make made
+clean: ## remove all files created by make
 	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS)
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find posekit validators urdf viewer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

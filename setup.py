@@ -1,4 +1,4 @@
-"""Build the compiled solver and tree where there is a compiler; without one their NumPy references are used."""
+"""Build the compiled solver and tree; without a compiler, their NumPy references are used."""
 
 from pybind11.setup_helpers import Pybind11Extension
 from setuptools import setup

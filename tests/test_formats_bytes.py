@@ -337,7 +337,7 @@ def test_a_repaired_c3d_keeps_its_other_points_and_its_analogue_values(
 @pytest.mark.parametrize("ending", [".glb", ".bvh", ".trc", ".c3d"])
 def test_alternative_postures_are_refused_by_formats_of_one_recording(tmp_path: Path, ending: str) -> None:
     alternatives = posekit.recover(posekit.builtin_view("seq1")).motion("all")
-    with pytest.raises(posekit.InputError, match="several postures a frame"):
+    with pytest.raises(posekit.InputError, match="several postures per frame"):
         posekit.save(alternatives, tmp_path / f"every{ending}")
 
 

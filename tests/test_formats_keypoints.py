@@ -312,7 +312,7 @@ def test_timestamps_have_the_unit_of_their_steps(tmp_path: Path, name: str, step
 
 def test_times_of_the_file_win_over_the_rate(tmp_path: Path) -> None:
     found = posekit.open(mediapipe(tmp_path), rate=60)
-    with pytest.warns(UserWarning, match="times are 25 frames a second, not 60"):
+    with pytest.warns(UserWarning, match="times are 25 frames per second, not 60"):
         assert np.diff(found.view(camera()).time) == pytest.approx(0.04)
 
 

@@ -437,7 +437,7 @@ class Validator:
         """
         count = len(self.configuration_names)
         expected = f"joints (N, {len(JOINTS)}, 3), or configurations (N, {count})"
-        remedy = "give one posture a row; files, and points of another layout, to posekit.validate"
+        remedy = "give one posture per row; files, and points of another layout, to posekit.validate"
         values = numbers(given, "postures", "", expected, remedy)
         if values.ndim == 1 or values.shape in ((len(JOINTS), 3), (len(POINTS), 3)):
             values = values[None]

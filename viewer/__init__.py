@@ -103,7 +103,7 @@ def draw(
             raise refusal(path, "--posture", shown(which), " or ".join(PLOT_NAMES), "choose a plot")
         return write_bytes(path, plotted(source, kind, suffix, frame=frame, view=view))
     if which and isinstance(source, Motion):
-        expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture a frame"
+        expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture per frame"
         raise refusal(
             path, "--posture", shown(which), expected, "leave it out, or choose frames with --frame"
         )

@@ -441,7 +441,7 @@ def with_head(joints: ArrayLike, head: Array | None = None) -> Array:
     joints = np.asarray(joints, dtype=np.float64)
     if joints.ndim != 3 or joints.shape[1] not in (len(JOINTS), len(POINTS)) or joints.shape[2] != 3:
         expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
-        raise refusal("", "joints", f"shape {joints.shape}", expected, "one posture a row", error=FigureError)
+        raise refusal("", "joints", f"shape {joints.shape}", expected, "a posture per row", error=FigureError)
     if joints.shape[1] == len(POINTS):
         return joints
     if head is None:

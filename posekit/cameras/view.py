@@ -140,7 +140,7 @@ class View(Record):
             absent = given.shape == (0,) or (name == "own_head_image" and not given.size)
             values = np.full(shape, np.nan) if absent else given
             if values.shape != shape:
-                raise refusal("view", name, f"shape {values.shape}", f"{shape}", "give one row a frame")
+                raise refusal("view", name, f"shape {values.shape}", f"{shape}", "give one row per frame")
             _check_points(name, values)
             self._set(name, values)
         if np.isnan(self.time).any():

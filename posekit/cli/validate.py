@@ -42,7 +42,7 @@ BAD_INPUT = 2
 )
 @option("--keep-spans", metavar="SECONDS", default=None, hidden=True, help="Minimum duration of a good part.")
 @option(
-    "--repair", metavar="FILE|DIR", type=click.Path(path_type=Path), help="Write a motion nearby that passes."
+    "--repair", metavar="FILE|DIR", type=click.Path(path_type=Path), help="Write a near motion that passes."
 )
 @reading()
 @settings_options(ValidateSettings, SHOWN, panel="Judging")
@@ -81,7 +81,7 @@ def validate(
     elif any(clip.decision == "repair?" for clip in report.clips):
         one = sources[0]
         target = f"{one.stem}.repaired{one.suffix}" if len(sources) == 1 and one.is_file() else "repaired/"
-        say(f"next: the same command with --repair {target} writes a motion nearby that passes")
+        say(f"next: the same command with --repair {target} writes a similar motion that passes")
     if report.refused:
         code = BAD_INPUT
     raise SystemExit(code)

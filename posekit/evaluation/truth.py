@@ -126,7 +126,7 @@ def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
     if not timed and len(joints) != count:
         got = f"{len(joints)} frames for {count} pictures, and not the times of both"
         remedy = "state the rate of the pictures: posekit recover --rate"
-        raise refusal(motion.source or "truth", "truth", got, "times, or a frame a picture", remedy)
+        raise refusal(motion.source or "truth", "truth", got, "times, or one frame per picture", remedy)
     if timed and len(since) > 1:
         for how, seconds in (("by time", time), ("by time from the first picture", time - time[0])):
             nearest = np.abs(since[None] - seconds[:, None]).argmin(axis=1)

@@ -105,7 +105,7 @@ class Detections(Record):
             given = np.array(getattr(self, name), dtype=type(unknown))
             values = given if given.size else np.full(shape, unknown)
             if values.shape != shape:
-                raise refusal(self.source, name, f"shape {values.shape}", f"{shape}", "give one row a person")
+                raise refusal(self.source, name, f"shape {values.shape}", f"{shape}", "give a row per person")
             self._set(name, values)
         if other := set(self.names) - {*POINTS, *FEET_POINTS}:
             raise refusal(self.source, "names", shown(min(other)), "names of joints, head or feet points")

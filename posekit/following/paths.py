@@ -255,7 +255,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     if not len(recovery.survivors):
         raise refusal(recovery.source, "follow", "no frame with a posture", "at least one")
     if (np.diff(time) <= 1e-6).any():
-        raise refusal(recovery.source, "time", "times that do not ascend", "one picture a time")
+        raise refusal(recovery.source, "time", "times that do not ascend", "one picture for each time")
     frames = [candidates(recovery, k) for k in range(len(recovery))]
     trellis = Trellis()
     for frame in watched(frames, "following"):

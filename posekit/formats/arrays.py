@@ -60,7 +60,7 @@ def key_points_of(values: Any, options: Options) -> Detections:
     several = points[:, None] if points.ndim == 3 else points
     if several.ndim != 4 or several.shape[-1] not in (2, 3):
         expected = "key points (T, P, 2), or (T, P, 3) with confidences"
-        raise refusal("array", "", f"shape {points.shape}", expected, "give one picture a row")
+        raise refusal("array", "", f"shape {points.shape}", expected, "give one picture per row")
     rows = Rows("array")
     rows.kind = "an array"
     if several.shape[-1] == 2:

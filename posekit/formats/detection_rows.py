@@ -296,6 +296,6 @@ def _times(stated: Array, film: bool, options: Options) -> Array | None:
     time = np.interp(np.arange(len(time)), np.flatnonzero(known), time[known]) - time[known][0]
     rate = 1 / float(np.median(steps)) if len(steps) else None
     if rate and options.rate and abs(rate / options.rate - 1) > 0.05:
-        contradiction = f"the file's times are {rate:.3g} frames a second, not {options.rate:g}"
+        contradiction = f"the file's times are {rate:.3g} frames per second, not {options.rate:g}"
         options.warn(f"{contradiction}: its times are used")
     return np.asarray(time)

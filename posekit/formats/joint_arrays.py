@@ -183,7 +183,7 @@ def _read_table(table: Table, path: str, options: Options) -> Motion:
         points = np.stack(flat, axis=1).reshape(-1, len(labels), 3)
         rows = np.arange(len(points))
     if not len(rows):
-        raise refusal(path, "", "no rows", "a row a frame", "check how it was written")
+        raise refusal(path, "", "no rows", "one row per frame", "check how it was written")
     fields: dict[str, Any] = {}
     if who:
         kept = [who[row] for row in rows.tolist()]

@@ -56,9 +56,9 @@ class Options:
                 raise refusal("", name, shown(given), expected, "state one of them")
             object.__setattr__(self, name, words.get(str(given).lower(), ""))
         if self.rate is not None:
-            rate = number(self.rate, "rate", "frames a second, above 0", "state another")
+            rate = number(self.rate, "rate", "frames per second, above 0", "state another")
             if rate <= 0:
-                raise refusal("", "rate", shown(self.rate), "frames a second, above 0", "state another")
+                raise refusal("", "rate", shown(self.rate), "frames per second, above 0", "state another")
             object.__setattr__(self, "rate", rate)
 
     def note(self, assumption: str) -> None:

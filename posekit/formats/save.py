@@ -73,7 +73,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
         kind = "Motion"
     elif which:
         raise refusal(
-            path, "--posture", shown(which), "no choice: a motion has one posture a frame", "leave it out"
+            path, "--posture", shown(which), "no choice: a motion has one posture per frame", "leave it out"
         )
     elif kind == "dict" and not all(isinstance(camera, PinholeCamera) for camera in thing.values()):
         raise refusal(path, "", "a dict", "cameras by name", "save a motion, view, result or report")

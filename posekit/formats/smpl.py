@@ -63,7 +63,7 @@ def read(document: Mapping[str, Any], path: str, options: Options) -> Motion:
     parts = [np.asarray(document[key], dtype=np.float64).reshape(len(document[key]), -1) for key in keys]
     if len({len(part) for part in parts}) > 1 or sum(part.shape[1] for part in parts) < 3 * N_JOINTS:
         got = f"{' and '.join(keys)} of shapes {', '.join(str(part.shape) for part in parts)}"
-        expected = f"{3 * N_JOINTS} numbers a frame or more: rotation vectors of {N_JOINTS} joints"
+        expected = f"{3 * N_JOINTS} numbers per frame or more: rotation vectors of {N_JOINTS} joints"
         raise refusal(path, keys[0], got, expected, "correct the file")
     poses = np.concatenate(parts, axis=1)
     place = np.asarray(document[next(name for name in _PLACES if name in document)], dtype=np.float64)

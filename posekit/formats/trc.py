@@ -133,7 +133,7 @@ def _rows(table: Table, start: int, width: int, path: str) -> Array:
             raise refusal(path, f"line {table.numbers_of_lines[k]}", f"{len(row)} cells", f"{width}", remedy)
         cells += row
     if not cells:
-        raise refusal(path, "", "no frames", "a row a frame", "check how it was written")
+        raise refusal(path, "", "no frames", "one row per frame", "check how it was written")
     lines = table.numbers_of_lines[start:]
     values = checked(cells, path, lambda k: f"line {lines[k // width]}, column {k % width + 1}").reshape(
         -1, width
@@ -210,7 +210,7 @@ def one_recording(motion: Motion, format: str) -> Array:
         got = "configurations without points"
         raise refusal(motion.source, "", got, f"points for {format}", "write csv or npz, or give --urdf")
     if len(np.unique(np.asarray(motion.clip))) > 1 or (len(motion) > 1 and not motion.in_time):
-        got = f"{len(np.unique(np.asarray(motion.clip)))} recordings, or several postures a frame"
+        got = f"{len(np.unique(np.asarray(motion.clip)))} recordings, or several postures per frame"
         raise refusal(motion.source, "", got, f"one for {format}", "write csv or npz, or choose one")
     return motion.joints
 

@@ -254,8 +254,8 @@ def read_object(document: Any, path: str | Path, points: Sequence[str]) -> dict[
     Returns
     -------
     dict
-        ``image`` (F, P, 2) in pixels, ``truth`` (F, P, 3), ``time`` (F,), ``aspect``, and ``scale`` in pixels a metre,
-        None if unknown. Lengths are metres, or in the object's own unit if the file's ``unit`` is null.
+        ``image`` (F, P, 2) in pixels, ``truth`` (F, P, 3), ``time`` (F,), ``aspect``, and ``scale`` in pixels per
+        metre, None if unknown. Lengths are metres, or in the object's own unit if the file's ``unit`` is null.
 
     Raises
     ------

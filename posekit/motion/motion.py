@@ -124,14 +124,14 @@ class Motion(Record):
         """Store a read-only copy of an array after checking its shape; None stays None."""
         if given is None:
             return
-        values = numbers(given, self.source or "motion", name, remedy="give one row a frame")
+        values = numbers(given, self.source or "motion", name, remedy="give one row per frame")
         fits = values.ndim == len(shape) and all(
             want in (None, have) for want, have in zip(shape, values.shape, strict=False)
         )
         if not fits:
             wanted = " x ".join("any" if extent is None else str(extent) for extent in shape)
             got = " x ".join(map(str, values.shape))
-            raise self._refused(name, f"shape {got}", f"shape {wanted}", "state their names, a row a frame")
+            raise self._refused(name, f"shape {got}", f"shape {wanted}", "name them, one row per frame")
         if (wrong := np.isinf(values) if dtype is np.float64 else ~np.isfinite(values)).any():
             where = [int(index) for index in np.argwhere(wrong)[0]]
             raise self._refused(

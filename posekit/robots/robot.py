@@ -229,7 +229,7 @@ class Robot(Record):
             If the shape is wrong, a number is not finite, or a quaternion's length differs from 1 by more than 0.01.
         """
         q, check = np.atleast_2d(np.array(q, dtype=np.float64)), partial(need, source)
-        remedy = "give a row a configuration, in the order of configuration_names"
+        remedy = "give one row per configuration, in the order of configuration_names"
         check(q.shape[1:] == (self.model.nq,), "", f"shape {q.shape}", f"(N, {self.model.nq})", remedy)
         for row, column in np.argwhere(~np.isfinite(q))[:1]:
             place = f"row {row}: {self.configuration_names[column]}"

@@ -29,7 +29,7 @@ from posekit.settings import ValidateSettings, stated
 from posekit.skeleton import JOINTS
 from posekit.validators.report import Report, joined, plural
 
-#: Maximum number of rounds of repair: replaced postures can tremble, and a file rounds.
+#: Maximum number of rounds of repair; more than one is needed if replaced postures jitter or the file rounds numbers.
 ROUNDS: Final = 4
 #: Change of a frame above which it counts as changed, metres or radians.
 SEEN: Final = 5e-6
@@ -72,12 +72,12 @@ class Repaired(Record):
         return list(self.notes)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the repaired motion. In the format of its own file, it keeps the names and columns of that file.
+        """Write the repaired motion. If the format is that of the source file, its names and columns are kept.
 
         Raises
         ------
         InputError
-            If the format cannot hold the motion, or there are several files.
+            If the format cannot represent the motion, or there are several files.
         """
         import posekit
 
@@ -118,21 +118,22 @@ def repair(
 ) -> Repaired:
     """Find a motion near the given motion that passes all checks.
 
-    Defects over time are removed first: frames are put in order, right and left exchanged back, lengths of limbs
-    restored, jumps and frozen frames interpolated, trembling smoothed, the body shifted to the ground, and standing
-    feet held in place. Then each rejected posture is pushed inside its bounds by the shortest steps; if that fails,
-    it is moved toward the nearest good frames until it passes. A first frame from which the body jumps, such as a
-    T-pose, is replaced by extrapolation.
+    Defects of the recording are removed first: frames are sorted, exchanged sides corrected, lengths of limbs restored,
+    jumps and frozen frames interpolated, jitter smoothed, the body shifted to the ground, and standing feet fixed. Then
+    each rejected posture is moved inside its bounds by the shortest steps. If that fails, it is interpolated toward the
+    nearest valid frames until it passes. A first frame with another posture, such as a T-pose, is extrapolated.
 
-    Frames that need no change stay, byte for byte in BVH files and in tables. A written file is read again and judged.
+    Frames without defects are unchanged, byte for byte in BVH files and in tables. A written file is read again and
+    judged.
 
     Parameters
     ----------
     source : path, sequence of path, Motion or array
-        A file, a folder, a motion, or an array as `posekit.validate` takes it; an array is motion if `rate` is given.
+        A file, a folder, a motion, or an array as in `posekit.validate`; the frames of an array are successive in time
+        if `rate` is given.
     target : path, optional
-        File to write. For a folder or several files: a new folder, which gets files of the same names; valid files
-        are copied unchanged.
+        File to write. For a folder or several files: a new folder for files with the same names; valid files are copied
+        unchanged.
     urdf, settings, layout, unit, up, rate, person, checks, ranges, profile, ground
         As in `posekit.validate`.
 
@@ -143,7 +144,7 @@ def repair(
     Raises
     ------
     InputError
-        If a file cannot be read, or the target cannot hold the motion.
+        If a file cannot be read, or the format of the target cannot represent the motion.
 
     Examples
     --------
@@ -279,7 +280,7 @@ def _joined(clips: Sequence[Clip], motion: Motion) -> Motion:
 def _in_its_file(
     before: Motion, after: Motion, clips: Sequence[Clip], facts: dict[str, Any]
 ) -> tuple[bytes, list[str]]:
-    """Return the repaired file, empty if its format cannot be kept, and notes about contents that were not changed."""
+    """Return the bytes of the repaired file, empty if its format cannot be kept, and notes about unchanged arrays."""
     if isinstance(before.document, Bvh):
         return in_bvh(clips[0], before.document, Options(**facts)) if len(after) == len(before) else b"", []
     if not Path(before.source).is_file():
