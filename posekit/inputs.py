@@ -35,7 +35,7 @@ def files_of(given: Any) -> Iterator[Path]:
             continue
         # `Path.glob` refuses patterns with an absolute path.
         matches = glob(str(path), recursive=True)  # noqa: PTH207
-        found = list(_below(path)) if path.is_dir() else sorted(map(Path, matches))
+        found = list(_below(path)) if str(one) and path.is_dir() else sorted(map(Path, matches))
         if not found:
             what = "a folder without files of motion" if path.is_dir() else "no file"
             remedy = "write them with posekit samples DIR" if str(one) == "samples" else "check the path"

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import string
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
 from posekit.errors import nearest, refusal, shown
+from posekit.files import parse_toml, read_bytes
 from posekit.geometry import PER_METRE, UNIT_WORDS, Record
 
 #: Number of units in one metre, pixel, degree, second or hertz, for quantities given as text; 100 % is one.
@@ -152,6 +152,9 @@ class Settings(Record):
         for one in fields(self):
             if one.type in ("str", "str | None") and getattr(self, one.name) is not None:
                 self._set(one.name, str(getattr(self, one.name)))
+            if one.type in ("bool", "bool | None") and getattr(self, one.name) not in (True, False, None):
+                got = shown(getattr(self, one.name))
+                raise refusal("", one.name, got, "true or false", "write one of them")
         if isinstance(self.checks, str):
             self._set("checks", tuple(name.strip() for name in self.checks.split(",") if name.strip()))
         elif self.checks is not None:
@@ -159,7 +162,7 @@ class Settings(Record):
         if isinstance(self.rules, str):
             rules = map(str.strip, self.rules.split(","))
             self._set("rules", tuple(int(rule) if rule.isdigit() else rule for rule in rules if rule))
-        self._set("rules", tuple(self.rules))
+        self._set("rules", tuple(self.rules) if isinstance(self.rules, Iterable) else (self.rules,))
         self._one_of("walkers", get_args(Walkers))
         if not set(self.rules) <= {1, 2, 3, 4, 5}:
             raise refusal("", "rules", shown(list(self.rules)), "some of 1, 2, 3, 4, 5", "give them as 1,2")
@@ -205,11 +208,7 @@ class Settings(Record):
         InputError
             If the file cannot be read or a field is wrong.
         """
-        try:
-            found = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise refusal(path, "", str(error), "a TOML file of settings", "see `posekit settings`") from None
-        return (base or cls()).changed(**found)
+        return (base or cls()).changed(**parse_toml(read_bytes(path), str(path)))
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as JSON values; check objects are replaced by their names."""

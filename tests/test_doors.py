@@ -534,3 +534,24 @@ def test_a_stated_unit_is_the_unit_of_the_written_file(folder: Path, tmp_path: P
         line.split()[2] for line in (tmp_path / "jump.bvh").read_text().splitlines() if "OFFSET" in line
     ]
     assert 10 < max(abs(float(one)) for one in offsets) < 25  # a thigh in inches
+
+
+def test_a_file_that_is_named_twice_is_judged_once(folder: Path) -> None:
+    assert posekit.validate([folder / "walk.npz"] * 2).decision == "keep 1 of 1 clip"
+
+
+def test_an_empty_path_is_not_the_present_folder() -> None:
+    for door in (posekit.validate, posekit.open, posekit.recover):
+        with pytest.raises(posekit.InputError, match=r"no file|a folder"):
+            door("")
+
+
+@pytest.mark.parametrize("rules", [1, "1", [1], "1,"])
+def test_rules_may_be_one_number(rules: Any) -> None:
+    assert ValidateSettings(rules=rules).rules == (1,)
+
+
+@pytest.mark.parametrize(("name", "value"), [("strict", "no"), ("rules", "one"), ("rules", 7)])
+def test_a_word_is_not_taken_for_true(name: str, value: Any) -> None:
+    with pytest.raises(posekit.InputError, match=f"^{name}: "):
+        ValidateSettings(**{name: value})

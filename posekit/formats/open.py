@@ -63,8 +63,8 @@ def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
     numbers, strings and plain containers; an array without a name has the key "". The document of a table is a
     `posekit.formats.tables.Table`, for Parquet with metadata in `about`. The document of a folder is its `Path`.
     """
-    path = Path(path)
-    if path.is_dir():
+    given, path = str(path), Path(path)
+    if given and path.is_dir():
         return "folder", path
     data, suffix = read_bytes(path), suffix_of(path)
     by_suffix = (name for name, (_, suffixes) in CONTAINERS.items() if suffix in suffixes)
@@ -171,6 +171,8 @@ def open(  # the door's name, as in `gzip.open`
     remedy = "name the joints in a TOML file (--layout), or give the array to posekit.recover or validate"
     if container == "arrays" and all(isinstance(one, dict) for one in document.values()):
         held, remedy = f"{len(names)} recordings, {listed}", "write each into a file of its own"
+    elif container == "folder":
+        held, remedy = "a folder without key points", "give one of its files"
     elif isinstance(document, dict) and {"images", "annotations"} <= document.keys():
         held, remedy = "a COCO file without keypoints", "give the file of its person keypoints"
     raise refusal(path, "", held, "motion, key points, a view, cameras, a result or a report", remedy)

@@ -95,7 +95,7 @@ def validate(
     facts = facts_of(layout=layout, unit=unit, up=up, rate=rate, person=person)
     if not are_paths(given):
         return judge.report(given if hasattr(given, "survivors") else judge.motion(given, facts))
-    report = _files(list(files_of(given)), judge, facts)
+    report = _files(list(dict.fromkeys(files_of(given))), judge, facts)
     if keep is not None:
         spans = None if keep_spans is None else number(keep_spans, "keep-spans", "seconds")
         report = replace(report, notes=(*report.notes, keep_clips(report, keep, spans=spans)))
