@@ -64,7 +64,7 @@ def grow_best(
     given: Tolerance | None,
     about: dict[str, Any],
 ) -> tuple[Array, Array, Array]:
-    """Grow the tree of one frame with the exact tolerance, and if the points are not exact, with the measured one.
+    """Grow the tree of one frame with the exact tolerance or, if the points are not exact, the measured tolerance.
 
     Returns
     -------
