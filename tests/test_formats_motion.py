@@ -217,8 +217,8 @@ def test_position_channels_may_stand_in_place_of_offsets(tmp_path: Path, every: 
     (tmp_path / "absolute.bvh").write_text("\n".join(lines) + "Frame Time: 0.0333333333\n" + rows)
     motion = posekit.open(tmp_path / "absolute.bvh")
     assert np.abs(motion.joints - plain.joints).max() < 1e-12
-    assert any("in place of the offsets" in note for note in motion.notes)
-    assert not any("in place of the offsets" in note for note in plain.notes)
+    assert any("replace the offsets" in note for note in motion.notes)
+    assert not any("replace the offsets" in note for note in plain.notes)
 
 
 def test_positions_of_a_root_alone_that_repeat_its_offset_are_not_noted(tmp_path: Path) -> None:
@@ -845,9 +845,9 @@ TWICE = np.sort(np.r_[EVEN[:23], EVEN[7]])
         ({"time": EVEN, "fps": 26.5}, None, EVEN, "contradict the file's rate 26.5"),
         ({"time": EVEN}, 28.0, EVEN, ""),
         ({"time": EVEN}, 60.0, EVEN, "contradict --rate 60"),
-        ({"time": TWICE}, None, TWICE, "stand still or go back at 1 of 23 steps"),
+        ({"time": TWICE}, None, TWICE, "times do not increase at 1 of 23 steps"),
         ({"time": EVEN[::-1].copy(), "fps": 30.0}, None, EVEN, "the rate is used instead"),
-        ({"time": EVEN[::-1].copy()}, None, EVEN[::-1], "stand still or go back at 23 of 23 steps"),
+        ({"time": EVEN[::-1].copy()}, None, EVEN[::-1], "times do not increase at 23 of 23 steps"),
         ({"time": np.zeros(24)}, 60.0, EVEN / 2, "the rate is used instead"),
         ({"time": np.full(24, np.nan), "fps": 15.0}, None, 2 * EVEN, ""),
         ({"fps": 30.0}, None, EVEN, ""),
@@ -896,10 +896,10 @@ def crawling(forward: float, rises: tuple[float, float] = (0.0, 0.0)) -> Any:
         (0.0, (0.0, 0.0), "", "+x", "+x is up, because bodies stand along it"),
         (0.59, (0.0, 0.0), "", "+x", "+x is up, because bodies stand along it"),
         (1.0, (0.16, 0.17), "", "+x", "+x is up, because bodies stand along it"),
-        (0.61, (0.3, 0.0), "", "+z", "+z is up by the ground: the lowest joint stays level along it"),
+        (0.61, (0.3, 0.0), "", "+z", "+z is up by the ground: the height of the lowest joint"),
         (1.0, (0.04, 0.5), "", "+y", "+y is up by the ground"),
         (1.0, (0.21, 0.1), "", "+z", "+z is up by the ground"),
-        (1.0, (0.19, 0.1), "", "", "the up axis is not known"),
+        (1.0, (0.19, 0.1), "", "", "the up axis is unknown"),
         (0.0, (0.0, 0.0), "+z", "+z", "the person is lying in most frames if +z is up"),
         (0.61, (0.0, 0.0), "+z", "+z", ""),
         (0.0, (0.0, 0.0), "-x", "-x", "the person is upside down in most frames if -x is up"),

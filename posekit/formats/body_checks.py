@@ -112,7 +112,7 @@ def points_motion(
         options.note(f"{' and '.join(derived)} placed from shoulders and hips")
     missing = ", ".join(limb for limb in LIMBS if limb not in placed)
     if missing and layout.name:
-        options.warn(f"{missing} are not in the file: what needs them stays undecided")
+        options.warn(f"{missing} are not in the file: checks that need them are undecided")
     body = _tree(placed, joints)
     _check_depth(_tree(placed, joints, without=derived), source)
     unit = options.unit or unit or layout.fields.get("unit", "")
@@ -376,10 +376,10 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
     others = min(rise[name] for name in UP_AXES if name[1] != best[1])
     if rise[best] < FLAT_METRES and CLEAR_RATIO * rise[best] < others:
         best = custom if custom[1:] == best[1] else f"+{best[1]}"
-        options.note(f"{best} is up by the ground: the lowest joint stays level along it")
+        options.note(f"{best} is up by the ground: the height of the lowest joint hardly varies")
         return best
     if not custom:
-        options.note("the up axis is not known: nobody stands, and no ground is level (--up)")
+        options.note("the up axis is unknown: no body stands upright, no ground is level (--up)")
     return custom
 
 
@@ -427,11 +427,11 @@ def times(
                 options.warn(f"{contradiction}: times are kept")
         if step or not len(steps) or not (stated or options.rate):
             if (steps <= 0).any():
-                options.warn(f"times stand still or go back at {(steps <= 0).sum()} of {len(steps)} steps")
+                options.warn(f"times do not increase at {(steps <= 0).sum()} of {len(steps)} steps")
             return _unrounded(time, stated, options) if counted.all() else time
-        options.warn("times stand still: the rate is used instead")
+        options.warn("times do not increase: the rate is used instead")
     if stated and options.rate and abs(stated / options.rate - 1) > 1e-6:
-        options.warn(f"--rate {options.rate:g} is used in place of the file's {stated:g} a second")
+        options.warn(f"--rate {options.rate:g} is used in place of the file's {stated:g} Hz")
     used = options.rate or stated
     if used is None:
         if frames > 1:

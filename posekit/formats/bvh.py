@@ -222,7 +222,7 @@ def read(document: Bvh, path: str, options: Options) -> Motion:
     points = world_points(document, absolute=absolute)
     held = zip(document.parents, document.channels, strict=True)
     if absolute and any(parent >= 0 and not all(turns for turns, _ in own) for parent, own in held):
-        options.note("position channels stand in place of the offsets")
+        options.note("position channels replace the offsets")
     if (frames := len(document.values)) != document.frames:
         options.warn(f"Frames is {document.frames}, but the file has {frames}: it may be cut off")
     unit, metres = (
