@@ -81,7 +81,7 @@ def draw(
     suffix = path.suffix.lower()
     if suffix not in (".html", *PICTURES, *PLOTS):
         expected = f"{', '.join((*PICTURES, '.html', '.svg', '.pdf'))}"
-        raise refusal(path, "", f"the format {suffix or 'of no ending'}", expected, "name one of these")
+        raise refusal(path, "", shown(suffix), f"a suffix among {expected}", "choose one")
     if over is not None:
         from posekit.viewer.overlay import overlaid
 
@@ -98,15 +98,13 @@ def draw(
 
         kind = which if which in PLOT_NAMES else "timeline" if isinstance(source, Report) else "angles"
         if suffix not in PLOTS:
-            raise refusal(path, "", f"the format {suffix}", ", ".join(PLOTS), "name a plot so")
+            raise refusal(path, "", shown(suffix), f"a plot: {', '.join(PLOTS)}", "choose one")
         if which not in ("", *PLOT_NAMES):
             raise refusal(path, "--posture", shown(which), " or ".join(PLOT_NAMES), "choose a plot")
         return write_bytes(path, plotted(source, kind, suffix, frame=frame, view=view))
     if which and isinstance(source, Motion):
-        expected = f"{' or '.join(PLOT_NAMES)}: a motion has one posture per frame"
-        raise refusal(
-            path, "--posture", shown(which), expected, "leave it out, or choose frames with --frame"
-        )
+        expected = f"{' or '.join(PLOT_NAMES)}; a motion has one posture per frame"
+        raise refusal(path, "--posture", shown(which), expected, "omit it, or select frames with --frame")
     from posekit.viewer.scene import camera_lines, pictures
 
     seen = view if isinstance(view, View) else None

@@ -393,5 +393,5 @@ def _check_drawn(pixels: Pixels) -> None:
     share = float((np.abs(pixels.astype(int) - background).max(axis=-1) > 8).mean())
     if share < LEAST_DRAWN:
         raise ViewerError(
-            "the picture is flat: the browser's WebGL failed, or the bodies are out of sight; use another browser"
+            "the picture has a single colour: WebGL failed in the browser, or no body is visible; use another browser"
         )

@@ -87,7 +87,7 @@ def page_data(
         count = sum(len(one) for one in motions)
         if motions and count != len(source):
             raise refusal(
-                "render", "view", f"{count} frames", f"{len(source)}, those of the report", "give its motions"
+                "render", "view", f"{count} frames", f"{len(source)} as in the report", "state its motions"
             )
         return _of_motions(motions, source, title, urdf)
     motion = source.take(drawn.frame_rows(len(source), frame, source.source))
@@ -362,8 +362,8 @@ def _of_result(
     drawn.frame_with_postures(recovery, None)
     chosen: list[int] = drawn.frame_rows(len(recovery), frame, recovery.source).tolist()
     if view is not None and len(view) != len(recovery):
-        expected = f"{len(recovery)}, those of the result"
-        raise refusal("render", "--view", f"{len(view)} frames", expected, "give its own view")
+        expected = f"{len(recovery)} as in the result"
+        raise refusal("render", "--view", f"{len(view)} frames", expected, "state the view of the result")
     table, answer = recovery.survivors, recovery.answer
     most = min(MOST_OF_FRAME, max(20, MOST_POSTURES // len(chosen)))
     points = np.concatenate([table.joints, np.asarray(table.head)], axis=1)
