@@ -37,9 +37,6 @@ UNSEEN_DEGREES: Final = 45.0
 #: bend of 15 degrees, a valgus of 4 degrees changes that rotation by 15 degrees.
 STRAIGHT_DEGREES: Final = 15.0
 
-#: Tolerance for rounding of exact angles, degrees; it moves a wrist by 5 µm.
-ROUNDING_DEGREES: Final = 1e-3
-
 #: Minimum bend at which a frame determines the axis of its hinge, degrees; above it carrying angles rotate that axis by
 #: 35 degrees at most.
 BENT_DEGREES: Final = 20.0
