@@ -17,6 +17,8 @@ from posekit.recovery.objects import (
     recover_object,
     search,
 )
+from posekit.recovery.objects.linkage import linkage_of_robot
+from posekit.robots import Robot
 
 
 def chain(lengths, **about):
@@ -355,3 +357,23 @@ def test_a_robot_is_recovered_with_its_configuration():
     assert np.abs(apart).max() < 1e-5
     document = found.document()
     assert document["schema"] == "posekit.object/1" and document["frames"][0]["postures"][0]["certified"]
+
+
+def test_points_of_a_robot_are_its_base_its_turning_joints_and_its_ends():
+    """Segments are the distances that no joint changes; nothing is known behind a joint that slides."""
+    arm = [("shoulder", "revolute", 0.2), ("elbow", "revolute", 0.3), ("wrist", "continuous", 0.25)]
+    arm += [("hand", "fixed", 0.1), ("slide", "prismatic", 0.1), ("finger", "revolute", 0.1)]
+    limit = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+    parts, above = ['<link name="base"/>'], "base"
+    for k, (name, kind, x) in enumerate(arm):
+        axis = f'<axis xyz="0 {k % 2} {1 - k % 2}"/>'
+        ends = f'<parent link="{above}"/><child link="{name}_link"/><origin xyz="{x} 0 0"/>'
+        parts.append(
+            f'<joint name="{name}" type="{kind}">{ends}{axis}{limit}</joint><link name="{name}_link"/>'
+        )
+        above = f"{name}_link" if name != "hand" else "wrist_link"
+    linkage = linkage_of_robot(Robot(urdf=f'<robot name="arm">{"".join(parts)}</robot>', fixed_base=True))
+    assert linkage.points == ("base", "shoulder", "elbow", "wrist", "hand_link")
+    found = dict(zip(linkage.segment_names, linkage.lengths.tolist(), strict=True))
+    steps = {"base-shoulder": 0.2, "shoulder-elbow": 0.3, "elbow-wrist": 0.25, "wrist-hand_link": 0.1}
+    assert found == pytest.approx(steps)
