@@ -497,7 +497,7 @@ MADE: dict[str, Any] = {name: getattr(posekit, name) for name in ("Motion", "Val
         (lambda: MADE["Motion"](joints=STANDING, joint_name=()), r"Motion: joint_name: .*joint_names"),
         (lambda: MADE["ValidateSettings"](tolerance=1), r"tolerance: .*rigid_tolerance"),
         (lambda: MADE["Judgement"](places=(), values=[]), r"Judgement: values: .*did you mean value\?"),
-        (lambda: posekit.Motion(joints=np.zeros((2, 17, 3))), "state their names"),
+        (lambda: posekit.Motion(joints=np.zeros((2, 17, 3))), "name them, one row per frame"),
         (lambda: posekit.validate(True), "bool|true|shape"),
         (lambda: posekit.validate(np.zeros((5, 14, 3), complex)), "complex128"),
         (lambda: posekit.recover(np.ones((1, 17, 2)), layout="COCO"), "did you mean coco_1"),
