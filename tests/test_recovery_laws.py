@@ -17,7 +17,7 @@ from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.doors import view_of
 from posekit.robots import load_robot
 from posekit.settings import EXACT, MEASURED
-from posekit.skeleton import JOINTS, SEGMENT_NAMES, other_side
+from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES, other_side
 from posekit.synthesis import forget_camera, random_views
 from tests.test_cli import folder, run
 
@@ -296,3 +296,19 @@ def test_a_search_of_depths_is_the_default_rules_are_numbers_and_rounding_is_exa
     assert posekit.RecoverSettings(rules="1, 3,5").rules == (1, 3, 5)
     with pytest.raises(posekit.InputError, match="expected some of 1, 2, 3, 4, 5"):
         posekit.RecoverSettings(rules=(0, 1))
+
+
+def test_a_head_is_as_large_as_the_head_points_that_a_view_gives() -> None:
+    seen = random_views(1, np.random.default_rng(1), distance=(4.0, 5.0))
+    usual = posekit.recover(seen)
+    head = usual.survivors.head[0] - usual.survivors.joints[0, 0]
+    figure = posekit.load_figure().head_points
+    large = replace(
+        seen,
+        head_points={name: (1.3 * figure[1 + k]).tolist() for k, name in enumerate(HEAD_POINTS)},
+        head_image=seen.camera.project((seen.truth[0, 0] + 1.3 * head)[None]),
+    )
+    found = posekit.recover(large).survivors
+    assert len(found)
+    away = np.linalg.norm(found.head - found.joints[:, :1], axis=-1)
+    np.testing.assert_allclose(away, np.tile(1.3 * np.linalg.norm(figure[1:], axis=1), (len(found), 1)))
