@@ -59,7 +59,8 @@ class JointRange:
     """An angle of a joint is outside its range.
 
     The axial rotation of an almost straight limb is poorly determined. Its tolerance is the tolerance of directions
-    divided by the sine of the bend. For measured bodies the rotation is undecided at bends below `STRAIGHT_DEGREES`.
+    divided by the sine of the bend. In recordings of people, the axial rotation is undecided if elbow or knee bends by
+    less than `STRAIGHT_DEGREES`.
 
     Parameters
     ----------

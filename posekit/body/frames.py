@@ -46,8 +46,8 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
     """Return the hips' frame: left is from right to left hip, down is from the pelvis and perpendicular to left.
 
     A pelvis between the hips defines no plane with them. Then down is from the neck to the pelvis, made perpendicular
-    to the hips' line. This is continuous unless the spine is along that line. It does not determine the flexion of the
-    pelvis.
+    to the hips' line. The frame is continuous unless the spine is parallel to the line between the hips. It does not
+    determine the flexion of the pelvis.
 
     Parameters
     ----------

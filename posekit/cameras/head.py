@@ -88,8 +88,9 @@ class HeadPose(Record):
     rms : array (F,)
         Root of the mean squared residual of the seen points.
     misfit : tuple of str or None
-        For each frame, the point that does not fit the other points; None if all points fit. With normal errors, one
-        correct head in two hundred has a misfit by chance. A warning is given only if the share of misfits is higher.
+        For each frame, the point that does not fit the other points; None if all points fit. With normal errors,
+        `misfit` names a point of a correct head in one of two hundred heads by chance. A warning is given only if the
+        share of misfits is higher.
     """
 
     head: HeadPoints

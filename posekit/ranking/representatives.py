@@ -35,10 +35,10 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
     Returns
     -------
     rows : int array (R,)
-        Representatives by frame; the one with the largest `held` comes first.
+        Representatives, frame by frame; in a frame, the one with the largest `held` comes first.
     held : array (R,)
-        Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
-        earlier representative.
+        Total probability of the postures within 5 cm of each representative, itself included; a posture near several
+        representatives counts for the first one.
     """
     one, other = _near(shape, frame)
     rows, rest, left = np.arange(len(frame)), weight.copy(), hold.copy()

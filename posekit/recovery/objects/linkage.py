@@ -117,7 +117,7 @@ class Linkage(Record):
                 raise self._wrong(field, f"{value:g}", "a finite positive number", "leave it out")
 
     def _check_shape(self) -> None:
-        """Refuse an object that its segments do not connect, or a loop that cannot close."""
+        """Refuse an object whose segments do not connect all points, or a loop that cannot close."""
         from scipy.sparse.csgraph import shortest_path
 
         edges = [(*pair, float(size)) for pair, size in zip(self.segments, self.lengths, strict=True)]

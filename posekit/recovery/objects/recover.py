@@ -147,7 +147,7 @@ def recover_object(
     tolerance: tuple[float, float] | None = None,
     robot: Any = None,
 ) -> ObjectRecovery:
-    """Recover every posture of an object behind a view.
+    """Find every posture of an object that projects onto the given image points.
 
     Parameters
     ----------
