@@ -110,7 +110,7 @@ class PostureJudge:
     settings : Settings
         Ranges, walking rules and contact margin.
     tolerance : Tolerance or None
-        Allowed differences from the figure; None for measured people.
+        Allowed differences from the figure; None if the postures were measured on people.
     up : array (3,), optional
         Unit vector against gravity in the frame of the postures.
     """

@@ -472,7 +472,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def joined(reports: Sequence[Report], *, refused: Sequence[str] = ()) -> Report:
-    """Concatenate reports; checks and places with the same name are merged."""
+    """Concatenate reports; checks with the same name are merged, and so are judged places with the same name."""
     units = {name: unit for one in reports for name, unit in zip(one.checks, one.units, strict=True)}
     check_at = {name: k for k, name in enumerate(units)}
     places = dict.fromkeys(name for one in reports for name in one.places)

@@ -91,7 +91,7 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
 
 
 def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Array, str]:
-    """Match motion to pictures by frame or time, and choose the axes whose projection is nearest to the image."""
+    """Match motion to pictures by frame or time, and choose the permutation of its axes with the least image error."""
     source = motion.source or "truth"
     if not isinstance(camera, PinholeCamera) or camera.R is None or camera.t is None:
         raise refusal(source, "truth", "a camera without a pose", "R and t", "give a calibration")

@@ -245,8 +245,8 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
     k : int
         Index of the point. A point of a limb has too few rigid neighbours; the result is then False in every frame.
     unsure : bool array (T, P)
-        Whether a point may be missing in a frame. Such points are no neighbours, and the usual distances are measured
-        in other frames.
+        Whether a point may be missing in a frame. Points that may be missing are not used as neighbours, and the usual
+        distances are those of the frames in which point k is certain.
     """
     others = np.arange(points.shape[1]) != k
     apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]

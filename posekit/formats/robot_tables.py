@@ -282,7 +282,7 @@ def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> 
 
 
 def _named(labels: tuple[str, ...], count: int, order: str, options: Options) -> tuple[str, ...]:
-    """Return the names of the joints from the file or, if it has none, from the layout."""
+    """Return the names of the joints: from the file, or else from the layout that states their order."""
     names = load_layout(order).fields["joints"] if order and not labels else ()
     if len(names) == count and (not options.urdf or "g1" in options.urdf.lower() or options.layout):
         options.note(f"{len(names)} joints are in the order of {order}, unnamed in the file (--layout)")

@@ -73,7 +73,7 @@ def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement
 
 
 def _over_gaps(joints: Array) -> Array:
-    """Return the mean speed of each joint over the gap before a slot (S, 14), metres per slot; NaN without a gap."""
+    """Return the mean speeds (S, 14) of joints over the empty slots before each slot, metres per slot; else NaN."""
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)
