@@ -230,7 +230,7 @@ def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
     record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
     if isinstance(model, LeeChenCamera) and model.f is not None:
         record["f"] = float(np.broadcast_to(model.f, len(view))[k])
-    if pose is not None and pose.found[k]:
+    if pose is not None and not pose.reasons[k]:
         R, t, f = pose.R_cam_head[k], pose.t_cam_head[k], float(pose.f[k])
         record |= {"residual": float(pose.rms[k]), "rotation": R.tolist(), "position": (-R.T @ t).tolist()}
         if isinstance(model, LeeChenCamera):
