@@ -1,4 +1,4 @@
-"""The base class of cameras: rays of image points, and the two possible ends of a segment on a ray."""
+"""The base class of cameras: the ray of each image point, and a joint's near and far positions on its ray."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ COINCIDENT_METRES: Final = 1e-7
 
 
 class Lift(NamedTuple):
-    """The possible positions of a segment's far end, given its start, its length and the ray of its image point.
+    """The near and far positions of a segment's end on the ray of its image point.
 
     Attributes
     ----------
     points : array (..., 2, 3)
-        The nearer and the farther candidate, camera frame, metres. NaN if the ray is unknown.
+        The near and the far position, camera frame, metres. Both are NaN if the ray is unknown.
     valid : bool array (..., 2)
-        Whether each candidate is a solution. If the ray is tangent to the sphere, both candidates coincide and only the
-        nearer is valid.
+        Whether each position is in front of the camera and at the segment's length from its start. If both positions
+        coincide, only the near one is valid.
     excess : array (...)
-        Distance from the segment's start to the ray minus the segment's length, metres: positive if the
-        segment is too short for its image.
+        Distance from the segment's start to the ray minus the segment's length, metres. A positive value means that the
+        segment is too short to reach the ray.
     """
 
     points: Array
@@ -40,9 +40,9 @@ class Lift(NamedTuple):
 class Camera(Record):
     """Base class of the three camera models.
 
-    The camera frame is OpenCV's: x right, y down, z forward. Normalised image points do not depend on intrinsics and
-    lens: they are (x/z, y/z) of a perspective camera, and (x, y) in metres of the scaled orthographic camera. The first
-    axis of every array is the frame, since focal length or scale may differ between frames.
+    The camera frame is OpenCV's: x right, y down, z forward. Normalised image points are (x/z, y/z) for a perspective
+    camera, and (x, y) in metres for the scaled orthographic camera. The first axis of every array is the index of the
+    picture, because focal length or scale may differ between pictures.
     """
 
     #: Whether rays meet in the optical centre; otherwise they are parallel.
@@ -58,7 +58,7 @@ class Camera(Record):
 
     @abstractmethod
     def jacobian(self, normalized: Array) -> Array:
-        """Return the derivatives (F, ..., 2, 2) of image points by normalised image points (F, ..., 2)."""
+        """Return the Jacobian (F, ..., 2, 2) of image points with respect to normalised image points (F, ..., 2)."""
 
     def rays(self, image: Array) -> tuple[Array, Array]:
         """Return origins and unit directions (F, ..., 3) of the rays of image points (F, ..., 2)."""
@@ -67,18 +67,18 @@ class Camera(Record):
         return np.zeros_like(direction), direction
 
     def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
-        """Compute the candidates for the far ends of segments; see `meet_sphere`.
+        """Compute the near and far positions of segments' ends on their rays; see `meet_sphere`.
 
         Parameters
         ----------
         start : array (F, ..., 3)
             Known ends of the segments, camera frame, metres.
         rays : pair of arrays broadcastable to (F, ..., 3)
-            `rays` of the image points of the other ends.
+            Origins and unit directions of the rays of the other ends.
         length : array broadcastable to (F, ...)
             Lengths, metres.
         tolerance : float
-            Distance by which a segment may be too short for its image, metres.
+            Distance by which a segment may be too short to reach its ray, metres.
         """
         return meet_sphere(*rays, start, length, tolerance=tolerance)
 
@@ -87,13 +87,13 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     r"""Intersect the ray of an image point with the sphere around a segment's start.
 
     The sphere's radius is the segment's length :math:`l`. The perpendicular from the start to the ray has length
-    :math:`h` and its foot at the ray's parameter :math:`t_0`. The possible ends are at :math:`t_0 \pm \sqrt{l^2 - h^2}`
-    (Lee & Chen 1985, eqs. 6-7, solved for the ray's parameter instead of k).
+    :math:`h`, and its foot is at distance :math:`t_0` from the ray's origin. The ray meets the sphere at the distances
+    :math:`t_0 \pm \sqrt{l^2 - h^2}` from its origin (Lee & Chen 1985, eqs. 6-7).
 
     Parameters
     ----------
     origin, direction : array (..., 3)
-        The ray, with a direction of unit length; points with negative parameters are behind the camera.
+        Origin and unit direction of the ray; negative distances along the ray are behind the camera.
     start : array (..., 3)
         The segment's known end, metres.
     length : array (...)
@@ -116,7 +116,7 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
 
 
 def positive(name: str, value: float | Array | None) -> float | Array | None:
-    """Check a focal length or scale, one or one per frame; return a float or a read-only array, None if unknown.
+    """Check that a focal length or scale is positive; return it as a float or a read-only array (F,), or None.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def positive(name: str, value: float | Array | None) -> float | Array | None:
 
 
 def per_frame(name: str, value: float | Array | None, ndim: int) -> Array:
-    """Reshape one number, or one per frame (F,), so that it broadcasts against an array with `ndim` axes.
+    """Reshape a number, or an array (F,), so that it broadcasts against an array (F, ...) with `ndim` axes.
 
     Raises
     ------

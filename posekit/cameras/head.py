@@ -1,15 +1,16 @@
 r"""The camera's pose, and its focal length if unknown, from six or more head points (Lee & Chen 1985, §2.1).
 
-The squared reprojection error is minimised over the head's pose. With points that are centred and scaled to size 1,
-:math:`q = R\,(p - c) / \sigma`, and the head's centre at depth :math:`z`, the perspective image is
+The squared reprojection error is minimised over the head's pose. Head points :math:`p` with centre :math:`c` and size
+:math:`\sigma` are centred, scaled and rotated: :math:`q = R\,(p - c) / \sigma`. If the centre is at depth :math:`z`,
+the perspective image of a point is
 
 .. math:: u = \frac{a + s\,q_{xy}}{1 + d\,q_z}, \qquad s = f \sigma / z, \quad d = \sigma / z,
 
-where :math:`a` is the image of the centre. The image depends on each of the unknowns :math:`R, a, s, d`, and a camera
-at infinity is the regular point :math:`d = 0`, the scaled orthographic projection. If z and f were the unknowns, both
-would diverge for a distant camera. If f is unknown, there are seven unknowns. If the camera is known, :math:`u` is the
-normalised image (f = 1) and :math:`d = s`, so there are six unknowns. Residuals are then multiplied by the camera's
-Jacobian, which converts them to pixels.
+where :math:`a` is the image of the centre. The unknowns are :math:`R, a, s, d`. A camera at infinity has :math:`d = 0`,
+which is the scaled orthographic projection. If z and f were the unknowns instead of s and d, both would diverge for a
+distant camera. If f is unknown, there are seven unknowns: three of :math:`R`, two of :math:`a`, :math:`s` and
+:math:`d`. If the camera is known, :math:`u` is the normalised image (f = 1) and :math:`d = s`, so there are six
+unknowns. The camera's Jacobian then converts residuals to pixels.
 """
 
 from __future__ import annotations
@@ -62,25 +63,27 @@ UNSETTLED: Final = "no pose was found from any start: check the image points and
 
 
 class HeadWarning(UserWarning):
-    """Warning that a head point does not fit the others: in a single frame, or in more frames than chance explains."""
+    """Warning that a head point fits the other head points badly, in more frames than chance explains."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class HeadPose(Record):
-    """The pose of a head in F frames; one frame is a batch of one.
+    """The pose of a head in each of F frames.
 
     Attributes
     ----------
     head : HeadPoints
-        The head points, in the camera frame.
+        The head points, in the head's own frame.
     reasons : tuple of str
-        Reason why each frame has no pose; empty if it has one. R, t, f and points of a frame without a pose are NaN.
+        For each frame, the reason why it has no pose; an empty string if it has one. If a frame has no pose, its R, t,
+        f and points are NaN.
     R_cam_head : array (F, 3, 3)
         Rotation from the head's frame to the camera's (OpenCV: x right, y down, z forward).
     t_cam_head : array (F, 3)
         The head frame's origin in the camera frame, metres.
     f : array (F,)
-        The focal length, in the image's unit: estimated, or the known camera's. A distant head hardly determines f.
+        The camera's focal length, in the unit of the image, or its estimate if the camera's f is None. The estimate is
+        imprecise if the head is far away.
     points_cam : array (F, P, 3)
         All head points, seen or unseen, in the camera frame, metres.
     residuals : array (F, P)
@@ -88,9 +91,9 @@ class HeadPose(Record):
     rms : array (F,)
         Root of the mean squared residual of the seen points.
     misfit : tuple of str or None
-        For each frame, the point that does not fit the other points; None if all points fit. With normal errors,
-        `misfit` names a point of a correct head in one of two hundred heads by chance. A warning is given only if the
-        share of misfits is higher.
+        For each frame, the point that does not fit the other points; None if all points fit. If image points have
+        normally distributed errors, one in two hundred frames has a misfit by chance. posekit warns only if the share
+        of frames with a misfit is higher.
     """
 
     head: HeadPoints
@@ -116,8 +119,8 @@ class HeadPose(Record):
 def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeChenCamera) -> HeadPose:
     r"""Estimate the head's pose from its image (perspective-n-point), and f if it is unknown.
 
-    The reprojection error has the image's unit; the lens is linearised at the image points. A `HeadWarning` names a
-    point that does not fit the other points.
+    The fit minimises the reprojection error in the unit of the image points. Lens distortion is linearised at the image
+    points. A `HeadWarning` names a point that does not fit the other points.
 
     Parameters
     ----------
@@ -180,7 +183,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
                 reasons[row] += f"; check head point {misfit[row]} first, which does not fit the others"
 
     def whole(values: Array, kept: Flags) -> Array:
-        """Return the values of the kept frames in an array of all frames; other frames are NaN."""
+        """Expand the values of the kept frames to an array of all frames, with NaN for the other frames."""
         full = np.full((len(points), *values.shape[1:]), np.nan)
         full[rows[kept]] = values[kept]
         return full
@@ -209,7 +212,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
 
 
 def _degenerate(head: HeadPoints, plane: Array, seen: Flags) -> list[str]:
-    """Return the reason why each frame determines no camera; empty for a frame that determines one."""
+    """Return, for each frame, the reason why its points determine no camera; an empty string if they determine one."""
     reasons = [degeneracy(head.names, head.points, pattern) for pattern in seen]
     along, across = np.linalg.svd(_centred(plane, seen)[2], compute_uv=False).T
     for frame in np.flatnonzero(across <= DEGENERATE_EXTENT * along):
@@ -218,7 +221,7 @@ def _degenerate(head: HeadPoints, plane: Array, seen: Flags) -> list[str]:
 
 
 def _centred(points: Array, seen: Flags) -> tuple[Array, Array, Array]:
-    """Return each frame's centre (F, D) and size (F,) of the seen points (F, P, D), and the points relative to them."""
+    """Return the centre (F, D) and RMS size (F,) of the seen points (F, P, D), and the points centred and scaled."""
     weight = seen / np.maximum(seen.sum(axis=-1, keepdims=True), 1)
     centre = (weight[..., None] * points).sum(axis=1)
     offset = np.where(seen[..., None], points - centre[:, None], 0.0)
@@ -227,7 +230,7 @@ def _centred(points: Array, seen: Flags) -> tuple[Array, Array, Array]:
 
 
 def _parts(x: Array) -> tuple[Array, Array, Array, Array]:
-    """Split poses (F, 13) into R, the image a of the centre, s and d."""
+    """Split poses (F, 13) into R, a, s and d of the formula of this module."""
     return x[:, :9].reshape(-1, 3, 3), x[:, 9:11], x[:, 11], x[:, 12]
 
 
@@ -238,8 +241,8 @@ def _pose(R: Array, shift: Array, scale: Array, slope: Array) -> Array:
 class _Problem(NamedTuple):
     """Least-squares problem of F heads.
 
-    The fields are centred points (F, P, 3) of size 1, normalised image points (F, P, 2), the derivatives (F, P, 2, 2)
-    of image points by normalised image points (0 for unseen points), and whether f is unknown.
+    `points` (F, P, 3) are head points, centred and scaled to size 1. `plane` (F, P, 2) are normalised image points.
+    `to_image` (F, P, 2, 2) is the Jacobian of the camera, zero for unseen points. `free` is true if f is unknown.
     """
 
     points: Array
@@ -258,7 +261,7 @@ class _Problem(NamedTuple):
 
     @property
     def rounding(self) -> Array:
-        """Squared error (F,) that rounding causes."""
+        """Squared reprojection error (F,) that rounding of image points causes."""
         _, size, offset = _centred(self.plane, self.seen)
         spread = np.einsum("fpij,fpj->fpi", self.to_image, size[:, None, None] * offset)
         return np.asarray(ROUNDING_ERROR**2 * (spread**2).sum(axis=(1, 2)))
@@ -268,10 +271,10 @@ class _Problem(NamedTuple):
         return _Problem(self.points[rows], self.plane[rows], self.to_image[rows], self.free)
 
     def look(self, x: Array) -> tuple[Array, Array, Array]:
-        """Return squared errors (F,) (infinite if a point is behind the camera), residuals (F, P, 2), and derivatives.
+        """Return squared errors (F,), residuals (F, P, 2) and their Jacobian (F, P, 2, 6 or 7) at poses `x`.
 
-        The derivatives (F, P, 2, 6 or 7) are by a rotation vector in the camera frame, by shift, by scale, and by slope
-        if f is unknown.
+        The squared error is infinite if a point is behind the camera. The columns of the Jacobian are a rotation vector
+        in the camera frame, the image a of the centre, s, and d if f is unknown.
         """
         R, shift, scale, slope = _parts(x)
         q = self.points @ np.swapaxes(R, -1, -2)
@@ -293,7 +296,7 @@ class _Problem(NamedTuple):
         return np.where(possible & np.isfinite(cost), cost, np.inf), residual, J
 
     def fit(self, x: Array, precision: float = FIT_PRECISION) -> tuple[Array, Array, Array]:
-        """Minimise the squared error from a start (Levenberg 1944; Marquardt 1963); return x, errors and residuals."""
+        """Minimise the squared error from poses `x` by Levenberg-Marquardt; return poses, errors and residuals."""
         x, (cost, residual, J) = x.copy(), self.look(x)
         damping, rounding = np.full(len(x), DAMPING[0]), self.rounding * 1e-10
         active = np.flatnonzero(np.isfinite(cost))
@@ -320,11 +323,11 @@ class _Problem(NamedTuple):
         return x, cost, residual
 
     def best(self) -> tuple[Array, Array, Array]:
-        """Return the best fit from the scaled orthographic pose and from this pose with reversed depths (Necker 1832).
+        """Return the best fit from two starts: the scaled orthographic pose, and its depth reversal (Necker 1832).
 
-        For coarse image points there is a second minimum near the reversed pose. That pose mirrors the head along its
-        thinnest direction and then along the optical axis; the two reflections together are a rotation. If f is
-        unknown, a third fit starts near the camera.
+        For coarse image points, the squared error has a second minimum near the reversed pose. The reversal mirrors the
+        head along its thinnest direction and then along the optical axis; the two reflections together are a rotation.
+        If f is unknown, a third fit starts with a head near the camera.
         """
         fits = [self.fit(self.start())]
         thinnest = np.linalg.svd(self.points, full_matrices=False)[2][:, 2]
@@ -352,19 +355,19 @@ class _Problem(NamedTuple):
         return _pose(R, shift, scale, np.zeros(len(R)) if self.free else scale)
 
     def behind(self, cost: Array) -> Flags:
-        """Return whether a head behind the camera fits each frame (F,) better: its image is that of a mirrored head."""
+        """Return whether a mirrored head fits each frame (F,) better; the head is then behind the camera."""
         mirrored = self._replace(points=self.points * [1.0, 1.0, -1.0])
         other = mirrored.fit(mirrored.start())[1]
         ratio = np.maximum(other, self.rounding) / np.maximum(cost, self.rounding)
         return np.asarray(ratio ** (self.freedom / 2) < BETTER_BEHIND)
 
     def misfits(self, cost: Array) -> tuple[Ints, Array]:
-        r"""Return the point (F,) that fits the others worst, and the p-value (F,) of its error.
+        r"""Return the index (F,) of the head point that fits the others worst, and the p-value (F,) of its error.
 
-        The head is fitted again without each of its points j, which reduces the squared error S to :math:`S_j`. For
-        normal errors of unknown variance, and one point chosen beforehand, the p-value is :math:`(S_j/S)^{m/2}`, where
-        m is the number of degrees of freedom without the point (the mean-shift outlier test of Cook & Weisberg 1982,
-        for a pair of observations). All P points are examined, hence the factor P (Bonferroni).
+        The fit is repeated without each point j, which reduces the squared error S to :math:`S_j`. For one point and
+        normal errors of unknown variance, the p-value is :math:`(S_j/S)^{m/2}` (mean-shift outlier test, Cook &
+        Weisberg 1982). Here m is the number of degrees of freedom without the point. All seen points are tested, so the
+        p-value is multiplied by their number (Bonferroni).
         """
         frames, points = np.nonzero(self.seen & (np.isfinite(cost) & (cost > self.rounding))[:, None])
         without = self.take(frames)
@@ -379,10 +382,10 @@ class _Problem(NamedTuple):
 
 
 def _warn(pose: HeadPose, chance: Array, rows: Ints) -> None:
-    """Warn once for each point that does not fit in more frames than chance explains; name its worst frame.
+    """Warn once for each head point that fits badly in more frames than chance explains; name its worst frame.
 
-    The k smallest p-values are reported, for the largest k whose k-th p-value is at most k / F of `FALSE_ALARMS`
-    (Benjamini & Hochberg 1995).
+    The procedure of Benjamini & Hochberg (1995) selects the frames by their p-values, with the false discovery rate
+    `FALSE_ALARMS`.
     """
     ordered = np.sort(chance)
     below = ordered[ordered <= FALSE_ALARMS * np.arange(1, len(chance) + 1) / max(len(chance), 1)]

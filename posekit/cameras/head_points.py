@@ -1,6 +1,6 @@
-"""The points of the head: their names, their positions in the head's frame, and whether they determine a camera.
+"""The points of a head: their names, their positions in the head's frame, and a test whether they fix a camera.
 
-The frame is the paper's, right-handed: x forward, y up, z to the person's right (Lee & Chen 1985, §2.1).
+The head's frame is right-handed: x forward, y up, z to the person's right (Lee & Chen 1985, §2.1).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class HeadPoints(Record):
     names : tuple of str
         Unique name of each point.
     points : array (P, 3)
-        Metres. The origin of the frame is arbitrary: in Table A.2 the neck is at (-0.34, 0.52, 0).
+        Positions, metres. The origin of the head's frame is arbitrary: in `TABLE_A2` the neck is at (-0.34, 0.52, 0).
 
     Raises
     ------
@@ -62,16 +62,16 @@ class HeadPoints(Record):
 
     @classmethod
     def from_mapping(cls, points: Mapping[str, ArrayLike]) -> HeadPoints:
-        """Make head points from a mapping of names to positions, metres; names are free, and the order is kept."""
+        """Make head points from a mapping of names to positions, metres; keep the order of the mapping."""
         return cls(names=tuple(points), points=np.array(list(points.values()), dtype=np.float64))
 
     def with_points(self, points: Mapping[str, ArrayLike]) -> HeadPoints:
-        """Replace points by name and append new ones."""
+        """Return head points with some positions replaced by name, and new names appended."""
         return HeadPoints.from_mapping({**dict(zip(self.names, self.points, strict=True)), **points})
 
 
 def degeneracy(names: tuple[str, ...], points: Array, seen: Flags) -> str:
-    """Return the reason why the points (P, 3) that are `seen` (P,) determine no camera; empty if they do."""
+    """Return the reason why the seen points determine no camera; an empty string if they determine one."""
     count = int(seen.sum())
     if count < MIN_POINTS:
         missing = [name for name, visible in zip(names, seen, strict=True) if not visible]

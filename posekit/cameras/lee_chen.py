@@ -1,9 +1,9 @@
-r"""The camera of Lee & Chen 1985. Only this module converts between the paper's conventions and posekit's.
+r"""The camera of Lee & Chen 1985. Only this module converts between the conventions of this paper and of posekit.
 
-The paper's frame is left-handed: x right, y up, z away from the camera, with the origin *on the image plane*, f in
-front of the centre of projection, so that :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6). Inside posekit the
-camera is a pinhole with intrinsics ``diag(f, f, 1)``, y down and the origin in the centre of projection. The conversion
-changes the sign of y and adds f to z; it is exact in both directions.
+The paper's camera frame is left-handed: x right, y up, z away from the camera. Its origin is *on the image plane*, at
+the distance f in front of the centre of projection, so :math:`x' = f x / (z + f)` (Lee & Chen 1985, eqs. 1-6).
+posekit's camera frame has y down and its origin in the centre of projection; the intrinsics are ``diag(f, f, 1)``. The
+conversion from the paper to posekit changes the sign of y and adds f to z.
 """
 
 from __future__ import annotations
@@ -51,49 +51,50 @@ class LeeChenCamera(Camera):
         return np.asarray(image / per_frame("f", self.f, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
-        """Return the derivatives (F, ..., 2, 2) of image points by (x/z, y/z)."""
+        """Return the Jacobian (F, ..., 2, 2) of image points with respect to (x/z, y/z)."""
         distances = np.broadcast_to(per_frame("f", self.f, normalized.ndim), normalized.shape)
         return np.asarray(distances[..., None] * np.eye(2))
 
     def take(self, rows: Any) -> LeeChenCamera:
-        """Return the camera of some frames."""
+        """Return the camera of the selected frames."""
         return LeeChenCamera(f=self.f[rows]) if isinstance(self.f, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the fields of the camera in a file, with f in `unit`."""
+        """Return the camera as a mapping to write to a file, with f in `unit`."""
         return {"model": "lee-chen", "f": None if self.f is None else from_metres(self.f, unit).tolist()}
 
 
 def image_from_paper(image: Array) -> Array:
-    """Convert the paper's image points (y up) to posekit's (y down), or back: the map is its own inverse."""
+    """Convert image points from Lee & Chen's convention (y up) to posekit's (y down), or back."""
     return image * UP_FLIP[:2]
 
 
 def points_to_paper(points: Array, f: float | Array) -> Array:
-    """Convert points (F, ..., 3) from OpenCV's camera frame to the paper's; f is one number, or one per frame (F,)."""
+    """Convert points (F, ..., 3) from OpenCV's camera frame to Lee & Chen's; f is a number or an array (F,)."""
     return (points - _forward(f, points.ndim)) * UP_FLIP
 
 
 def rotation_to_paper(R: Array) -> Array:
-    """Convert R_cam_head (..., 3, 3) in OpenCV's convention to the matrix [R] that the paper prints (Table 2b).
+    """Convert R_cam_head (..., 3, 3) from OpenCV's convention to the matrix [R] of Lee & Chen (Table 2b).
 
-    Its columns are the right-handed camera's axes, right, up and backward, in the head's coordinates.
+    The columns of [R] are the camera's right, up and backward directions in the head's frame.
     """
     return np.stack([R[..., 0, :], -R[..., 1, :], -R[..., 2, :]], axis=-1)
 
 
 def camera_position(R: Array, t: Array, f: float | Array) -> Array:
-    """Return the paper's camera position (Table 2c): the image plane's origin in the head's coordinates.
+    """Return the camera position of Lee & Chen (Table 2c): the origin of the image plane, in the head's frame.
 
-    R (..., 3, 3) and t (..., 3) map the head's frame to OpenCV's camera frame; f is one number, or one per frame.
+    R (..., 3, 3) and t (..., 3) map the head's frame to OpenCV's camera frame; f is a number or an array (F,).
     """
     return np.asarray(np.einsum("...ji,...j->...i", R, _forward(f, t.ndim) - t))
 
 
 def transformation_matrix(R: Array, t: Array, f: float | Array) -> Array:
-    """Return the paper's matrix [T] (..., 4, 3) of eq. (1), scaled as in Table 2a.
+    """Return the projection matrix [T] (..., 4, 3) of Lee & Chen, eq. (1), scaled as in Table 2a.
 
-    ``(x, y, z, 1) [T] = (X, Y, H)`` maps a point of the head's frame to its image ``(X / H, Y / H)``, y up.
+    With ``(x, y, z, 1) [T] = (X, Y, H)``, the point (x, y, z) of the head's frame has the image ``(X / H, Y / H)``, y
+    up.
     """
     rows = np.concatenate([R, t[..., None]], axis=-1)
     distances = np.asarray(f, dtype=np.float64)[..., None]

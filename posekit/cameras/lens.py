@@ -26,13 +26,12 @@ CLOSE: Final = 1e-9
 
 
 def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> Array:
-    r"""Apply a lens to ideal image points.
+    r"""Apply lens distortion to ideal image points (x/z, y/z).
 
-    With :math:`r^2 = x^2 + y^2`, the radial factor is
-    :math:`(1 + k_1 r^2 + k_2 r^4 + k_3 r^6) / (1 + k_4 r^2 + k_5 r^4 + k_6 r^6)`; tangential, thin prism and tilt terms
-    follow (OpenCV's documentation of `calib3d`, "Detailed Description"). The fisheye model replaces r by
-    :math:`\theta_d = \theta (1 + k_1 \theta^2 + k_2 \theta^4 + k_3 \theta^6 + k_4 \theta^8)`,
-    :math:`\theta = \arctan r` (Kannala & Brandt 2006, as in OpenCV's `fisheye`).
+    With :math:`r^2 = x^2 + y^2`, the radial factor is :math:`(1 + k_1 r^2 + k_2 r^4 + k_3 r^6) / (1 + k_4 r^2 + k_5 r^4
+    + k_6 r^6)`; tangential, thin prism and tilt terms are added as in OpenCV (documentation of `calib3d`, "Detailed
+    Description"). The fisheye model replaces r by :math:`\theta_d = \theta (1 + k_1 \theta^2 + k_2 \theta^4 + k_3
+    \theta^6 + k_4 \theta^8)`, :math:`\theta = \arctan r` (Kannala & Brandt 2006, as in OpenCV's `fisheye`).
 
     Parameters
     ----------
@@ -55,8 +54,8 @@ def distort(normalized: Array, distortion: Array, *, fisheye: bool = False) -> A
 def undistort(distorted: Array, distortion: Array, *, fisheye: bool = False) -> Array:
     """Invert `distort`; NaN if no ray inside `fold_radius` projects to the point.
 
-    Newton's method converges from different starts for different lenses: the result of a fixed-point iteration (as
-    OpenCV's `undistortPoints`), the point itself, and a point near the optical axis are tried in turn.
+    Newton's method tries three starts in turn, because no single start converges for all lenses. They are the result of
+    a fixed-point iteration (as in OpenCV's `undistortPoints`), the point itself, and a point near the optical axis.
     """
     target = distorted.reshape(-1, 2)
     near, found = target, np.full_like(target, np.nan)
@@ -71,7 +70,7 @@ def undistort(distorted: Array, distortion: Array, *, fisheye: bool = False) -> 
 
 
 def lens_jacobian(normalized: Array, distortion: Array, *, fisheye: bool = False) -> Array:
-    """Return the derivatives (..., 2, 2) of `distort`, exact to rounding (complex step; Squire & Trapp 1998)."""
+    """Return the Jacobian (..., 2, 2) of `distort` by complex-step differentiation (Squire & Trapp 1998)."""
     tiny = 1e-100
     x, y = normalized[..., 0], normalized[..., 1]
     by_x = _bent(x + 1j * tiny, y + 0j, distortion, fisheye)
@@ -81,16 +80,16 @@ def lens_jacobian(normalized: Array, distortion: Array, *, fisheye: bool = False
 
 
 def lens_radius(normalized: Array, *, fisheye: bool = False) -> Array:
-    """Return the argument of the radial polynomial: r, or the angle to the optical axis of a fisheye lens."""
+    """Return the variable of the radial polynomial: r, or for a fisheye lens the angle to the optical axis, radians."""
     radius = np.linalg.norm(normalized, axis=-1)
     return np.asarray(np.arctan(radius) if fisheye else radius)
 
 
 def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
-    r"""Return the `lens_radius` at which the image folds back or the model has a pole; infinite if neither happens.
+    r"""Return the first `lens_radius` at which the distorted radius stops growing or has a pole; infinite if none.
 
-    It is the first zero of the slope of the radial function, or of its denominator. Beyond it a polynomial fitted to a
-    lens does not describe the lens.
+    It is the first zero of the radial function's derivative or denominator. Beyond this radius, the fitted polynomial
+    does not describe the lens.
     """
     if fisheye:
         k1, k2, k3, k4 = np.pad(distortion, (0, 4 - len(distortion)))
@@ -105,7 +104,7 @@ def fold_radius(distortion: Array, *, fisheye: bool = False) -> float:
 
 
 def _first_root(ascending: list[Array]) -> float:
-    """Return the square root of the smallest positive zero of polynomials in r^2 that are 1 at zero."""
+    """Return the smallest positive zero r of several polynomials in r^2, each of which is 1 at r = 0."""
     smallest = 0.0
     for coefficients in ascending:
         # The roots are found in 1 / r^2, where the leading coefficient is one even if the lens's coefficients are tiny.

@@ -35,11 +35,12 @@ class PinholeCamera(Camera):
         Intrinsics, pixels, with positive focal lengths; the centre of the first pixel is (0, 0), as in OpenCV.
     distortion : array (n,), optional
         Coefficients in OpenCV's order, n one of 0, 4, 5, 8, 12, 14: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4,
-        tau_x, tau_y. With `fisheye`, none or k1, k2, k3, k4 of that model.
+        tau_x, tau_y. A fisheye lens has no coefficients, or k1, k2, k3, k4.
     fisheye : bool
         Whether the lens is OpenCV's fisheye model (Kannala & Brandt 2006).
     R : array (3, 3), optional
-        Rotation from the world to the camera: ``p_cam = R p_world + t``. A rounded R is made orthonormal.
+        Rotation from the world to the camera: ``p_cam = R p_world + t``. If the entries of R are rounded, R is replaced
+        by the nearest rotation.
     t : array (3,), optional
         Translation from the world to the camera, metres.
     size : (int, int), optional
@@ -49,9 +50,9 @@ class PinholeCamera(Camera):
     name : str
         Name of the camera in its file.
     how : str
-        ``calibrated``, or a description of the guess.
+        ``calibrated``, or a text that says how the focal length was guessed.
     deviation : float
-        Standard deviation of a guessed focal length as a fraction of it; 0 if calibrated.
+        Relative standard deviation of a guessed focal length; 0 if the camera is calibrated.
 
     Raises
     ------
@@ -115,7 +116,7 @@ class PinholeCamera(Camera):
             raise self._refused("deviation", f"{self.deviation:g}", "a fraction of the focal length below 1")
 
     def _rotation(self, given: Array) -> Array:
-        """Return the rotation nearest to a rounded matrix (3, 3)."""
+        """Return the rotation matrix nearest to a matrix (3, 3) with rounded entries."""
         with np.errstate(over="ignore", invalid="ignore"):
             off = np.abs(given @ given.T - np.eye(3)).max() if given.shape == (3, 3) else np.inf
         if not off <= ROTATION_ROUNDING:
@@ -142,7 +143,8 @@ class PinholeCamera(Camera):
     def project(self, points: Array) -> Array:
         """Project points (..., 3), camera frame, metres, to pixels (..., 2).
 
-        Points that are not in front of the camera, or beyond the radius where the lens model folds, become NaN.
+        A pixel is NaN if its point is behind the camera, or outside the valid radius of the lens model
+        (`lens.fold_radius`).
         """
         depth = points[..., 2:]
         normalized = points[..., :2] / np.where(depth > 0, depth, np.nan)
@@ -163,18 +165,18 @@ class PinholeCamera(Camera):
         return lens.undistort(normalized, self.distortion, fisheye=self.fisheye)
 
     def jacobian(self, normalized: Array) -> Array:
-        """Return the derivatives (..., 2, 2) of pixels by ideal image points (..., 2)."""
+        """Return the Jacobian (..., 2, 2) of pixels with respect to ideal image points (..., 2)."""
         scale = self.K[:2, :2]
         if self.distortion is None:
             return np.broadcast_to(scale, (*normalized.shape[:-1], 2, 2))
         return np.asarray(scale @ lens.lens_jacobian(normalized, self.distortion, fisheye=self.fisheye))
 
     def take(self, rows: Any) -> PinholeCamera:
-        """Return the camera of some frames, which is the same for all frames."""
+        """Return this camera, because it is the same for all frames."""
         return self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the fields of the camera in a file, with t in `unit`."""
+        """Return the camera as a mapping to write to a file, with t in `unit`."""
         optional = {
             "distortion": None if self.distortion is None else self.distortion.tolist(),
             "fisheye": self.fisheye,
@@ -199,9 +201,10 @@ def camera_from_fov(
     name: str = "",
     deviation: float = FOCAL_DEVIATION,
 ) -> PinholeCamera:
-    r"""Guess a camera from its angle of view, :math:`f = d / (2 \tan(\alpha / 2))`.
+    r"""Guess a camera from its angle of view :math:`\alpha`: :math:`f = d / (2 \tan(\alpha / 2))`.
 
-    Pixels are square, the principal point is in the middle, and there is no distortion.
+    Here d is the picture's diagonal, width or height, pixels. Pixels are square, the principal point is in the middle
+    of the picture, and there is no distortion.
 
     Parameters
     ----------
@@ -210,9 +213,9 @@ def camera_from_fov(
     fov_degrees : float
         The angle of view, between 0 and 180 degrees.
     axis : str
-        Direction of the angle: ``diagonal``, ``horizontal`` or ``vertical``.
+        Direction in which the angle is measured: ``diagonal``, ``horizontal`` or ``vertical``.
     deviation : float
-        Standard deviation of f as a fraction of it.
+        Relative standard deviation of f.
 
     Raises
     ------

@@ -27,7 +27,7 @@ class ScaledOrthographicCamera(Camera):
     scale : float or array (F,), optional
         s, pixels per metre, one number or one per frame; None if unknown.
     aspect : float
-        Ratio of a pixel's width to its height. u is multiplied by it, and s is the scale of v.
+        Ratio of a pixel's width to its height. u is multiplied by this ratio, so that the scale s fits both axes.
 
     Raises
     ------
@@ -54,20 +54,22 @@ class ScaledOrthographicCamera(Camera):
         return np.asarray(image * np.array([self.aspect, 1.0]) / per_frame("scale", self.scale, image.ndim))
 
     def jacobian(self, normalized: Array) -> Array:
-        """Return the derivatives (F, ..., 2, 2) of pixels by x, y (F, ..., 2)."""
+        """Return the Jacobian (F, ..., 2, 2) of pixels with respect to x, y (F, ..., 2), metres."""
         scale = per_frame("scale", self.scale, normalized.ndim) / np.array([self.aspect, 1.0])
         return np.asarray(np.broadcast_to(scale, normalized.shape)[..., None] * np.eye(2))
 
     def rays(self, image: Array) -> tuple[Array, Array]:
-        """Return origins at depth 0 and directions (0, 0, 1), both (F, ..., 3), of pixels (F, ..., 2)."""
+        """Return the rays of pixels (F, ..., 2): origins at depth 0 and directions (0, 0, 1), both (F, ..., 3)."""
         place = self.normalize(image)
         origin = np.concatenate([place, np.zeros_like(place[..., :1])], axis=-1)
         return origin, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origin.shape)
 
     def lift(self, start: Array, rays: tuple[Array, Array], length: Array, *, tolerance: float) -> Lift:
-        r"""Compute the candidates for the far ends of segments, at the start's depth plus or minus dZ.
+        r"""Compute the near and far positions of segments' ends, at the start's depth minus and plus dZ.
 
-        :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}` (Taylor 2000, eq. 2). No point is behind this camera.
+        :math:`dZ = \sqrt{l^2 - |\Delta xy|^2}` (Taylor 2000, eq. 2), with the segment's length l and the difference
+        :math:`\Delta xy` between the x and y of its ends. All depths are valid, because this camera has no optical
+        centre.
         """
         place = rays[0][..., :2]
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
@@ -85,11 +87,11 @@ class ScaledOrthographicCamera(Camera):
         return Lift(np.concatenate([beside, depth[..., None]], axis=-1), valid, excess)
 
     def take(self, rows: Any) -> ScaledOrthographicCamera:
-        """Return the camera of some frames."""
+        """Return the camera of the selected frames."""
         return replace(self, scale=self.scale[rows]) if isinstance(self.scale, np.ndarray) else self
 
     def fields(self, unit: str = "m") -> dict[str, Any]:
-        """Return the fields of the camera in a file, with the scale in pixels per `unit`."""
+        """Return the camera as a mapping to write to a file, with the scale in pixels per `unit`."""
         scale = None if self.scale is None else (np.asarray(self.scale) / PER_METRE[unit]).tolist()
         fields: dict[str, Any] = {"model": "scaled-orthographic", "scale": scale}
         return fields if self.aspect == 1 else {**fields, "aspect": self.aspect}

@@ -39,12 +39,12 @@ class View(Record):
     Parameters
     ----------
     camera : PinholeCamera, ScaledOrthographicCamera or LeeChenCamera
-        The camera; unknown parameters are None, and lengths are in metres.
+        The camera; its unknown parameters are None.
     time : array (F,)
         Seconds.
     image : array (F, 14, 2)
-        Image points of the joints, in tree order, y down: pixels, or metres on the image plane of Lee & Chen's camera.
-        At least one joint is known in at least one frame.
+        Image points of the joints, in the order of `posekit.skeleton.JOINTS`, y down. The unit is pixels, or metres on
+        the image plane for Lee & Chen's camera. At least one joint is known in at least one frame.
     head_image : array (F, 5, 2), optional
         Image points of the head, in the order of `posekit.skeleton.HEAD_POINTS`.
     own_head_image : array (F, K, 2), optional
@@ -52,28 +52,30 @@ class View(Record):
     confidence : array (F, 19), optional
         Confidence of the image points of joints and head points, as reported by the detector, usually 0 to 1.
     root : array (F, 3), optional
-        The neck, OpenCV camera frame, metres.
+        Position of the neck, OpenCV camera frame, metres.
     truth : array (F, 14, 3), optional
-        The true joints, OpenCV camera frame, metres.
+        True joint positions, OpenCV camera frame, metres.
     lengths : mapping of str to float, optional
-        Lengths in metres of the segments that differ from the figure's, by `posekit.skeleton.SEGMENT_NAMES`.
+        Segment lengths, metres, by name (`posekit.skeleton.SEGMENT_NAMES`). A segment without an entry has the figure's
+        length.
     shoulders : {"front", "behind"}, optional
-        Side of the line from neck to pelvis on which the shoulders lie: lengths do not determine it.
+        Whether the shoulders lie in front of or behind the line from neck to pelvis. Segment lengths do not determine
+        this.
     stature : float, optional
         Height of the person, metres.
     deviation : float, optional
         Standard deviation of each coordinate of the image points, pixels.
     length_deviation : float, optional
-        Relative standard deviation of the person's lengths, 0 to 0.3; 0 if they are exact.
+        Relative standard deviation of the person's segment lengths, 0 to 0.3; 0 if the lengths are exact.
     derived : tuple of str
-        Joints of `image` that the detector does not report; they were computed from joints that it reports.
+        Joints of `image` that were computed from other joints, because the detector does not report them.
     head_points : mapping of str to array (3,), optional
         Points of the rigid head in the head's frame, metres: the neck, some or all of `HEAD_POINTS`, and any number of
         points with other names (Lee & Chen 1985, §2.1, recommend more than six points).
     unit : {"m", "cm", "mm"}
         Unit of lengths in the view's file; in memory all lengths are in metres.
     source : str
-        File that the view came from; empty if there is none.
+        File that the view was read from; empty if there is none.
     pictures : tuple of str
         Names of the pictures, one per frame; empty if there are none.
     layout : str
@@ -157,7 +159,7 @@ class View(Record):
 
     @property
     def own_head_names(self) -> tuple[str, ...]:
-        """The head points beyond neck, nose, eyes and ears."""
+        """Names of the head points other than neck, nose, eyes and ears."""
         return own_names(self.head_points or ())
 
     def take(self, rows: Ints | Sequence[int] | slice) -> View:
@@ -206,12 +208,12 @@ class View(Record):
 
 
 def own_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of head points that are the user's own."""
+    """Return the names of head points other than neck, nose, eyes and ears."""
     return tuple(name for name in names if name not in HEAD_NAMES)
 
 
 def is_head_name(name: str) -> bool:
-    """Return whether a head point can have this name: short, printable, and not a joint's."""
+    """Return whether a head point may have this name: short, printable, and not a joint (except the neck)."""
     short_enough = 0 < len(name.strip()) <= len(name) <= MAX_NAME_CHARACTERS
     return name in HEAD_NAMES or (short_enough and name.isprintable() and name not in JOINTS)
 

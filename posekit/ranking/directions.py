@@ -72,18 +72,18 @@ def directions(joints: Array, up: Array | None = None) -> Array:
 
 
 def log_room(joints: Array) -> Array:
-    r"""Return the logarithm (N,) of the solid angle of segment directions per area of the image, minus its mean.
+    r"""Return the sum (N,) over limb segments of log(solid angle of directions / image area), minus its mean.
 
-    A direction is a point on the unit sphere, and its image is the projection of that point:
-    :math:`d\omega = dA / |\cos\theta|`, with :math:`\theta` the angle between segment and ray. The same area of the
+    Directions of a segment are points of the unit sphere. A solid angle :math:`d\omega` of them has the image area
+    :math:`dA = |\cos\theta|\, d\omega`, with :math:`\theta` the angle between segment and ray. The same area of the
     image corresponds to more directions if the segment is parallel to the image than if it points to the camera.
     Because noise blurs directions, :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
-        Camera frame, any unit. The rays of a posture are parallel to z if one of its joints is not in front of the
-        camera. A segment with an unknown end contributes 0.
+        Camera frame, any unit. If a joint is not in front of the camera, all rays of its posture are assumed parallel
+        to z. A segment with an unknown end contributes 0.
     """
     parallel = np.asarray((joints[:, :, 2] <= 0).any(axis=1))[:, None, None]
     along = joints[:, ENDS] - joints[:, STARTS]

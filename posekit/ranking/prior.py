@@ -1,12 +1,12 @@
-r"""The prior of postures: mixtures of t distributions of segment directions, and the weights of all log terms.
+r"""The prior of postures: mixtures of t distributions of segment directions, and weights for `log_terms`.
 
 .. math::
 
     \log p(x) = c + \log \sum_k s_k \left(1 + \frac{(x - m_k)^T S^{-1} (x - m_k)}{\nu}\right)^{-(\nu + d) / 2}
 
-The marginal distribution of some coordinates has the same form, with their rows of m and their rows and columns of S
-(Kotz & Nadarajah 2004, Multivariate t distributions and their applications, §1.10). Unknown coordinates are removed in
-this way.
+Here s are weights, m centres, S is the scale matrix, and :math:`\nu` the degrees of freedom. The marginal distribution
+of the known coordinates has the same form, with the known rows of m and the known rows and columns of S (Kotz &
+Nadarajah 2004, Multivariate t distributions and their applications, §1.10).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ UNEVEN: Final = np.sqrt(2.0 + np.arange(3 * len(DIRECTION_NAMES)))
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StudentMixture(Record):
-    """A mixture of K multivariate t distributions of d coordinates, with one scale matrix and different centres.
+    """A mixture of K multivariate t distributions of d coordinates, with different centres and a common scale matrix.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class StudentMixture(Record):
         return {}
 
     def _log_sum(self, x: Array, count: int) -> Array:
-        """Return the log of the sum over the components at points (N, d)."""
+        """Return the logarithm (N,) of the sum over k in the module's formula, at points x (N, d)."""
         W = self.whitening[:count, :count]
         points, middles = x[:, :count] @ W.T, self.means[:, :count] @ W.T
         # 1 + |p - m|^2 / nu, as one product of matrices.
@@ -135,20 +135,22 @@ def digamma(x: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Prior(Record):
-    r"""A prior of postures, and the weights of the log terms of `posekit.ranking.log_terms`.
+    r"""A prior of postures, and the weights of the terms of `posekit.ranking.log_terms`.
 
     Parameters
     ----------
     blocks : sequence of (names, StudentMixture, bool)
-        For each block: names of directions, their joint distribution, and whether only the conditional density of `up`
-        given the other directions is used.
+        Each block has the names of some directions and their joint distribution. If the bool is true, only the
+        conditional density of `up` given the other directions is used.
     temperature : float
-        Metres. The log-density of directions of exact postures is divided by 1 + deviation / temperature, because
-        errors of a centimetre change directions by more than the width of the prior's peaks.
+        Metres. For exact postures, the log-density of directions is divided by 1 + deviation / temperature, with the
+        standard deviation of the joints. Without this, errors of a centimetre change directions by more than the width
+        of the prior's peaks.
     weights, noisy : mapping of str to float
-        Weight of each log term for exact postures, and for modes under noise.
+        Weights of the terms by name: for exact postures, and for modes of noisy image points.
     balance, contact : (float, float)
-        Scale s (m) and mean u of the log-density :math:`u - \log(1 + (d / s)^2)` of a distance d of `standing`.
+        Scale s (metres) and constant u of the log-density :math:`u - \log(1 + (d / s)^2)`. The distance d is a result
+        of `posekit.ranking.standing.standing`.
     """
 
     blocks: Sequence[tuple[tuple[str, ...], StudentMixture, bool]]
@@ -165,9 +167,9 @@ class Prior(Record):
         Parameters
         ----------
         found : array
-            `posekit.ranking.directions.directions`, with `up` or without.
+            Result of `posekit.ranking.directions.directions`, with or without `up`.
         sine : float
-            Sine of the standard deviation of `up`; its square is added to the variance.
+            Sine of the angular standard deviation of `up`; its square is added to the variances of `up`.
 
         Returns
         -------
@@ -195,7 +197,7 @@ class Prior(Record):
 
 @lru_cache(maxsize=4)
 def load_prior(name: str = "people") -> Prior:
-    """Load a prior by name, or from a TOML file of the same form as the built-in prior.
+    """Load a prior by its name, or from a TOML file with the same keys as the built-in prior.
 
     Raises
     ------
@@ -221,7 +223,7 @@ def load_prior(name: str = "people") -> Prior:
 
 
 def _block(table: Mapping[str, Any], dof: float) -> tuple[tuple[str, ...], StudentMixture, bool]:
-    """Read one block. Matrices are texts with a row in each line; the scale is a lower triangle."""
+    """Read one block. A matrix is a text with one row per line; the scale matrix has only its lower triangle."""
     names = tuple(table["directions"])
     scale = np.zeros((3 * len(names), 3 * len(names)))
     for row, line in enumerate(table["scale"].splitlines()):

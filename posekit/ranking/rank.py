@@ -45,7 +45,7 @@ class Up(Record):
     deviation : float
         Standard deviation of the direction, degrees.
     source : str
-        Description of the direction's origin, for the result.
+        Text that says where the direction comes from; results contain it.
     """
 
     direction: Array
@@ -63,7 +63,7 @@ class Up(Record):
 
 
 def deviation_of_tolerance(rigid: float) -> float:
-    """Return the standard deviation (m) of the joints of exact survivors that follows from the tree's tolerance (m)."""
+    """Convert the tree's tolerance of rigid distances (m) to a standard deviation (m) of the survivors' joints."""
     return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
 
 
@@ -78,7 +78,7 @@ def log_terms(
     up: Up | None = None,
     prior: Prior | None = None,
 ) -> dict[str, Array]:
-    """Return the weighted log terms (N,) of postures, by name; their sum is the log of an unnormalised probability.
+    """Return terms (N,) by name; their sum is the logarithm of the unnormalised probability of each posture.
 
     Parameters
     ----------
@@ -87,24 +87,26 @@ def log_terms(
     deviation : float
         Standard deviation of the joints of exact postures, metres.
     chi2 : array (N,), optional
-        Chi-square of modes under noise. Without it, the errors of the four rigid distances are used.
+        Chi-square of modes of noisy image points. Without it, the term ``image`` uses the errors of the four rigid
+        distances in torso and hips.
     log_volume : array (N,), optional
         Half the log determinant of the covariance of each mode.
     lengths : array (17,), optional
         Segment lengths in the order of `posekit.skeleton.SEGMENTS`, metres, for exact postures.
     length_residual : array (N,), optional
-        Metres by which the worst segment is too short to reach the ray of its image point.
+        Largest distance by which a segment of each posture is too short to reach its ray, metres.
     up : Up, optional
-        The up direction; without it there are no terms for gravity, balance and contact.
+        The up direction; without it, there are no terms ``balance`` and ``contact``, and ``gravity`` is 0.
     prior : Prior, optional
         The prior of postures; by default the built-in prior.
 
     Notes
     -----
-    The terms are ``image``, ``posture`` (directions of segments in the torso's frame), ``gravity`` (up given the
-    posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and ``foreshortening``; modes
-    under noise also have ``volume``. The mean over true postures is subtracted from each term except chi2, so that a
-    term that cannot be evaluated is 0.
+    The terms are ``image`` (fit to the image), ``posture`` (directions of segments in the torso's frame), ``gravity``
+    (up direction given the posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and
+    ``foreshortening`` (`posekit.ranking.directions.log_room`). Modes of noisy image points also have ``volume``
+    (`log_volume`). Each term except chi2 is relative to its mean over true postures; a term that cannot be evaluated is
+    0.
     """
     prior = prior or load_prior()
     # In this order NumPy's inner loops run over postures, not over x, y, z.
@@ -133,7 +135,7 @@ def log_terms(
 
 
 def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: float) -> Array:
-    """Return the log-density (N,) of the errors of rigid distances and of the length residual, minus its mean."""
+    """Return the log-density (N,) of the errors of rigid distances and of the length residual, relative to its mean."""
     start, end = np.array(RIGID_SEGMENTS).T
     apart = joints[:, end] - joints[:, start]
     off = np.sqrt(dot(apart, apart)) - lengths[-len(RIGID_SEGMENTS) :]
@@ -149,8 +151,8 @@ def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: fl
 def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
     """Return probabilities (N,) proportional to the exponential of scores (N,); they sum to one over each frame.
 
-    `frame` (N,) is the frame of each score, from 0. All members of a frame are equally probable if all its scores are
-    minus infinity.
+    `frame` (N,) is the index of the frame of each score. If all scores of a frame are minus infinity, its probabilities
+    are equal.
     """
     if not len(score):
         return np.empty(0)

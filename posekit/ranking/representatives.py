@@ -1,4 +1,4 @@
-"""Representatives: a few postures of a frame; the postures near them have nearly all of the frame's probability."""
+"""Representatives: a few postures of a frame that stand for all likely postures within 5 cm of them."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
     Parameters
     ----------
     shape : array (N, 14, 3)
-        Postures by frame, the likeliest first, metres.
+        Joint positions of postures, metres, sorted by frame and then by descending probability.
     frame : int array (N,)
         Frame of each posture, 0 to K - 1.
     weight : array (N,)
         Probability of each posture; within a frame the sum is one.
     hold : array (K,)
-        Total probability to reach in each frame.
+        Total probability that the representatives of each frame must reach, with the postures near them.
 
     Returns
     -------
     rows : int array (R,)
-        Representatives, frame by frame; in a frame, the one with the largest `held` comes first.
+        Indices of the representatives, sorted by frame and then by descending `held`.
     held : array (R,)
-        Total probability of the postures within 5 cm of each representative, itself included; a posture near several
-        representatives counts for the first one.
+        Total probability of each representative and the postures within 5 cm of it. A posture near several
+        representatives counts only for the first of them that was chosen.
     """
     one, other = _near(shape, frame)
     rows, rest, left = np.arange(len(frame)), weight.copy(), hold.copy()

@@ -1,7 +1,7 @@
-r"""Balance of a standing person: distance of the centre of mass from the support, and height of the ankles.
+r"""Balance of a standing person: distance of the centre of mass from the base of support, and height of the ankles.
 
 One picture does not show the height of the ground. A standing person is supported by the lower foot, and by both feet
-if both are low. The support is the line from the lower ankle towards the higher ankle, shortened by the factor
+if both are low. The base of support is a line from the lower ankle towards the higher ankle, shortened by the factor
 :math:`e^{-h^2 / 2 (10 cm)^2}`, with h the height difference of the ankles.
 """
 
@@ -53,7 +53,7 @@ def centre_of_mass(joints: Array) -> Array:
 
 
 def standing(joints: Array, up: Array) -> tuple[Array, Array]:
-    """Return the distance of the centre of mass from the support, and the height difference of the ankles.
+    """Return the distance of the centre of mass from the base of support, and the height difference of the ankles.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def standing(joints: Array, up: Array) -> tuple[Array, Array]:
     Returns
     -------
     off : array (N,)
-        Horizontal distance of the centre of mass from the support, metres; NaN if neck, a hip or an ankle is unknown.
+        Horizontal distance of the centre of mass from the base of support, metres; NaN if neck, a hip or an ankle is
+        unknown.
     apart : array (N,)
         Height of one ankle above the other, metres; NaN if an ankle is unknown.
     """

@@ -1,11 +1,12 @@
-r"""Joint ranges and their couplings as arrays of numbers, which the solver and the check of joint ranges share.
+r"""Joint ranges as arrays of numbers, which the solver and the check of joint ranges share.
 
-A limb has four angles in closed form, :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` of the ball joint in the parent's
-frame (x forward, y left, z up) and the hinge's :math:`\varepsilon` about y. Up to four sets of angles have the same two
-segment directions. The limb is within its limits if every angle of one set is between its bounds. A bound is a constant
-or a piecewise linear function of another angle (a coupling). A range may also shrink if other angles of the joint are
-near their limits (a joint sinus). If the table has a bound of elevation, an arm is judged by elevation, plane of
-elevation and axial turn, because flexion and abduction are singular for an arm that points sideways.
+A limb has four angles. The shoulder or hip has the Euler angles :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` in the frame
+of torso or hips (x forward, y left, z up). The elbow or knee, a hinge, has the angle :math:`\varepsilon` about y. Up to
+four sets of these angles give the same directions of the limb's two segments. The limb is within its limits if at least
+one set has every angle between its bounds. A bound is a constant or a piecewise linear function of another angle (a
+coupling). A range may also shrink if other angles of the joint are near their limits (a joint sinus). If the table of
+joint ranges bounds elevation, arms are judged by elevation, plane of elevation and axial rotation. Flexion and
+abduction are singular for an arm that points sideways.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class Limits:
         above_hips: float = 0.1,
         pelvis_between_hips: bool = False,
     ) -> Limits:
-        """Convert a table of joint ranges.
+        """Convert a table of joint ranges to arrays of numbers.
 
         Parameters
         ----------
@@ -102,8 +103,8 @@ class Limits:
         above_hips : float
             Distance of the pelvis joint from the line between the hips, metres.
         pelvis_between_hips : bool
-            Whether the pelvis joint is on the line between the hips. The frame of the hips then follows from the spine,
-            and the pelvis may be flexed within its range.
+            Whether the pelvis joint is on the line between the hips. Joint positions then do not show the flexion of
+            the pelvis, so any flexion within its range is allowed.
 
         Returns
         -------
@@ -139,7 +140,7 @@ class Limits:
 
     @property
     def names(self) -> list[str]:
-        """Names (19,) of the angles that have limits: three of the pelvis, then four of each limb."""
+        """Names of the 19 angles that have limits: three of the pelvis, then four of each limb."""
         first = "shoulder.elevation" if self.numbers["by_elevation"] else KINDS[0][0]
         angles = [(first, *KINDS[0][1:]), KINDS[1]]
         limbs = [f"{name.split('_')[0]}_{angle}" for k, name in enumerate(LIMBS) for angle in angles[k // 2]]
@@ -148,25 +149,26 @@ class Limits:
     def read(
         self, limb: int, rotations: Array, tolerance: float = 0.0, writing: Ints | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the angles of limbs and the bounds of these angles, for all W equivalent sets of Euler angles.
+        """Return the angles of one limb in N postures and their bounds, for all W equivalent sets of angles.
 
         Parameters
         ----------
         limb : int
             Index in `LIMBS`.
         rotations : array (N, 4)
-            Angles of the closed form (`posekit.body.angles.limb_branch`), radians.
+            The angles that `posekit.body.angles.limb_branch` returns, radians.
         tolerance : float
-            Tolerance of the joint sinus, radians.
+            Tolerance of the angles that enter the joint sinus, radians.
         writing : int array (N,), optional
-            Number of the set of angles to return for each limb; all sets if not given.
+            Index of the set of angles to return for each posture; all sets if not given.
 
         Returns
         -------
         value, lower, upper : array (N, W, 4)
-            Flexion or elevation, abduction, rotation, hinge, radians; bounds are infinite for an angle without limits.
+            Flexion (or elevation), abduction, rotation and hinge angle, and their bounds, radians. Bounds are infinite
+            for an angle without limits.
         bend : array (N,)
-            Sine of the hinge's bend.
+            Absolute value of the sine of the hinge angle.
         """
         n, kind = self.numbers, limb // 2
         arm = kind == 0 and bool(n["by_elevation"])
@@ -204,16 +206,16 @@ class Limits:
     def _bounds(
         self, limb: int, angles: Array, readings: list[Array], tolerance: float
     ) -> tuple[Array, Array, dict[int, Array], list[Array]]:
-        """Return the bounds of limbs with couplings and sinus applied.
+        """Return the bounds of a limb's angles, with couplings and joint sinus applied.
 
         Returns
         -------
         lower, upper : array (N, W, 4)
             Bounds of the four angles, radians.
         turns : dict of int to array (N, W)
-            Bounds of the turn of an arm: key 0 is the lower bound, key 1 the upper.
+            Bounds of the axial rotation of an arm: key 0 is the lower bound, key 1 the upper bound.
         outward : list of two arrays (N, W)
-            Angles by which valgus widens the rotation's lower and upper bound, radians.
+            Angles by which valgus of elbow or knee widens the lower and the upper bound of rotation, radians.
         """
         n, kind, shape = self.numbers, limb // 2, angles.shape[:2]
         bounds = [np.broadcast_to(n["limit"][limb, :, k], angles.shape).copy() for k in range(2)]
@@ -248,11 +250,12 @@ class Limits:
         return bounds[0], bounds[1], turns, outward
 
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
-        r"""Return the excess of limb angles over their limits (N, 4), radians, and the set of Euler angles used (N,).
+        r"""Return the excess of limb angles over their limits (N, 4), radians, and the index (N,) of the set used.
 
-        Without `writing`, the set of angles that violates its limits least is used. A rotation that exceeds its limit
-        by v has the residual :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`, which vanishes for a straight limb, whose
-        rotation is not determined. The first angle is weighted in the same way near its singularity.
+        Without `writing`, the set of angles that violates its limits least is used. An axial rotation that exceeds its
+        limit by v has the residual :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`. It vanishes for a straight limb,
+        because its axial rotation is undetermined. Flexion is weighted in the same way with :math:`\cos\beta` instead
+        of :math:`\sin\varepsilon`.
         """
         value, lower, upper, _ = self.read(limb, rotations, writing=writing)
         above, below = value - upper, lower - value
@@ -267,7 +270,7 @@ class Limits:
 
 
 def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -> None:
-    """Write the couplings and sinuses of a table of ranges into the record `n`."""
+    """Write the couplings and joint sinuses of a table of joint ranges into the record `n`."""
     couplings = ranges.get("coupling", ())
     longest = max((len(one["points"]) for one in couplings), default=0)
     if len(couplings) > MAX_COUPLINGS or longest > MAX_KNOTS:
@@ -291,16 +294,17 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -
 
 
 def _place(kind: int, angle: str) -> int:
-    """Return the index of a limb angle: 0 to 3 for the four angles of the closed form, 4 and more for `READINGS`."""
+    """Return the index of a limb angle: 0 to 3 for the angles in `KINDS`, 4 to 7 for the angles in `READINGS`."""
     return KINDS[kind].index(angle) if angle in KINDS[kind] else 4 + READINGS.index(angle.split(".")[1])
 
 
 def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
-    r"""Return the error of axial rotations due to valgus, radians, and whether the hinge bends naturally.
+    r"""Return the error of axial rotation due to valgus, radians, and whether the hinge bends in its natural direction.
 
-    The rotation is computed from the lower segment. If this segment leaves the hinge's plane by the angle v, the
-    rotation is wrong by :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`. Ranges of
-    rotation are measured at a bend of 90 degrees, so the error at that bend (`square`) is subtracted.
+    Axial rotation of the upper segment is computed from the direction of the lower segment. If the lower segment leaves
+    the hinge's plane by the angle v, the rotation is wrong by :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of
+    :math:`\varepsilon`. Ranges of rotation are measured at a bend of 90 degrees, so the error at that bend (`square`)
+    is subtracted.
     """
     off, sine = np.maximum(end, 0.0), np.sin(hinge)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -311,9 +315,9 @@ def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
 def _round_off(
     n: NDArray[np.void], limb: int, angles: Array, bounds: list[Array], means: list[Array], slack: float
 ) -> None:
-    """Narrow the bounds of abduction and rotation in place where the preceding angles are far from mid-range.
+    """Apply a joint sinus in place: narrow abduction and rotation where the preceding angles are far from mid-range.
 
-    `slack` is the tolerance of angles, radians; it widens the ranges that measure the distance from the middle.
+    The distance from mid-range is a fraction of half the range plus the tolerance `slack`, radians.
     """
     limit, mean, power = n["limit"][limb], n["mean"][limb // 2], n["sinus"][limb // 2]
     used = np.zeros(angles.shape[:2])
@@ -331,6 +335,6 @@ def _round_off(
 
 
 def limb_directions(joints: Array, limb: int) -> tuple[Array, Array]:
-    """Return the unit directions of the upper and lower segment of one limb (N, 3)."""
+    """Return the unit directions of the upper and the lower segment of one limb, both (N, 3)."""
     start, middle, end = joints[:, STARTS[limb]], joints[:, MIDDLES[limb]], joints[:, ENDS[limb]]
     return unit(middle - start), unit(end - middle)

@@ -43,7 +43,7 @@ KNOWN: Final = np.array([UNKNOWN_PLACE_METRES**-2, HIDDEN_METRES**-2, TURN_INFOR
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Modes:
-    """M modes of the frames of a problem, sorted by frame and then by chi2, the smallest first.
+    """The M modes of all frames of a problem, sorted by frame and then by ascending chi2.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Modes:
     frame : int array (M,)
         Frame of each mode.
     x : array (M, 43)
-        Unknowns: joints, camera frame, metres, and the logarithm of the size.
+        Unknowns: 42 joint coordinates, camera frame, metres, and the logarithm of the body's size (see `size`).
     chi2 : array (M,)
         Sum of squared residuals.
     """
@@ -73,7 +73,7 @@ class Modes:
 
     @property
     def size(self) -> Array:
-        """Logarithm of the ratio of each body's size to the given lengths (M,)."""
+        """Logarithm (M,) of the factor that scales all given lengths to the lengths of the mode."""
         return self.x[:, 42]
 
     def take(self, rows: Ints | Flags | slice) -> Modes:
@@ -84,7 +84,7 @@ class Modes:
     def log_evidence(self) -> Array:
         r"""Laplace approximation of the logarithm of each mode's evidence (M,), up to a constant of its frame.
 
-        :math:`-\chi^2 / 2 - \ln \det H / 2`.
+        It is :math:`-\chi^2 / 2 - \ln \det H / 2`, with H the information matrix of the unknowns.
         """
         found = run("log_determinants", self.problem, self.frame, self.x, KNOWN)
         return np.asarray(-self.chi2 / 2 - found / 2)
@@ -96,7 +96,8 @@ class Modes:
     def residuals(self) -> Mapping[str, Array]:
         """Return the absolute value of every residual of all modes (M,), in standard deviations, by name.
 
-        Names are ``image right_wrist``, ``length neck-pelvis``, ``root``, ``size`` and ``limit right_elbow.flexion``.
+        Names are, for example, ``image right_wrist``, ``length neck-pelvis``, ``root``, ``size`` and ``limit
+        right_elbow.flexion``.
         """
         x, joints, p, limits = self.x, self.joints, self.problem.records[self.frame], self.problem.limits
         root = np.einsum("nab,nb->na", p["root_weight"], joints[:, 0] - p["root"])
@@ -120,11 +121,11 @@ def distinct(
     within: float | Array,
     sure: bool = False,
 ) -> Flags:
-    """Return a mask of the bodies (N, 43) that differ from every kept body of lower chi2 in their group.
+    """Return a mask (N,) of distinct bodies: each differs from every kept body of lower chi2 in its group.
 
-    Bodies are sorted by group, then by chi2. Two bodies are the same if no joint of `parts`, relative to the neck,
-    differs by more than `within` metres, a number or (N,). With `sure`, they are also the same if their difference is
-    within their uncertainty (`MERGE_CHI2`).
+    The bodies `x` (N, 43) are sorted by group, then by chi2. Two bodies are the same if no joint of the body parts
+    `parts`, relative to the neck, differs by more than `within` metres. With `sure`, they are also the same if their
+    difference is small compared with their standard deviations (`MERGE_CHI2`).
     """
     near = np.broadcast_to(np.asarray(within, dtype=np.float64), group.shape)
     reach = MERGE_REACH_METRES if sure else 0.0

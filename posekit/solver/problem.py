@@ -1,7 +1,8 @@
 r"""The data of the solver: image points, root, segment lengths and joint limits, each with its standard deviation.
 
-The unknowns of a frame are its 14 joint positions in the camera frame and the logarithm s of a size that all lengths
-share. With :math:`\pi` the projection, the residuals are
+The unknowns of a frame are the 14 joint positions X in the camera frame, and the logarithm s of a common factor on all
+segment lengths. Let :math:`\pi` be the projection, r the normalised image points, :math:`\mu` the known neck position,
+and l the given segment lengths. The residuals, in standard deviations, are
 
 .. math::
 
@@ -81,7 +82,7 @@ class Problem:
     records : records (F,) of `PROBLEM`
         The frames, all seen by one kind of camera.
     limits : Limits, optional
-        Joint ranges; postures beyond them have residuals.
+        Joint ranges; angles beyond them have residuals.
     """
 
     records: NDArray[np.void]
@@ -100,27 +101,26 @@ class Problem:
         limits: Limits | None = None,
         robust: bool = False,
     ) -> Problem:
-        """Make the problem of a view: image points of a camera, and the prior knowledge of the person.
+        """Make a problem from the image points of a camera and the prior knowledge of the person.
 
         Parameters
         ----------
         camera : Camera
-            Pinhole, scaled orthographic or Lee & Chen's camera; a focal length or scale with an axis has one entry per
-            frame.
+            Pinhole, scaled orthographic or Lee & Chen's camera; its focal length or scale may be an array (F,).
         image : array (F, 14, 2)
             Image points, pixels; NaN where a joint is hidden.
         deviation : float or array broadcastable to (F, 14)
-            Standard deviation of each coordinate, pixels.
+            Standard deviation of each coordinate of the image points, pixels.
         lengths : array (17,) or (F, 17)
-            Metres, in the order of `posekit.skeleton.SEGMENTS`.
+            Segment lengths, metres, in the order of `posekit.skeleton.SEGMENTS`.
         length_deviation, size_deviation : float or array broadcastable to (F, 17), (F,)
-            Relative standard deviations of each length, and of the size that all lengths share.
+            Relative standard deviations of each length, and of a common factor on all lengths.
         root : array (F, 3), optional
             Known position of the neck, metres; NaN where it is not known.
         limits : Limits, optional
             Joint ranges.
         robust : bool
-            Whether the residuals of image points are bounded (robust), because detectors make gross errors.
+            Whether the loss function of image points is bounded (robust), because detectors make gross errors.
         """
         rays = camera.normalize(image)
         hidden = np.asarray(np.isnan(rays).any(axis=-1))
@@ -154,7 +154,7 @@ class Problem:
 
     @property
     def perspective(self) -> bool:
-        """Whether the camera has an optical centre."""
+        """Whether the camera is a perspective camera."""
         return bool((self.records["perspective"] > 0).any())
 
     @cached_property
@@ -164,21 +164,21 @@ class Problem:
 
     @property
     def sized(self) -> Flags:
-        """Whether the size that all lengths share is unknown, by frame (F,)."""
+        """Whether the common factor on all lengths is unknown, for each frame (F,)."""
         return np.asarray(self.records["size_weight"] > 0)
 
     @property
     def rooted(self) -> Flags:
-        """Whether the position of the neck is known, by frame (F,)."""
+        """Whether the position of the neck is known, for each frame (F,)."""
         return np.asarray((self.records["root_weight"] != 0).any(axis=2).all(axis=1))
 
     @property
     def freedom(self) -> Ints:
-        """Degrees of freedom of chi2 (F,): image coordinates and priors in excess of the unknowns.
+        """Degrees of freedom of chi2 (F,): number of image coordinates and priors minus number of unknowns.
 
-        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. The degrees of
-        freedom are the coordinates of torso points and root beyond the six unknowns of the torso's pose, and the
-        coordinates of hip points beyond the three unknowns of the hips' orientation.
+        Limbs contribute nothing, because a limb has at least as many unknowns as image coordinates. The torso
+        contributes its image coordinates and priors minus the six unknowns of its pose. The hips contribute their image
+        coordinates minus the three unknowns of their orientation. A negative contribution counts as zero.
         """
         seen = self.seen_joints
         priors = (self.records["root_weight"] != 0).any(axis=2).sum(axis=1) - self.sized

@@ -1,7 +1,7 @@
 """The solver in NumPy: the same residuals and steps as `solver.cpp`, computed for all starts at once.
 
-Unknowns x (N, 43) are the 14 joint positions and the logarithm of the size that all lengths share. The bits of `parts`
-select the unknowns that are free: bit 0 the trunk (six joints and the size), bits 1 to 4 the four limbs.
+Unknowns x (N, 43) are the 14 joint positions and the size: the logarithm of a common factor on all lengths. The bits of
+`parts` select the unknowns that are free: bit 0 the trunk (six joints and the size), bits 1 to 4 the four limbs.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ Pull = Callable[[Array], Array]
 class Normal:
     """Normal equations of N postures in C unknowns: the coordinates of F free joints, then the size.
 
-    The attributes are chi2 (N,), matrix (N, C, C), gradient (N, C), the residuals `beyond` of joint limits (N, K), zero
-    within the limits, and their derivatives `slopes` (N, K, C - 1).
+    The attributes `chi2` (N,), `gradient` (N, C) and `matrix` (N, C, C) are the quadratic model. `beyond` (N, K) are
+    the residuals of joint limits, zero within the limits; `slopes` (N, K, C - 1) are their derivatives.
     """
 
     def __init__(self, count: int, width: int) -> None:
@@ -82,7 +82,7 @@ class Normal:
         self.matrix, self.slopes = np.zeros((count, width, width)), np.zeros((count, 0, width - 1))
 
     def add(self, r: Array, d: Array) -> None:
-        """Add residuals (N, K) with derivatives (N, K, L) along the first L unknowns."""
+        """Add residuals (N, K) and their derivatives (N, K, L) with respect to the first L unknowns."""
         part = slice(0, d.shape[2])
         self.chi2 += dot(r, r)
         self.gradient[:, part] += (r[:, None] @ d)[:, 0]
@@ -90,15 +90,15 @@ class Normal:
 
 
 def free_joints(parts: int) -> Ints:
-    """Return the indices (F,) of the joints of the free parts, ascending."""
+    """Return the indices (F,), ascending, of the joints that the bits of `parts` select."""
     limbs = [joint for k in range(4) if parts >> (k + 1) & 1 for joint in LIMB_JOINTS[k][1:]]
     return np.sort([*range(6 * (parts & 1)), *limbs])
 
 
 def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | None = None) -> Normal:
-    """Return the normal equations of frames `which` (N,) at x (N, 43).
+    """Return the normal equations of N postures `x` (N, 43); `which` (N,) is the frame of each posture.
 
-    chi2 is infinite if a seen joint is behind the camera, or if a value is not a number.
+    chi2 is infinite if a seen joint is behind the camera, or if chi2 would be NaN.
     """
     records, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
     some, trunk = np.isin(SEGMENT_ENDS, free), parts & 1
@@ -141,7 +141,7 @@ def evaluate(problem: Problem, which: Ints, x: Array, parts: int, pull: Pull | N
 
 
 def _laid(blocks: Array, to_joints: Array) -> Array:
-    """Return matrices (N, 3F, 3F) over F joints from blocks (N, P, 3, 3) over P points.
+    """Assemble matrices (N, 3F, 3F) of F joints from blocks (N, P, 3, 3) of P points.
 
     A point is a joint position or a segment vector: a linear combination of joints with coefficients `to_joints` (P,
     F).
@@ -152,7 +152,7 @@ def _laid(blocks: Array, to_joints: Array) -> Array:
 
 
 def image_terms(records: Records, joints: Array) -> tuple[Array, Array, Flags]:
-    """Return residuals (N, 2, 14) of image points, derivatives (N, 2, 14, 3), and seen joints behind the camera."""
+    """Return image residuals (N, 2, 14), their derivatives (N, 2, 14, 3), and a mask of joints behind the camera."""
     weight, perspective = np.swapaxes(records["image"], 1, 2), bool(records["perspective"].any())
     depth = joints[..., 2:] if perspective else np.ones((len(joints), 14, 1))
     inverse = 1 / np.where(depth > 0, depth, 1.0)
@@ -164,10 +164,10 @@ def image_terms(records: Records, joints: Array) -> tuple[Array, Array, Flags]:
 
 
 def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) -> tuple[Array, Array, Array]:
-    """Return residuals (N, S) of the log-lengths of some segments, and their derivatives (N, S, 3) along the segments.
+    """Return log-length residuals (N, S) of segments, their derivatives (N, S, 3) and curvature (N, S, 3, 3).
 
-    The third array is their curvature (N, S, 3, 3): to second order, moving an end sideways lengthens the segment.
-    Negative curvature is set to zero.
+    Derivatives are with respect to the vector from a segment's start to its end. The curvature is not zero, because
+    moving an end sideways lengthens the segment to second order. Negative curvature is set to zero.
     """
     line = INCIDENCE[some] @ x[:, :SIZE].reshape(-1, 14, 3)
     square, w = dot(line, line), records["length_weight"][:, some]
@@ -177,10 +177,10 @@ def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) 
 
 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
-    """Yield the excess of angles over their limits, radians, and its derivatives by joint positions.
+    """Yield pairs: angles beyond their limits, radians, and their derivatives with respect to joint positions.
 
-    If the trunk is free, the first pair (N, 3), (N, 3, 14, 3) belongs to the pelvis. A pair (N, 5), (N, 5, 14, 3) for
-    each free limb follows; its fifth row has residual zero and adds only curvature (see `_limb_slopes`).
+    If the trunk is free, the first pair (N, 3), (N, 3, 14, 3) belongs to the pelvis. Each free limb then has a pair (N,
+    5), (N, 5, 14, 3). Its fifth row has residual zero and adds only curvature (see `_limb_slopes`).
     """
     frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
@@ -204,7 +204,7 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Arr
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
-    """Add to `d` (M, K, 14, 3) the derivatives of w (M, K, 3) dot the rotation vector of torso or hips."""
+    """Add to `d` (M, K, 14, 3) the derivatives of `w` (M, K, 3) times the rotation vector of torso or hips."""
     forward, left, up = (R[:, None, :, k] for k in range(3))
     between = bool(limits.numbers["between_hips"])
     (a, b), (s, t) = ((0, 3), (1, 2)) if torso else ((4, 5), (0, 3) if between else (3, 4))
@@ -218,7 +218,7 @@ def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w:
 
 
 def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, some: Flags) -> Array:
-    """Return the derivatives (N, 3, 14, 3) of pelvis angles by joint positions; zero where `some` (N, 3) is False."""
+    """Return derivatives (N, 3, 14, 3) of pelvis angles by joint positions; zero where `some` (N, 3) is False."""
     left, up = torso[:, :, 1], hips[:, :, 2]
     lean = dot(left, up)[:, None]
     square = np.maximum(1 - lean * lean, LEAST_COSINE**2)
@@ -233,10 +233,10 @@ def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, som
 def _limb_slopes(
     limits: Limits, joints: Array, frame: Array, limb: int, angles: Array, slopes: Array, bent: Array
 ) -> Array:
-    """Convert derivatives (M, 4, 4) of a limb's residuals by its angles to derivatives by joint positions.
+    """Convert the Jacobian (M, 4, 4) of a limb's residuals from its angles to joint positions (chain rule).
 
-    Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians: if an elbow or
-    knee is almost straight, moving its end sideways in any direction increases the bend to second order.
+    Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians. It matters if an
+    elbow or knee is almost straight: moving wrist or ankle sideways in any direction bends the joint to second order.
     """
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
     upper, lower = (one[:, None] for one in lim.limb_directions(joints, limb))
@@ -274,8 +274,8 @@ def descend(
 ) -> tuple[Array, Array, Array]:
     """Minimise chi2 from N starts by Levenberg-Marquardt.
 
-    A rejected step may violate joint limits that its start does not violate. The model of the next step includes these
-    limits, because otherwise it would violate them again.
+    A rejected step may violate joint limits that its start respects. The quadratic model of the next step includes
+    these limits, because otherwise the next step would violate them again.
 
     Parameters
     ----------
@@ -284,24 +284,24 @@ def descend(
     which : int array (N,)
         The frame of each start.
     start : array (N, 43)
-        Joints, camera frame, metres, and the logarithm of the size.
+        Joint positions, camera frame, metres, and the logarithm of the size.
     parts : int
-        Bits of the parts of the body that are free.
+        Bits that select the free parts of the body: bit 0 the trunk, bits 1 to 4 the limbs.
     most : int
         Largest number of steps.
     hopeless : array (N,)
-        A start whose chi2 is above this value is abandoned if the model of its next step predicts less than half of
-        that chi2 as reduction.
+        A start with a larger chi2 is abandoned, unless its next step is predicted to reduce chi2 by at least half.
     damping : array (N,)
         Damping of the first step, 1/m^2: `FIRST_DAMPING`, or the final damping of an earlier descent. A start with
-        infinite damping stays where it is.
+        infinite damping does not move.
     pull : callable, optional
-        Further residuals of whole bodies.
+        Function that returns further residuals (N, K) of postures (N, 14, 3).
 
     Returns
     -------
     x, chi2, damping : array (N, 43), (N,), (N,)
-        Damping is infinite for a start that has converged or is abandoned.
+        Final unknowns, chi2 and damping of each start. Damping is infinite for a start that has converged or is
+        abandoned.
     """
     column = np.append((3 * free_joints(parts)[:, None] + np.arange(3)).ravel(), SIZE)
     x, damping = np.array(start, dtype=np.float64), np.array(damping, dtype=np.float64)
@@ -347,8 +347,8 @@ def descend(
 def information(problem: Problem, which: Ints, x: Array, known: Array, parts: int = 31) -> Array:
     """Return the information matrices (N, C, C): the normal matrices plus weak priors of positions and rotations.
 
-    `known` (3,) has three numbers: the prior information on the position of a joint, and of a hidden joint, both in
-    1/m^2; and the factor of the information on rotations (`posekit.solver.modes.TURN_INFORMATION`).
+    `known` (3,) has three numbers: the prior information on the position of a seen joint and of a hidden joint, both in
+    1/m^2, and `posekit.solver.modes.TURN_INFORMATION`.
     """
     p, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
     H = evaluate(problem, which, x, parts).matrix + FLOOR * np.eye(3 * len(free) + 1)
@@ -388,11 +388,11 @@ def distinct(
     level: float,
     known: Array,
 ) -> Flags:
-    """Return a mask (N,) of the bodies that differ from every kept body of lower chi2 in their group.
+    """Return a mask (N,) of distinct bodies: each differs from every kept body of lower chi2 in its group.
 
-    Bodies are sorted by group, then by chi2. Two bodies are the same if no joint of `parts`, relative to the neck,
-    differs by more than `within` (N,) metres. They are also the same if no joint differs by more than `reach` metres
-    and their difference d has :math:`d^T H d` below `level`.
+    The bodies `x` (N, 43) are sorted by group, then by chi2. Two bodies are the same if no joint of the body parts
+    `parts`, relative to the neck, differs by more than `within` (N,) metres. They are also the same if no joint differs
+    by more than `reach` metres and their difference d in all unknowns has :math:`d^T H d` below `level`.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
     free = free_joints(parts)

@@ -1,4 +1,4 @@
-"""The method: minimise chi2 of trunks, then of each limb on each trunk, then of whole bodies that combine both."""
+"""The method: minimise chi2 over positions of the trunk, then of each limb on each trunk, then of whole bodies."""
 
 from __future__ import annotations
 
@@ -63,14 +63,16 @@ def solve(
     Parameters
     ----------
     problem : Problem
-        F frames; each is solved alone.
+        F frames, which are solved independently.
     max_chi2 : float, optional
-        Largest chi2 of a mode. By default noise alone exceeds it with probability `REJECTION_PROBABILITY`.
+        Largest chi2 of a mode. The default is the value that noise alone exceeds with probability
+        `REJECTION_PROBABILITY`.
     most : int, optional
-        Largest number of modes per frame, by lowest chi2; all modes if not given.
+        Largest number of modes per frame; modes with the lowest chi2 are kept. All modes are kept if `most` is not
+        given.
     pull : callable, optional
-        Function that returns further residuals (N, K), standard deviations, of postures (N, 14, 3), such as the excess
-        over a check's bounds. Modes are refined with these residuals.
+        Function that maps postures (N, 14, 3) to further residuals (N, K), in standard deviations. An example is the
+        distance beyond a check's bounds. Modes are refined with these residuals.
 
     Returns
     -------
@@ -99,12 +101,12 @@ def solve(
 
 
 def _rank(group: Ints) -> Ints:
-    """Return the rank of each entry within its group; groups are sorted in ascending order."""
+    """Return the rank of each entry within its group; `group` is sorted in ascending order."""
     return np.arange(len(group)) - np.searchsorted(group, group)
 
 
 def _best(problem: Problem, most: Array, frame: Ints, x: Array, chi2: Array, parts: int) -> Ints:
-    """Return the rows of distinct bodies whose chi2 is at most the limit `most` (F,) of their frame, the best first."""
+    """Return the rows of distinct bodies with chi2 up to the limit `most` (F,) of their frame, best first."""
     order = np.lexsort((chi2, frame))
     order = order[np.isfinite(chi2[order]) & (chi2[order] <= most[frame[order]])]
     within, sure = (SAME_TRUNK_METRES, False) if parts == 1 else (MERGE_DISTANCE_METRES, True)
@@ -114,9 +116,10 @@ def _best(problem: Problem, most: Array, frame: Ints, x: Array, chi2: Array, par
 def _minima(
     problem: Problem, passing: Array, frame: Ints, x: Array, parts: int, hopeless: float
 ) -> tuple[Ints, Array, Array]:
-    """Return the distinct minima whose chi2 passes: frames (M,), unknowns (M, 43) and chi2 (M,), sorted by chi2.
+    """Minimise chi2 from starts `x`; return frames (M,), unknowns (M, 43) and chi2 (M,) of the minima that pass.
 
-    Starts that are close to each other after `FIRST_STEPS` are merged.
+    A minimum passes if its chi2 is at most `passing` (F,) of its frame. Starts that are close to each other after
+    `FIRST_STEPS` steps are merged.
     """
     damping = np.full(len(frame), reference.FIRST_DAMPING)
     for steps, level in ((FIRST_STEPS, np.inf), (40, 1.0)):
@@ -128,7 +131,7 @@ def _minima(
 
 
 def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array) -> tuple[Ints, Array]:
-    """Combine trunks with limbs into whole bodies: frames (B,) and unknowns (B, 43)."""
+    """Combine trunks with limbs into whole bodies; return frames (B,) and unknowns (B, 43)."""
     open_ = problem.sized | ~problem.rooted
     if open_[frame].any():
         # At the depth of the trunk's own minimum a limb may be too short for its image; its near and far positions then
@@ -143,10 +146,10 @@ def _bodies(problem: Problem, frame: Ints, x: Array, chi2: Array, passing: Array
 
 
 def _combined(problem: Problem, frame: Ints, x: Array, chi2: Array, most: int) -> tuple[Ints, Array]:
-    """Return all combinations of trunk and limbs that can pass: rows of the trunks (B,) and unknowns (B, 43).
+    """Combine each trunk with positions of its four limbs; return rows of trunks (B,) and unknowns (B, 43).
 
-    The chi2 of a combination is the sum of the chi2 of its parts; it must be below `LOOSE_BODY`. Only the `most` best
-    positions of each limb on a trunk are combined.
+    The sum of the chi2 of trunk and limbs must be below `LOOSE_BODY`. Each limb on a trunk has at most `most`
+    positions, those with the lowest chi2.
     """
     trunk = x[:, :18].reshape(-1, 6, 3)
     row, body, total = np.arange(len(frame)), x, chi2

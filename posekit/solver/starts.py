@@ -40,7 +40,7 @@ HIP_PLACES: Final = np.concatenate([np.zeros((1, 3)), 0.08 * sphere(8)])
 
 
 def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array, far: Flags | bool) -> Array:
-    """Return the near or the far ends (N, 3) of segments on the ray of a joint.
+    """Return the near or the far positions (N, 3) of a joint on its ray, at `length` (N,) from `start` (N, 3).
 
     If a segment is too short to reach the ray, its end is the point of the ray nearest to its start.
     """
@@ -52,7 +52,7 @@ def lift(problem: Problem, frame: Ints, joint: int, start: Array, length: Array,
 
 
 def necks(problem: Problem) -> tuple[Ints, Array]:
-    """Return start positions of necks (K, 3), metres, and their frames (K,), ascending."""
+    """Return frames (K,), ascending, and initial positions (K, 3) of their necks, metres."""
     rooted, p, (origins, directions) = problem.rooted, problem.records, problem.rays
     deep = (p["root_weight"][:, 2, 2] > 0) & problem.seen_joints[:, 0]
     known = rooted | deep | (not problem.perspective)
@@ -82,10 +82,10 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
 def branches(
     problem: Problem, frame: Ints, joint: int, start: Array, ways: Array, hidden: Ints | int
 ) -> tuple[Ints, Array]:
-    """Return rows (S,), ascending, of parent positions `start` (N, 3), and the initial positions (S, 3) of their child.
+    """Return rows (S,), ascending, of the parent's positions `start` (N, 3), and positions (S, 3) of the joint.
 
-    A seen joint is placed near and far on its ray. A hidden joint is placed in each of the first `hidden`, int or (N,),
-    of the directions `ways` (N, W, 3).
+    A seen joint is placed near and far on its ray. A hidden joint is placed in the first `hidden` of the directions
+    `ways` (N, W, 3) from its parent.
     """
     seen = problem.seen_joints[frame, joint]
     row = np.repeat(np.arange(len(frame)), np.where(seen, 2, hidden))
@@ -97,7 +97,7 @@ def branches(
 
 
 def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
-    """Return frames (S,), ascending, and trunks (S, 6, 3) with each seen joint near or far, from every neck."""
+    """Return frames (S,), ascending, and trunks (S, 6, 3): every neck position, each seen joint near and far."""
     frame, neck = necks(problem)
     trunk = np.zeros((len(frame), TRUNK, 3))
     trunk[:, 0] = neck
@@ -114,8 +114,8 @@ def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
 def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
     """Place the hidden joints of torso or hips by fitting a straight trunk of the person's lengths to seen joints.
 
-    One or two seen joints leave a rotation undetermined. The trunk is then fitted in `DIRECTIONS` different rotations,
-    each determined by one more point beside the trunk.
+    One or two seen joints leave a rotation undetermined. The trunk is then fitted with many different rotations: a
+    point beside the trunk is placed in each of the directions `DIRECTIONS`.
     """
     seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
     seen[:, part] = problem.seen_joints[frame, part]
@@ -150,7 +150,7 @@ def _template(lengths: Array) -> Array:
 
 
 def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple[Ints, Array]:
-    """Return start positions (S, 2, 3) of elbow and wrist, or knee and ankle, and their trunks (S,), ascending.
+    """Return rows of trunks (S,), ascending, and initial positions (S, 2, 3) of elbow and wrist, or knee and ankle.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The candidate positions of every joint: one for each combination of near and far on its path from the root.
 
-A node at level j of the tree is a code of j bits, one for each joint in tree order, the highest bit for the first
-joint: 0 near, 1 far. The position of a joint depends only on the bits of the joints on its path from the root.
-Therefore all 8192 leaves consist of only 86 different positions and the root.
+A node at level j of the tree chooses near (0) or far (1) for each of the first j joints after the root. These j bits
+are the code of the node; the first joint has the highest bit. The position of a joint depends only on the bits of the
+joints on its path from the root. Therefore the 8192 leaves contain only 86 different positions, besides the root.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def path_of(joint: int) -> tuple[int, ...]:
 
 @lru_cache(maxsize=1024)
 def support_of(points: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the joints, in tree order, whose branches determine the positions of given points."""
+    """Return the joints whose near-far choices determine the positions of given points, in ascending order."""
     return tuple(sorted({joint for point in points if point < len(JOINTS) for joint in path_of(point)}))
 
 
 @lru_cache(maxsize=512)
 def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return the bits of given joints in every code (2^level,) of a level; the first joint has the highest bit."""
+    """Return, for each code of a level (2^level,), the bits of given joints as one integer, first joint highest."""
     codes = np.arange(1 << level, dtype=np.int64)
     picked = np.zeros_like(codes)
     for joint in joints:
@@ -74,13 +74,13 @@ class Candidates:
     Parameters
     ----------
     table : array (F, 87 + 5 + 1, 3)
-        Positions, camera frame, metres. The candidates of a joint begin at column ``FIRST[joint]``; then come five head
-        points and a column of NaN.
+        Positions, camera frame, metres. The candidates of each joint begin at column ``FIRST[joint]``. The last six
+        columns are five head points and one column of NaN.
     state : int array (F, 87)
-        `OPEN`, or a key of `UNJUDGED`.
+        `OPEN` if the branch of the candidate stays; otherwise the reason for pruning it, a key of `UNJUDGED`.
     excess : array (F, 87)
-        Metres by which the segment to the joint is too short to reach the ray of its image point; negative if it is
-        longer than the distance to the ray.
+        Distance from the parent's position to the joint's ray minus the segment's length, metres. A positive value
+        means that the segment is too short to reach the ray.
     """
 
     table: Array
@@ -98,15 +98,16 @@ class Candidates:
         camera : Camera
             Camera of the F frames.
         image : array (F, 14, 2)
-            Image points. An unseen joint (NaN) and all joints beyond it stay unknown.
+            Image points. The positions of an unseen joint (NaN) and of its descendants stay unknown.
         root : array (F, 3)
             The neck, camera frame, metres.
         lengths : array (F, 17)
-            Metres, in the order of `posekit.skeleton.SEGMENTS`.
+            Segment lengths, metres, in the order of `posekit.skeleton.SEGMENTS`.
         head : array (F, 5, 3)
             Head points, metres; NaN where not known.
         slack : float
-            Metres. A segment that misses the ray of its image point by less is treated as tangent to the ray.
+            Largest distance by which a segment may be too short to reach its ray, metres. The segment then ends at the
+            point of the ray nearest to its start.
         """
         frames = len(image)
         table = np.full((frames, HEAD_COLUMN + 6, 3), np.nan)
@@ -134,13 +135,13 @@ class Candidates:
         return Candidates(table=table, state=state, excess=excess)
 
     def column(self, level: int, point: int, code: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the columns (N,) of a point (a joint or a head point) for codes (N,) at a level."""
+        """Return the columns (N,) of `table` for a joint or head point at N nodes, given their level and codes (N,)."""
         if point >= len(JOINTS):
             return np.full(len(code), HEAD_COLUMN + point - len(JOINTS))
         return FIRST[point] + bits(level, path_of(point))[code]
 
     def places(self, level: int, points: Sequence[int], frame: Ints, code: NDArray[np.int64]) -> Array:
-        """Return the positions (N, 19, 3) of nodes, metres; NaN for points that are not among `points`."""
+        """Return positions (N, 19, 3) of joints and head points at N nodes, metres; NaN for those not in `points`."""
         width = self.table.shape[1]
         place = np.full((len(code), len(JOINTS) + 5), width - 1)
         for point in points:

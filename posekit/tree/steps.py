@@ -1,4 +1,4 @@
-"""Steps of the compiled tree: the choice of near or far for a joint, and posekit's own checks as numbers."""
+"""Steps of the compiled (C++) tree: branching at a joint, and posekit's own checks, encoded as numbers."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Step(NamedTuple):
     places : tuple of str
         Names of the places that the step judges.
     numbers : tuple of 25 float
-        Kind, limb, tolerance, eight indices of joints that the step reads (-1 if fewer), and fourteen numbers of the
-        kind.
+        Kind of the step, limb, tolerance, indices of up to eight joints that the step reads (padded with -1), and
+        fourteen numbers that depend on the kind.
     limits : record, optional
         Joint ranges of limbs and pelvis (`posekit.solver.Limits.numbers`).
     """
@@ -49,7 +49,7 @@ def step(
     limb: int = 0,
     limits: NDArray[np.void] | None = None,
 ) -> Step:
-    """Return a step; missing points are -1 and missing numbers are 0."""
+    """Make a step; pad its points with -1 and its numbers with 0."""
     read = (*points, *(-1,) * (8 - len(points)))
     return Step(
         tuple(places), (kind, limb, tolerance, *read, *numbers, *(0.0,) * (14 - len(numbers))), limits

@@ -1,8 +1,8 @@
 """The binary interpretation tree (Lee & Chen 1985, section 3.1), grown level by level over many frames at once.
 
-A node is a frame and a code. The judgement of a check depends only on the branches of the few joints that the check
-reads. Therefore a check judges each remaining combination of these branches once, for all nodes that share the
-combination. The four limbs, for example, are judged independently of each other.
+A node is identified by its frame and its code (see `posekit.tree.candidates`). A check reads only a few joints, so its
+judgement depends on few near-far choices. It judges each distinct combination of these choices once, for all nodes that
+share the combination. The four limbs, for example, are judged independently of each other.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Pruned(NamedTuple):
     level : int array (P,)
         Level of the branch; 2^(13 - level) leaves are below it.
     reason : int array (P,)
-        Row of `Trees.reasons`: the first violation.
+        Index in `Trees.reasons` of the first violated check and place.
     frame, code : int array (P,)
         Frame of the branch, and its code of `level` bits.
     value, lower, upper : array (P,)
-        Violating value and its bounds.
+        Value that violates the check, and the bounds of the check.
     """
 
     level: Ints
@@ -61,20 +61,21 @@ NOTHING: Final = Pruned(*np.zeros((4, 0), dtype=np.int64), *np.zeros((3, 0)))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trees:
-    """The survivors of the trees of F frames, by frame and code, and the pruned branches with the reason of each.
+    """The survivors of the trees of F frames, and the pruned branches with their reasons.
 
     Parameters
     ----------
     frame, code : int array (N,)
-        Frame of each survivor, and its 13 branches as bits: 0 near, 1 far, the highest bit for the first joint.
+        Frame of each survivor, and its branch as 13 bits: 0 near, 1 far. The first joint has the highest bit. Survivors
+        are sorted by frame, then by code.
     joints : array (N, 14, 3)
-        Positions, camera frame, metres; NaN for joints that are not seen, and for joints beyond them.
+        Positions, camera frame, metres; NaN for unseen joints and their descendants.
     length_residual : array (N,)
-        Metres by which the worst segment is too short to reach the ray of its image point.
+        Largest distance by which a segment of the survivor is too short to reach its ray, metres.
     losses : Pruned
         Pruned branches of each frame, in the order of pruning.
     reasons : tuple of (str, str)
-        ``check/place`` and the unit of its values.
+        Name ``check/place`` of each reason, and the unit of the check's values.
     count : int
         F.
     """
@@ -99,7 +100,7 @@ class Trees:
 
     @cached_property
     def rejected(self) -> list[dict[str, int]]:
-        """Number of rejected leaves of each frame by reason; with the survivors they sum to 8192."""
+        """Number of rejected leaves per frame and reason; rejected leaves and survivors of a frame sum to 8192."""
         width = max(len(self.reasons), 1)
         weight = 1 << (DEPTH - self.losses.level)
         number = np.bincount(self.losses.frame * width + self.losses.reason, weight, self.count * width)
@@ -126,7 +127,7 @@ class Trees:
 
 
 def ancestors(frame: Ints, code: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return the number of nodes at each level (`count`, 14) above leaves (N,), sorted by frame, then by code."""
+    """Count the ancestors of leaves (N,) per frame and level (`count`, 14); leaves are sorted by frame and code."""
     # Each leaf adds a node at every level from the first branch that differs from the leaf before.
     first = np.zeros(len(code), dtype=np.intp)
     _, digits = np.frexp(code[1:] ^ code[:-1])
@@ -153,22 +154,23 @@ def grow(
     camera : Camera
         Camera of the F frames.
     image : array (F, 14, 2)
-        Image points in tree order; NaN for joints that are not seen.
+        Image points in the order of `posekit.skeleton.JOINTS`; NaN for unseen joints.
     root : array (F, 3)
         The neck, camera frame, metres.
     lengths : array (17,) or (F, 17)
-        Metres, in the order of `posekit.skeleton.SEGMENTS`.
+        Segment lengths, metres, in the order of `posekit.skeleton.SEGMENTS`.
     checks : sequence of checks
-        A check judges at the first level at which all its ``points`` (by default all joints) have positions; checks of
-        the same level judge in this order.
+        A check judges at the first level at which all its ``points`` (by default all joints) have positions. Checks of
+        the same level judge in the order of this sequence.
     judge : callable, optional
         ``judge(check, points (N, 19, 3))`` returns the check's judgement of N postures; points that the check does not
         read are NaN. By default ``check.judge(points)``. The callable may have a method ``steps(check)`` that returns
         the check as steps of the compiled tree (`posekit.tree.steps`), or None.
     head : array (F, 5, 3), optional
-        Head points, metres. A check that reads head points judges no frame without them.
+        Head points, metres. A check that reads head points does not judge a frame without head points.
     tolerance : float
-        Metres. A segment that misses the ray of its image point by less is treated as tangent to the ray.
+        Largest distance by which a segment may be too short to reach its ray, metres. The segment then ends at the
+        point of the ray nearest to its start.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check, its level, the points that it reads, and its compiled steps; without a check, the branch of a joint."""
+    """A check with its level, the points that it reads, and its compiled steps; if `check` is None, a branching."""
 
     level: int
     check: Any
@@ -217,7 +219,7 @@ class _Planned(NamedTuple):
 def _planned(
     checks: Sequence[Any], form: Callable[[Any], Sequence[Step] | None] | None, head: Array
 ) -> list[_Planned]:
-    """Return branches and checks in the order of levels, with compiled steps for checks that the compiled tree has."""
+    """Return branchings and checks, sorted by level; checks that the C++ tree implements have compiled steps."""
     branch = [step(BRANCH, ())] if steps.compiled else None
     plan = [_Planned(level, None, (), branch) for level in range(1, DEPTH + 1)]
     for check in checks:
@@ -230,7 +232,7 @@ def _planned(
 
 
 def _numbered(reasons: dict[tuple[str, str], int], names: Iterable[str], unit: str) -> Ints:
-    """Return the rows (K,) of named reasons in `reasons`; names that are missing are added."""
+    """Return the indices (K,) of named reasons in `reasons`, after adding the names that are missing."""
     return np.array([reasons.setdefault((name, unit), len(reasons)) for name in names], dtype=np.int64)
 
 
@@ -270,7 +272,7 @@ def _taken(
     reasons: dict[tuple[str, str], int],
     ask: Callable[[Any, Array], Any],
 ) -> tuple[Ints, NDArray[np.int64], Pruned]:
-    """Apply one step, a branch or a check, to nodes; return the remaining nodes and the pruned branches."""
+    """Branch at one joint, or apply one check; return the remaining nodes and the pruned branches."""
     level, check = planned.level, planned.check
     if check is None:
         frame, code, reason, value, lower, upper = _branched(found, level, frame, code)
@@ -298,7 +300,7 @@ def _taken(
 def _branched(
     found: Candidates, joint: int, frame: Ints, code: NDArray[np.int64]
 ) -> tuple[Ints, NDArray[np.int64], Ints, Array, Array, Array]:
-    """Give every node a near and a far successor, each with a reason for pruning (-1 if it stays), value and bounds."""
+    """Give every node a near and a far child; return their reasons for pruning (-1 if kept), values and bounds."""
     frame, code = np.repeat(frame, 2), np.repeat(code, 2) << 1
     code[1::2] |= 1
     column = FIRST[joint] + bits(joint, path_of(joint))[code]
@@ -314,9 +316,10 @@ def _asked(
     code: NDArray[np.int64],
     ask: Callable[[Any, Array], Any],
 ) -> tuple[tuple[str, ...], Ints, Array, Array, Array]:
-    """Judge each distinct combination of the branches that a check reads.
+    """Judge each distinct combination of the near-far choices that a check depends on.
 
-    Return the places of the check, and for each node the violated place (-1 if it passes), its value and its bounds.
+    Return the places of the check, and for each node the index of the first violated place (-1 if none), its value and
+    its bounds.
     """
     level, check, points, _ = planned
     support = support_of(points)
@@ -340,7 +343,7 @@ def _asked(
 
 
 def _distinct(key: Ints) -> tuple[Ints, Ints]:
-    """Return one node for each distinct key, and the index of that node for every key (N,); keys are not negative."""
+    """Return an index of each distinct key and the inverse (N,), as `numpy.unique` does; keys are not negative."""
     width = int(key.max()) + 1
     if width > SPARSE_FROM * len(key):
         _, node, row = np.unique(key, return_index=True, return_inverse=True)
