@@ -78,7 +78,7 @@ def test_a_file_may_name_its_layout_and_an_argument_overrides_it(
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"joint_names": np.array(JOINTS[:13])}, "joint_names: got 13 names; expected 14, one a point"),
+        ({"joint_names": np.array(JOINTS[:13])}, "joint_names: got 13 names; expected 14, one per point"),
         (
             {"clip": np.zeros(3, dtype=int)},
             r"clip: got int64 \(3,\); expected 24 whole numbers from 0, below 24",
@@ -86,7 +86,7 @@ def test_a_file_may_name_its_layout_and_an_argument_overrides_it(
         ({"clip": np.full(24, 24)}, "clip: got int64"),
         ({"clip": np.full(24, -1)}, "clip: got int64"),
         ({"frame": np.full(24, 0.5)}, r"frame: got float64 \(24,\)"),
-        ({"time": np.arange(23.0)}, "time: got 23 of them; expected 24 numbers"),
+        ({"time": np.arange(23.0)}, "time: got 23 numbers; expected 24"),
         ({"unit": np.array("yard")}, "unit: got .?yard"),
         ({"up": np.array("w")}, "up: got .?w"),
     ],

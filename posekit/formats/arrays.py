@@ -18,12 +18,12 @@ from posekit.skeleton import JOINTS, POINTS
 
 
 def has_layout(given: Any, layout: str | None) -> bool:
-    """Return whether an array (T, J, 3) follows a layout: a stated one, or one of other points than the figure's.
+    """Return whether a layout is stated, or points (T, J, 3) differ in number from the points of the figure.
 
     Raises
     ------
     InputError
-        If they are not numbers.
+        If the values are not numbers.
     """
     if not isinstance(given, list | tuple | np.ndarray):
         return False

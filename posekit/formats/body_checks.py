@@ -31,9 +31,8 @@ CLEAR_UP_SHARE: Final = 0.7
 FLAT_METRES, STEEP_METRES = 0.15, 0.6
 #: Minimum ratio of the height range along another axis to the range along the up axis of a level ground.
 CLEAR_RATIO: Final = 2.0
-#: Rigid neighbours of a point, whose distance from it is nearly constant: allowed excess of the distance over its range
-#: in other frames, as a share; largest sum of excess and range (distances in a torso vary by 7 %, along limbs by more);
-#: number of neighbours.
+#: Points that are rigidly fixed to a point: tolerance added to the range of their distance, and largest sum of both, as
+#: shares of the usual distance (distances in a torso vary by 7 %, along limbs by more); number of points needed.
 RIGID_SHARE, RIGID_MOST, RIGID_NEIGHBOURS = 0.05, 0.2, 3
 #: Relative difference between a stated rate and the rate of the time stamps, above which they contradict each other.
 RATE_DISAGREES: Final = 0.1
@@ -162,12 +161,12 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
     Raises
     ------
     InputError
-        If no layout has P points, or the points form a body in no layout with P points.
+        If no layout has P points, or several layouts have P points and none of them gives a human body.
     """
     candidates = by_order(points.shape[1])
     fits = [one for one in candidates if _misfit(one, points) < 1.0]
     if len(candidates) == 1 and not fits:
-        options.note(f"points are in the order of {candidates[0].name}, which has {points.shape[1]}")
+        options.note(f"points are in the order of {candidates[0].name}, which has {points.shape[1]} points")
         return candidates[0]
     if not fits:
         counts = sorted({(len(one.points), one.name) for k in range(1, 200) for one in by_order(k)})
@@ -183,7 +182,7 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
 
 
 def _misfit(layout: Layout, points: Array) -> float:
-    """Return the largest error of a layout (unequal limbs, misplaced midpoints), divided by its bound."""
+    """Return the largest error of a layout (unequal limbs, misplaced midpoints), divided by the error's bound."""
     found = layout.gather(points[:, : len(layout.points)])
     if not set(LIMBS) <= set(found):
         return np.inf
@@ -214,8 +213,8 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
     """Set points (T, P, 3) to NaN if the file writes a constant in place of a missing point.
 
     A point is missing in frames in which its three coordinates equal one number, such as 0, -1 or 999, if they vary in
-    other frames. The exception is a root at the origin: it keeps its distances from its neighbours. A point that is
-    zero in all frames is a root if it is the pelvis or the midpoint of the hips; otherwise it is missing.
+    other frames. A point with its usual distances from the rest of the trunk is not missing, such as a pelvis at the
+    origin. A point that is zero in all frames is missing, unless it is the pelvis or the midpoint of the hips.
     """
     points[~(np.abs(points) <= FARTHEST_COORDINATE).all(axis=-1)] = np.nan
     alike = (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
@@ -233,20 +232,20 @@ def _mark_missing(points: Array, names: Sequence[str], layout: Layout, options: 
         if gone.any():
             points[gone, k] = np.nan
             written = ", ".join(f"{value:g}" for value in sentinels)
-            options.note(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames: {written}")
+            options.note(f"{names[k]} is missing in {gone.sum()} of {len(points)} frames, marked {written}")
 
 
 def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
-    """Return the frames (T,) in which a point of the trunk has its usual distances from its rigid neighbours.
+    """Return for each frame (T,) whether a point has its usual distances from points that are rigidly fixed to it.
 
     Parameters
     ----------
     points : array (T, P, 3)
     k : int
-        Index of the point. A point of a limb has too few rigid neighbours; the result is then False in every frame.
+        Index of the point. A point of a limb has too few rigidly fixed points: the result is False in every frame.
     unsure : bool array (T, P)
-        Whether a point may be missing in a frame. Points that may be missing are not used as neighbours, and the usual
-        distances are those of the frames in which point k is certain.
+        Whether a point may be missing in a frame. Distances from such points are ignored; the usual distances are
+        those in frames in which point k is not unsure.
     """
     others = np.arange(points.shape[1]) != k
     apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]
@@ -376,7 +375,7 @@ def body_up(body: Array, clip: Ints | None, stated: str, custom: str, options: O
     others = min(rise[name] for name in UP_AXES if name[1] != best[1])
     if rise[best] < FLAT_METRES and CLEAR_RATIO * rise[best] < others:
         best = custom if custom[1:] == best[1] else f"+{best[1]}"
-        options.note(f"{best} is up by the ground: the height of the lowest joint hardly varies")
+        options.note(f"{best} is up by the ground: the height of the lowest joint along it hardly varies")
         return best
     if not custom:
         options.note("the up axis is unknown: no body stands upright, no ground is level (--up)")
@@ -396,7 +395,7 @@ def _rise(body: Array, clip: Ints | None, up: str) -> float:
 
 
 def _is_rooted(body: Array) -> bool:
-    """Return whether the midpoint of the hips, or the pelvis, is at the origin in every frame of several frames."""
+    """Return whether the midpoint of the hips, or the pelvis, is at the origin in every frame; False for one frame."""
     middle = (body[:, JOINT["right_hip"]] + body[:, JOINT["left_hip"]]) / 2
     known = (root[np.isfinite(root).all(axis=-1)] for root in (middle, body[:, JOINT["pelvis"]]))
     return any(len(root) > 1 and np.abs(root).max() < ROUNDING_METRES for root in known)
@@ -413,7 +412,7 @@ def times(
     """Return the time of each frame (T,), seconds, from time stamps or else from a rate; None if both are unknown.
 
     Contradictions between times and rates are added to the warnings. Rows with the same frame number are alternative
-    postures.
+    postures of that frame.
     """
     stated = rate if rate is not None and 0 < rate < np.inf else None
     clip = np.zeros(frames, dtype=np.intp) if clip is None else clip

@@ -109,7 +109,7 @@ def parse(data: bytes, source: str) -> Bvh:
     head = _HEAD.match(document, motion.end())
     if head is None:
         line = document.count("\n", 0, motion.end()) + 2
-        raise refusal(source, f"line {line}", "no head", "Frames: and Frame Time:", "add both after MOTION")
+        raise refusal(source, f"line {line}", "no header", "Frames: and Frame Time:", "add both after MOTION")
     if not (head[1].isascii() and head[1].isdigit() and 0 < int(head[1][:13]) < 10**12):
         raise refusal(source, "Frames", shown(head[1]), "a positive whole number")
     seconds = float(head[2]) if _NUMBER.fullmatch(head[2]) else np.nan
@@ -197,7 +197,7 @@ def _number(word: str) -> float:
 
 
 def _values(document: str, start: int, width: int, source: str) -> Array:
-    """Read the numbers after the two lines of the motion's head (T, C)."""
+    """Read the channel values of all frames (T, C), which follow the lines Frames and Frame Time."""
     try:
         values = np.array(document[start:].split(), dtype=np.float64)
         sane = (np.abs(values) <= LARGEST_VALUE).all() and "_" not in document[start:]
@@ -217,7 +217,7 @@ def _values(document: str, start: int, width: int, source: str) -> Array:
 
 
 def read(document: Bvh, path: str, options: Options) -> Motion:
-    """Convert a BVH file to a motion; its points are the joints, and the End Sites with an offset."""
+    """Convert a BVH file to a motion; its points are the joints, and the End Sites with a nonzero offset."""
     absolute = positions_are_absolute(document)
     points = world_points(document, absolute=absolute)
     held = zip(document.parents, document.channels, strict=True)
@@ -310,7 +310,8 @@ def positions_are_absolute(document: Bvh) -> bool:
 
     According to the format's description, a joint's position channels are added to its offset. MotionBuilder, Blender
     and data sets made with them (LAFAN1, Bandai-Namco) write the whole position into the channels and also state the
-    offset. Joints below the root decide: their channels stay near the offset or near zero, but a root may be anywhere.
+    offset. Channels replace offsets if the channels of most joints below the root are near the joints' offsets. A root
+    may be anywhere; roots decide only if no other joint has position channels.
     """
     small = SMALL_OFFSET_SHARE * float(np.abs(document.offsets).max(initial=0.0))
     votes: dict[bool, list[bool]] = {True: [], False: []}
@@ -342,7 +343,7 @@ def _unit(document: Bvh, points: Array, source: str, options: Options) -> tuple[
 def _longest_chain(points: Array, parents: tuple[int, ...]) -> float:
     """Return the length of the longest chain of bones between two leaves of the tree; median over frames.
 
-    A root with a single child is a point of the world instead of the body, and is excluded.
+    A root with a single child is excluded, because it is a point of the world, not a joint of the body.
     """
     count = len(parents)
     children = np.bincount([parent for parent in parents if parent >= 0], minlength=count)

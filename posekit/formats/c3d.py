@@ -2,8 +2,8 @@
 
 A file consists of blocks of 512 bytes: a header with the numbers of points, analogue values and frames; parameters in
 groups; then the frames. A frame has four numbers for each point (x, y, z, and a residual that is negative if the point
-was not seen) and the analogue values. They are 16-bit integers if the scale is positive, 32-bit floats if it is
-negative. Every count is compared with the length of the file before frames are read.
+was not seen) and the analogue values. All numbers of a frame are 16-bit integers if the parameter ``POINT:SCALE`` is
+positive, 32-bit floats if it is negative. Every count is compared with the length of the file before frames are read.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def parse(data: bytes, source: str) -> C3d:
 
 
 def _floats(data: bytes, processor: int) -> NDArray[np.float32]:
-    """Decode 32-bit floats; DEC floats (processor 85) have exchanged halves and a value four times as large."""
+    """Decode 32-bit floats; for DEC floats (processor 85), swap the 16-bit halves and divide the value by 4."""
     if processor != 85:
         return np.frombuffer(data, ">f4" if processor == 86 else "<f4").astype(np.float32)
     words = np.frombuffer(data, "<u2").astype(np.uint32).reshape(-1, 2)
@@ -137,7 +137,7 @@ def _numbers(parameters: dict[str, Any], name: str) -> list[float]:
 
 
 def _frames(parameters: dict[str, Any], first: int, last: int, held: int, width: int, damaged: Any) -> int:
-    """Return the number of frames: from the header up to 65,535, from one of three parameters in longer files."""
+    """Return the number of frames: from the header or, above 65,535, the largest number that a parameter states."""
     count = last - first + 1
     if count < 1:
         raise damaged("header", f"frames {first} to {last}", "the last not before the first")
@@ -232,9 +232,9 @@ def read(document: C3d, path: str, options: Options) -> Motion:
 
 
 def with_points(data: bytes, document: C3d, points: Array) -> bytes:
-    """Return the bytes of a file with new points (T, P, 3) in its unit; all other bytes stay the same.
+    """Return the bytes of a file with new points (T, P, 3), in the file's unit; all other bytes stay the same.
 
-    Unknown points keep their numbers. The result is empty for files with DEC floats.
+    If a new point is NaN, the file's point is kept. The result is empty for files with DEC floats.
     """
     if not document.kind:
         return b""
@@ -290,7 +290,7 @@ def write(path: str | Path, motion: Motion) -> None:
 
 
 def _section(groups: dict[str, dict[str, tuple[int, Any]]]) -> bytes:
-    """Return the bytes of groups of parameters, given as (type, values) by name."""
+    """Return the bytes of the parameters, given by group and name as (type, values)."""
     made = b"\0\0\0\0"
     for number, (group, parameters) in enumerate(groups.items(), 1):
         made += struct.pack("bb", len(group), -number) + group.encode() + struct.pack("<HB", 3, 0)

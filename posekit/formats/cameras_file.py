@@ -2,8 +2,8 @@
 
 All these formats have named fields, with different names. One reader finds intrinsics, distortion, pose and image size
 under their usual names. Pose2Sim states ``fisheye`` for every camera; its unit is metres, and its z axis points up.
-Anipose's unit is that of its calibration board, mostly millimetres. Caliscope's ``rotation_count`` determines which
-direction is up.
+Anipose's unit is that of its calibration board, mostly millimetres. In Caliscope's files, ``rotation_count`` (quarter
+turns of the pictures) determines which axis is up.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabra
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
 #: Largest distance of a camera from the world's origin at which lengths of an unknown unit are read as metres.
 METRES_UP_TO: Final = 100.0
-#: Smallest distance at which they are read as millimetres; smaller distances may also be centimetres.
+#: Smallest such distance at which the lengths are read as millimetres; smaller distances may also be centimetres.
 MILLIMETRES_FROM: Final = 1000.0
 #: Minimum cosine between the world's up axis and the mean upward direction of the pictures.
 LEAST_UPRIGHT: Final = 0.8
@@ -255,7 +255,7 @@ def _is_intrinsic(value: Any) -> bool:
 
 
 def _value(fields: Fields, field: str, *suffixes: str) -> Any:
-    """Return the value of a field by the first of its known names, with a suffix, that the file has; None if absent."""
+    """Return the value under the first known name of a field, with one of the suffixes; None if it is absent."""
     by_key = {plain(str(key)): value for key, value in fields.items()}
     named = (plain(alias + suffix) for suffix in suffixes or ("",) for alias in FIELDS[field].split())
     value = next((by_key[name] for name in named if name in by_key), None)
@@ -280,11 +280,11 @@ def write_toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
     ups = {camera.up for camera in cameras.values()}
     if len(ups) > 1:
         got = f"worlds that point up along {', '.join(map(shown, sorted(ups)))}"
-        raise refusal(path, "up", got, "one world", "write one file each")
+        raise refusal(path, "up", got, "the same up axis for all", "write one file for each")
     tables: dict[str, dict[str, Any]] = {}
     for number, (name, camera) in enumerate(cameras.items(), start=1):
         if one_line(name) != name:
-            raise refusal("camera", "name", shown(name), "characters that print", "rename it")
+            raise refusal("camera", "name", shown(name), "printable characters", "rename it")
         table = tables[f"cam_{number:02d}"] = {"name": name}
         if camera.size is not None:
             table["size"] = [float(side) for side in camera.size]

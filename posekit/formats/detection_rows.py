@@ -25,12 +25,12 @@ MOST_SPREAD: Final = 20
 #: Largest median motion of a person between pictures of a film, as a multiple of the square root of the body's area;
 #: between unrelated photographs it is about 1 or more.
 FILM_MOTION: Final = 0.5
-#: Largest number of pictures in which this motion is measured.
+#: Largest number of pictures in which people's motion is measured.
 MOST_COMPARED: Final = 200
 #: Width and height of a picture whose size is unknown.
 UNKNOWN: Final = (math.nan, math.nan)
 #: Size of the head (nose, eyes and ears) relative to the body, assumed for layouts without head points, such as
-#: Human3.6M's. In the correct layout of points with a head the size is smaller, in a wrong layout it is larger.
+#: Human3.6M's. If points include a head, its size is smaller in the correct layout, larger in a wrong one.
 HEADLESS_SHARE: Final = 0.385
 #: Minimum ratio of the head's size in a wrong layout to its size in the correct layout.
 CLEAR_RATIO: Final = 1.17
@@ -50,7 +50,7 @@ class Rows:
     in_folder : bool
         Whether each picture has its own file.
     by_camera : bool
-        Whether the numbers of people are numbers of cameras, each of which shows the same person.
+        Whether a person's number is the number of a camera; all cameras show the same person.
     pictures : dict
         For each label: time (s), width and height, NaN where unknown.
     people : list of (str, array, int)
@@ -89,7 +89,7 @@ class Rows:
         self.people.append((self.picture(label), points, int(person) if whole else -1))
 
     def seen(self) -> tuple[list[str], Array, Ints]:
-        """Return labels, points (N, K, 3) and numbers (N,) of people with a known point; NaN for missing points.
+        """Return picture label, points (N, K, 3) and number (N,) of each person with a known point; NaN if missing.
 
         Raises
         ------
@@ -136,7 +136,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
         values = np.empty((0, width, 3))
     elif (rows.names or options.layout) and values.shape[1] != width:
         got = f"{values.shape[1]} points a person"
-        raise refusal(rows.source, "points", got, f"{width} of {layout.name}", "change it")
+        raise refusal(rows.source, "points", got, f"{width} of {layout.name}", "change the layout")
     names, placed, derived = layout.seen(rows.names, _in_pixels(rows, held, values[..., :2], options))
     confidence = layout.seen(rows.names, values[..., 2:])[1][..., 0]
     sizes = {size[1:] for size in rows.pictures.values()}
@@ -171,7 +171,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
 
 
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:
-    """Find the layout: the user's, or by the names in the file, or by the number of points and the head's size."""
+    """Find the layout: the user's, that of the names in the file, or by the number of points and the head's size."""
     if options.layout:
         return load_layout(options.layout)
     if rows.names:
@@ -247,7 +247,7 @@ def _places(rows: Rows, held: list[str], points: Array, options: Options) -> tup
     if step > 1 and film:
         options.note(f"pictures are numbered in steps of {step}")
     if not film and len(labels) > 1:
-        options.note("pictures are unrelated photographs: people are not followed through them")
+        options.note("pictures are unrelated photographs: people are not followed from picture to picture")
     return film, dict(zip(labels, map(int, place), strict=True))
 
 

@@ -68,7 +68,7 @@ def document_of(root: Node) -> dict[str, Any]:
 
 
 def _add_radius(postures: list[dict[str, Any]]) -> None:
-    """Add the fields of ``result/3`` to postures, in place: chi2, radius, branch, group and inferred."""
+    """Add to each posture, in place, the fields of ``result/3``: chi2, radius, branch, group and inferred."""
     refined = [one.get("refined") or one for one in postures]
     rows = [[row or [0.0] * 6 for row in one.get("covariance") or [None] * len(JOINTS)] for one in refined]
     matrices = np.zeros((len(postures), len(JOINTS), 3, 3))
@@ -91,7 +91,7 @@ def _path(one: Mapping[str, Any], places: list[dict[int, int]]) -> dict[str, Any
 
 
 def _unpadded(root: Node) -> dict[str, Any]:
-    """Return the JSON document of an NPZ, whose arrays (frames, postures, ...) are padded to the most postures."""
+    """Return the JSON document of an NPZ file, whose arrays are padded to equal numbers of postures per frame."""
     held: Mapping[str, Any] = root.value
     counts = root.at("count").array(None).astype(np.intp).tolist()
 

@@ -55,7 +55,7 @@ NODES: Final = _nodes()
 
 
 def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
-    """Return a figure with the person's lengths, and the root and angles of its tree in each frame of a recording.
+    """Return a figure with the person's segment lengths, and its root position and joint angles in each frame.
 
     Stored configurations of the figure are used unchanged; otherwise closed-form inverse kinematics computes them from
     the joints. An unknown angle has the value of the nearest frame in which it is known. An angle that is unknown in
@@ -102,7 +102,7 @@ def figure_in_tree(motion: Motion, format: str) -> tuple[Figure, Array, Array]:
     if lost.any():
         frame = int(np.argmax(lost))
         got = f"no torso in frame {frame} ({int(lost.sum())} of {len(q)} frames)"
-        raise refusal(motion.source, "joints", got, "neck, shoulders and pelvis in each", "write csv or npz")
+        raise refusal(motion.source, "joints", got, "neck, shoulders and pelvis in all", "write csv or npz")
     rest = np.clip(0.0, figure.limits.lower, figure.limits.upper)
     for k, neutral in zip(figure.angle_index, rest, strict=True):
         known = np.flatnonzero(np.isfinite(q[:, k]))
@@ -149,7 +149,7 @@ def euler_rotation(angles: Array) -> Array:
 
 
 def euler_angles(R: Array) -> Array:
-    """Return Euler angles (..., 3) of rotation matrices (..., 3, 3), radians, the second within a quarter turn.
+    """Return Euler angles (..., 3) of rotation matrices (..., 3, 3), radians; the second is in [-π/2, π/2].
 
     The third angle is computed after the rotation by the first angle is removed. At gimbal lock (the second angle is a
     quarter turn) the first angle is arbitrary, and the third angle compensates for it.

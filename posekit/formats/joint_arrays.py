@@ -77,7 +77,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     names = tuple(str(one) for one in np.ravel(next((document[n] for n in NAMES if n in document), ())))
     if names and len(names) != points.shape[1]:
         got = f"{len(names)} names"
-        raise refusal(path, "joint_names", got, f"{points.shape[1]}, one a point", "correct the file")
+        raise refusal(path, "joint_names", got, f"{points.shape[1]}, one per point", "correct the file")
     if np.shape(document.get("head")) == (frames, len(HEAD_POINTS), 3):
         points = np.concatenate([points, np.asarray(document["head"], dtype=np.float64)], axis=1)
         names = (*(names or JOINTS), *HEAD_POINTS)
@@ -142,7 +142,7 @@ def _times(held: Held, clip: Ints | None, frames: int, path: str) -> tuple[float
     """Return the file's rate and times; if recordings have different rates, times are computed from these rates."""
     time, rate = time_and_rate(held)
     if time is not None and len(time) != frames:
-        raise refusal(path, "time", f"{len(time)} of them", f"{frames} numbers", "correct the file")
+        raise refusal(path, "time", f"{len(time)} numbers", f"{frames}", "correct the file")
     rates = np.ravel(held.get("clip_fps", ())).astype(np.float64)
     if time is None and clip is not None and clip.max() < rates.size and len(np.unique(rates)) > 1:
         starts = np.array([np.argmax(clip == index) for index in range(rates.size)])
@@ -242,7 +242,7 @@ def _clip_names(motion: Motion) -> tuple[str, ...]:
 
 
 def columns_of(motion: Motion) -> dict[str, NDArray[Any]]:
-    """Return columns with one row per frame: time, name of the clip if there are several, ``neck_x``, …, or q."""
+    """Return columns with one row per frame: time, clip if there are several, and coordinates (``neck_x``) or q."""
     clip = np.asarray(motion.clip)
     columns: dict[str, NDArray[Any]] = {}
     if not motion.in_time and len(motion) > 1:

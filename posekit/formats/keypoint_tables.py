@@ -51,7 +51,7 @@ def _reader(table: Table) -> Callable[[Table, Rows], None] | None:
 
 
 def _in_pictures(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the columns of each point by coordinate or confidence, from names such as ``nose_x``, ``nose.score``."""
+    """Group column names, such as ``nose_x``, by point, and by ``x``, ``y`` or ``sure`` (confidence)."""
     found = columns_of_points(names).items()
     return {
         name: parts for name, parts in found if {"x", "y"} <= set(parts) and "world" not in name.casefold()
@@ -100,7 +100,7 @@ def _deeplabcut(table: Table, rows: Rows) -> None:
 
 
 def _stacked(parts: Mapping[str, Mapping[str, Any]], column: Callable[[Any], Array], count: int) -> Array:
-    """Return x, y and confidence (T, P, 3) from columns by point and part; NaN without a column."""
+    """Return x, y and confidence of the points (T, P, 3); NaN for values without a column."""
     points = np.full((count, len(parts), len(COORDS)), np.nan)
     for k, part in enumerate(parts.values()):
         for axis, name in enumerate(COORDS):

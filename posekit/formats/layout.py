@@ -91,10 +91,11 @@ class Layout:
         return found
 
     def seen(self, names: Sequence[str], values: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-        """Convert points in pictures (N, P, D) to posekit's names; neck and pelvis lie between shoulders and hips.
+        """Map a detector's image points (N, P, D) to posekit's points; compute neck and pelvis if they are absent.
 
         A detector's neck is the midpoint of the shoulders. The figure's pelvis is between the neck and the midpoint of
-        the hips, near the hips. Both are computed in the image; bent spines and perspective cause errors of 1 to 2 cm.
+        the hips, near the hips. Neck and pelvis are computed in the image; bent spines and perspective cause errors of
+        1 to 2 cm.
         """
         found = self.gather(values, names)
         found = {**middles(found), **found}
@@ -110,7 +111,7 @@ class Layout:
         return *_in_order(found, values), tuple(derived)
 
     def place(self, names: Sequence[str], points: Array) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
-        """Convert a file's 3D points to posekit's names; neck and pelvis are computed if the file lacks them.
+        """Map a file's 3D points to posekit's points; compute neck and pelvis if the file lacks them.
 
         Parameters
         ----------
@@ -238,11 +239,10 @@ def by_order(count: int) -> list[Layout]:
 def by_names(names: Sequence[str], source: str) -> Layout:
     """Find the layout of a file that names its points.
 
-    A layout fits if it defines all joints of every limb. Layouts that fit are ranked: first those with exactly these
-    points, then by the number of identical names (``RHip`` differs from ``r_hip``, with possibly another neck), then by
-    the number of landmarks, then those of files that name their points, then by the number of used names. If no layout
-    fits, the naming conventions of animation programs are tried, then layouts that define shoulders, hips and half of
-    the other limb joints.
+    A layout fits if it defines all joints of every limb. If several layouts fit, the first criterion that differs
+    decides: exactly the file's points; more identically spelt names (``RHip`` differs from ``r_hip``); more landmarks;
+    no fixed order of points; more used names. If no layout fits, the naming conventions of animation programs are
+    tried, then layouts that define shoulders, hips and half of the other limb joints.
 
     Raises
     ------
@@ -285,7 +285,7 @@ def by_names(names: Sequence[str], source: str) -> Layout:
 
 
 def _by_habit(names: Sequence[str]) -> Layout | None:
-    """Return a layout of names of animation programs, which consist of a common prefix, a side and a body part."""
+    """Return a layout of an animation program's names: each consists of a common prefix, a side and a body part."""
     habits = _built_in("animation").fields
     prefix = _common_prefix(names)
     found: dict[tuple[str, str], str] = {}

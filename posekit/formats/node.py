@@ -38,11 +38,11 @@ class Node:
         self.value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
     def refused(self, expected: str, remedy: str = "correct it", got: str = "") -> InputError:
-        """Return the error about this value."""
+        """Return an `InputError` about this value: what was found, what was expected, and the remedy."""
         return refusal(self.source, self.place, got or self._shown(), expected, remedy)
 
     def wrong(self, key: str, value: Any, expected: str, remedy: str, got: str = "") -> InputError:
-        """Return the error about a member's value."""
+        """Return an `InputError` about the value of the member `key`."""
         place = f"{self.place}.{cut(key)}".lstrip(".")
         return Node(value, self.source, place).refused(expected, remedy, got)
 
@@ -54,7 +54,7 @@ class Node:
         return shown(self.value.tolist() if isinstance(self.value, np.ndarray | np.generic) else self.value)
 
     def at(self, key: str | int, default: Any = MISSING) -> Node:
-        """Return a member of an object or list; a missing or null member is the default or, without one, refused."""
+        """Return a member of an object or list. If it is missing or null, return the default, or raise without one."""
         place = f"{self.place}[{key}]" if isinstance(key, int) else f"{self.place}.{cut(key)}".lstrip(".")
         value = self.value[key] if isinstance(key, int) else self.object().get(key)
         if value is None and default is MISSING:

@@ -38,8 +38,8 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        Arrays by name; an array without a name has the key ``""``. If a pickle is a dict with one clip, the result is
-        that clip.
+        Arrays by name; an array without a name has the key ``""``. If a pickled dict contains only one value, which is
+        a dict, the result is that inner dict.
 
     Raises
     ------
@@ -88,7 +88,7 @@ LAST_CHARACTER: Final = 0x10FFFF
 
 
 def _npy(file: io.BytesIO, source: str) -> Any:
-    """Read an array; the restricted unpickler reads an array of objects."""
+    """Read an array of an NPY file; the restricted unpickler `_Plain` reads arrays of objects."""
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file, max_header_size=100_000)
@@ -105,7 +105,7 @@ def _npy(file: io.BytesIO, source: str) -> Any:
 
 
 def _named(found: Any) -> dict[str, Any]:
-    """Return the named arrays of a pickle: its dict, the only dict in its dict, or its one array under ``""``."""
+    """Return the arrays of a pickled dict, or of the only dict in it, by name; a sole array has the name ``""``."""
     found = _plain_array(found)
     while isinstance(found, list | tuple) and len(found) == 1 and isinstance(found[0], dict):
         found = found[0]
@@ -143,7 +143,7 @@ class _Pending:
         self.kind, self.spec = kind, spec
 
     def build(self, state: Any, file: io.BytesIO) -> Any:
-        """Return the array that a pickle's state describes; a data type returns itself, with the state's byte order."""
+        """Return the array that a pickled state describes; for a data type, set its byte order and return itself."""
         if self.kind == "dtype":
             if state[2] is not None or state[3] is not None or state[1] not in ("<", ">", "=", "|"):
                 raise pickle.UnpicklingError("a compound data type")
@@ -255,7 +255,7 @@ def _unpickled(file: io.BytesIO, source: str, extra: Named | None = None, load: 
 
 
 def _resolved(found: Any) -> Any:
-    """Replace unfinished arrays, to which a pickle refers twice, and refuse functions and classes."""
+    """Replace each `_Pending` in nested containers by its array, and refuse functions and classes."""
     if isinstance(found, _Pending):
         return _resolved(found.value)
     if isinstance(found, dict):

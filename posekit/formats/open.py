@@ -1,4 +1,4 @@
-"""`open`: read a file, recognise its container, and call the first reader that fits its content."""
+"""`open`: read a file, recognise its container (JSON, arrays, table, …), and call the first reader that fits."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ WRITTEN_ONLY: Final = (".glb", ".gltf")
 
 
 def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
-    """Read a file and return the name of its container and its document.
+    """Parse a file; return the name of its container, such as ``json``, and its document (the parsed content).
 
     The document of JSON and TOML is a dict or a list. The document of arrays (NPZ, NPY, pickles) is a dict of arrays,
     numbers, strings and plain containers; an array without a name has the key "". The document of a table is a

@@ -14,7 +14,8 @@ from posekit.settings import number
 class Options:
     """Facts about a file that its user states; facts that are not stated are found in the file.
 
-    Words such as ``"meters"``, ``"Y"`` and ``"y-up"`` are accepted. The rate may be a text such as ``"30 Hz"``.
+    Words such as ``"meters"`` for the unit and ``"Y"`` or ``"y-up"`` for the axis are accepted. The rate may be a text
+    such as ``"30 Hz"``.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ def looks_like(document: Any) -> bool:
 
 
 def read(document: Any, path: str | Path, options: Options) -> Motion:
-    """Read postures. Without times and rate, the postures are not successive in time.
+    """Read postures. If neither times nor a rate are known, the postures are not successive in time.
 
     Parameters
     ----------

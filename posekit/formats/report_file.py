@@ -125,14 +125,14 @@ def write_md(path: str | Path, report: Report) -> None:
 
 
 def _about(report: Report) -> dict[str, Any]:
-    """Return the fields that are not arrays."""
+    """Return the fields of a report that are not arrays."""
     about: dict[str, Any] = {"schema": REPORT_SCHEMA}
     about |= {name: list(getattr(report, name)) for name in TEXTS}
     return about | {name: plain(dict(getattr(report, name))) for name in MAPPINGS}
 
 
 def _arrays(report: Report) -> Mapping[str, Any]:
-    """Return the arrays by name, with booleans as 0 and 1."""
+    """Return the arrays of a report by name, with booleans as 0 and 1."""
     held = {name: np.asarray(getattr(report, name)) for name in (*ROWS, *TABLES)}
     held |= {f"findings.{name}": np.asarray(report.findings[name]) for name in (*FINDINGS, *NUMBERS)}
     return {name: one.astype(np.int8) if one.dtype == np.bool_ else one for name, one in held.items()}

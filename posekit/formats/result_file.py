@@ -38,14 +38,14 @@ POWERS: Final = {"joints": 1, "head": 1, "radius": 1, "scale": -1, "answer.joint
 
 
 class Column(NamedTuple):
-    """Shape of one row's value (None stands for the number of frames or the size of q), and the value if unknown."""
+    """Shape of a column's entries (None: the number of frames, or the length of q), and the entry if unknown."""
 
     shape: tuple[int | None, ...] = ()
     empty: Any = np.nan
 
 
 def _declared(key: str) -> dict[str, Any]:
-    """Return the metadata ``shape`` or ``entry`` of the tables' fields, by the fields' names in files."""
+    """Return the metadata of all fields of tables whose metadata contain `key`, by the fields' names in files."""
     return {
         f"{table}.{one.name}".lstrip("."): one.metadata
         for table, kind in TABLES.items()
@@ -165,7 +165,7 @@ def _held(recovery: Recovery, name: str) -> Any:
 
 
 def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
-    """Return the columns of all tables by name, in metres, without survivors' columns whose values are all empty."""
+    """Return the columns of all tables by name, in metres; omit optional survivors' columns without known values."""
     found = {}
     for name, column in COLUMNS.items():
         if (held := _held(recovery, name)) is not None:
@@ -178,7 +178,7 @@ def _arrays(recovery: Recovery) -> dict[str, NDArray[Any]]:
 
 
 def _about(recovery: Recovery) -> dict[str, Any]:
-    """Return the fields that are not arrays."""
+    """Return the fields of a result that are not arrays."""
     about = {"schema": RESULT_SCHEMA, **plain({name: getattr(recovery, name) for name in ABOUT})}
     about |= {"frames": {"pictures": list(recovery.frames.pictures)}, "answer": {}}
     for name in LISTS:
@@ -202,7 +202,7 @@ def _in_unit(recovery: Recovery) -> dict[str, dict[str, list[Any]]]:
 
 
 def _objects(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    """Yield the rows of columns as objects."""
+    """Yield the rows of columns as dicts."""
     return (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
 
 
@@ -228,7 +228,7 @@ def _frame_fields(recovery: Recovery, tables: Mapping[str, dict[str, list[Any]]]
 
 
 def _scaled(fields: Mapping[str, Any] | None, lengths: tuple[str, ...], per: float) -> dict[str, Any] | None:
-    """Multiply the lengths among a frame's fields by `per`; a residual is in pixels unless the camera has a field f."""
+    """Multiply the fields in `lengths` by `per`, and divide a scale by it; scale the residual only if f is given."""
     if fields is None:
         return None
     found = dict(fields)
@@ -360,7 +360,7 @@ def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Rec
 
 
 def _values(arrays: Node, name: str, rows: int | None, frames: int | None) -> NDArray[Any]:
-    """Return the array of a column, in which NaN is replaced by the column's value for unknown rows."""
+    """Return the array of a column; the column's entry for unknown values replaces NaN."""
     node, (shape, empty) = arrays.at(name), COLUMNS[name]
     if empty == "":
         return np.asarray(node.value)

@@ -83,7 +83,7 @@ def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
 
 
 def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
-    """Return the names of the arrays or columns for a part of a layout; empty if one of them is missing."""
+    """Return the names of the arrays or columns of one part, such as the root's position; empty if one is missing."""
     if "arrays" in part:  # the first known name
         return [name for name in part["arrays"] if getattr(columns.get(name), "ndim", 0) > 1][:1]
     if "each" in part:  # a name per coordinate
@@ -101,7 +101,7 @@ def _labels(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> tuple[str, 
 
 
 def _whole(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> str | None:
-    """Return the name of the array with root and joints, which has 7 columns more than there are joint names."""
+    """Return the name of the array with root and joints; it has 7 columns more than the file has joint names."""
     wide = len(_labels(parts, columns)) + len(ROOT_NAMES)
     for name in parts["whole"]["arrays"]:
         values: Any = columns.get(name)
@@ -135,7 +135,7 @@ def read(document: Any, path: str, options: Options) -> Motion:
     )
     if labels and len(labels) != joints.shape[1]:
         got = f"{len(labels)} names"
-        raise refusal(path, "joint names", got, f"{joints.shape[1]}, one a joint", "correct the file")
+        raise refusal(path, "joint names", got, f"{joints.shape[1]}, one per joint", "correct the file")
     if any((np.abs(values) > FARTHEST_COORDINATE).any() for values in (place, turn, joints)):
         raise refusal(path, "", "a number too large", f"numbers below {FARTHEST_COORDINATE:g}")
     up = options.up or str(about.get("up", ""))
@@ -200,7 +200,7 @@ def _without_counter(values: Array, options: Options) -> dict[str, Array]:
 def _of_whole(
     parts: Mapping[str, Any], columns: Mapping[str, Any]
 ) -> tuple[Array, Array, Array, tuple[str, ...]]:
-    """Split rows into position, quaternion, joints and joint names; rows without a free root are joints only."""
+    """Split rows into position, quaternion, joints and joint names; rows of a fixed base are joints only."""
     labels, root = _labels(parts, columns), len(ROOT_NAMES)
     values = np.asarray(columns[_whole(parts, columns) or ""], dtype=np.float64)
     if labels[:root] == ROOT_NAMES:
@@ -268,9 +268,9 @@ def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | Non
 
 
 def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:
-    """Return the layout of joints without names: a simulator's breadth-first order, or the depth-first order.
+    """Return the name of the layout with the order of unnamed joints: a simulator's breadth-first, or depth-first.
 
-    In breadth-first order the first two bodies are the left and right hip, at equal distances from the root.
+    In breadth-first order, the two bodies after the root are the left and right hip, equally far from the root.
     """
     order = str(parts["joints"].get("orders", {}).get(str(count), ""))
     bodies = np.asarray(columns.get("body_pos_w", ()))
@@ -331,8 +331,8 @@ def root_quaternion(
     """Convert quaternions to the order x, y, z, w, and find the axis along which the robot stands.
 
     If no order is stated, both orders are compared: first by how upright the robot stands, then by whether it heads in
-    its direction of travel (its x axis points forward). If both are equal, the order is x, y, z, w by convention.
-    Continuity cannot decide, because rotations between frames have the same angles in both orders.
+    its direction of travel (its x axis points forward). If neither decides, the order is x, y, z, w by convention.
+    Continuity over time cannot decide, because rotations between frames have the same angles in both orders.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
     path : path
         Path whose suffix determines the format; a further ``.gz`` compresses the file.
     which : {"", "answer", "path", "all", "first"}
-        Postures of a recovery that files of motion get; the followed path if there is one, else the answer.
+        Postures of a recovery to write to a file of motion; by default the followed path or, without one, the answer.
     **options
         Options of the format, such as ``unit="m"`` for BVH.
 
@@ -83,7 +83,7 @@ def save(thing: Any, path: str | PathLike[str], *, which: str = "", **options: A
 
 
 def refuse_ending(kind: str, path: Path) -> None:
-    """Refuse a file name with a suffix in which objects of a class cannot be written; a recovery is also a motion."""
+    """Refuse a suffix to which objects of a class cannot be written; a recovery can also be written as a motion."""
     known = {**WRITERS.get(kind, {}), **(WRITERS["Motion"] if kind == "Recovery" else {})}
     if suffix_of(path) not in known:
         expected = f"one that is written: {', '.join(known)}" if known else "a motion, view, result or report"
@@ -94,7 +94,7 @@ def refuse_ending(kind: str, path: Path) -> None:
 
 
 def with_points(motion: Motion) -> Motion:
-    """Return a motion of configurations with the robot's 14 joints, metres, by forward kinematics.
+    """Return a motion with the positions of 14 joints, metres, computed from the robot's configurations.
 
     Raises
     ------

@@ -5,8 +5,8 @@ Keys: ``poses`` (T, 3 K), rotation vectors of the joints in the model's order, o
 frame rate (Mahmood et al. 2019, *AMASS: Archive of Motion Capture as Surface Shapes*). By convention z is up.
 
 The rest positions of joints are from the file or else from the mean shape of the neutral SMPL model. Shapes (``betas``)
-are ignored, because they need the model's files, which may not be redistributed. They change lengths by a few per cent
-but no angles.
+are ignored, because they need the model's files, which may not be redistributed. A shape changes lengths by a few per
+cent, but no angles.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def looks_like(document: Any) -> bool:
 
 
 def _angles(document: Any) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return the arrays of a body model, at the top level or in an inner dict, and the names of its angles."""
+    """Return the arrays of a body model, at the top level or in an inner dict, and the keys of its joint angles."""
     inner = document.values() if isinstance(document, Mapping) else ()
     for arrays in (document, *inner):
         if isinstance(arrays, Mapping) and any(name in arrays for name in _PLACES):

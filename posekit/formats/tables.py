@@ -134,7 +134,7 @@ class Table:
         return [str(value) for value in self.columns[name]]
 
     def checked(self, name: str) -> Array:
-        """Return a column as numbers (N,); NaN for empty cells. Refuse other cells without a number."""
+        """Return a column as numbers (N,); NaN for empty cells. Refuse cells with other text."""
         if not self.lines:
             return self.column(name)
         lines = self.numbers_of_lines[len(self.head) :]
@@ -162,7 +162,7 @@ def numbers(cells: list[str]) -> Array:
 
 
 def checked(cells: list[str], source: str, place: Callable[[int], str]) -> Array:
-    """Convert cells to numbers (N,); NaN for empty cells. Refuse other cells; the message names their position."""
+    """Convert cells to numbers (N,); NaN for empty cells. Refuse cells with other text; the message says where."""
     values = numbers(cells)
     for k in np.flatnonzero(~np.isfinite(values)).tolist():
         if cells[k].casefold() not in MISSING:
@@ -180,7 +180,7 @@ def _number(cell: str) -> float:
 
 
 def columns_of_points(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the names of each point's columns by ``x``, ``y``, ``z`` and ``sure`` (confidence)."""
+    """Group the names of columns by point, and by ``x``, ``y``, ``z`` or ``sure`` (confidence)."""
     found: dict[str, dict[str, str]] = {}
     for column in names:
         if match := _OF_POINT.fullmatch(column):

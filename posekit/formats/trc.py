@@ -107,7 +107,7 @@ def _title_cells(table: Table, line: str) -> list[str]:
 
 
 def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
-    """Return the markers' names: usually one for three columns, in some files one per column or with doubled tabs."""
+    """Return the markers' names from a header that has each name above three columns once, or above every column."""
     every_third = tuple(cells[::3])
     if all(every_third) and not any(cells[1::3]) and not any(cells[2::3]):
         return every_third
@@ -163,7 +163,7 @@ def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
 
     if not options.urdf:
         options.note(
-            "these are coordinates of an OpenSim model: give a URDF with them (--urdf), or the .trc of the markers"
+            "these are coordinates of an OpenSim model: give a URDF of it (--urdf), or the .trc of the markers"
         )
     return Motion(
         q=values[:, 1:],
@@ -211,7 +211,7 @@ def one_recording(motion: Motion, format: str) -> Array:
         raise refusal(motion.source, "", got, f"points for {format}", "write csv or npz, or give --urdf")
     if len(np.unique(np.asarray(motion.clip))) > 1 or (len(motion) > 1 and not motion.in_time):
         got = f"{len(np.unique(np.asarray(motion.clip)))} recordings, or several postures per frame"
-        raise refusal(motion.source, "", got, f"one for {format}", "write csv or npz, or choose one")
+        raise refusal(motion.source, "", got, f"one recording for {format}", "write csv or npz")
     return motion.joints
 
 
@@ -231,6 +231,6 @@ def even_step(motion: Motion, format: str) -> float:
     if not beside.max() <= UNEVEN_STEP_SHARE:
         got = f"steps from {np.diff(time).min():.4g} to {np.diff(time).max():.4g} s"
         raise refusal(
-            motion.source, "time", got, f"even steps: {format} has no other", "write csv, npz or trc"
+            motion.source, "time", got, f"even time steps, as {format} requires", "write csv, npz or trc"
         )
     return step

@@ -32,7 +32,7 @@ FIGURE_FIELDS: Final = ("lengths", "shoulders", "stature", "head_points")
 
 
 def looks_like(document: Any) -> bool:
-    """Return whether a JSON document states the schema, or has the fields of a view without a schema."""
+    """Return whether a JSON document is a view: by its schema or, without a schema, by its fields."""
     if not isinstance(document, dict):
         return False
     schema = schema_of(document)
@@ -104,7 +104,7 @@ def read(document: Any, path: str | Path, options: Options) -> View:
 
 
 def _parts(document: Any, path: str | Path, unit: Any) -> tuple[Node, str, CameraModel, list[Node]]:
-    """Return a document's root node, unit (`unit` if it states none), camera, and nodes of frames."""
+    """Return a document's root node, its unit of length (by default `unit`), its camera and its frames."""
     root = Node(document, path)
     check_schema(root, VIEW_SCHEMA)
     root.object(FIELDS)
@@ -128,7 +128,7 @@ def check_schema(root: Node, *schemas: str) -> str:
 
 
 def camera_from(node: Node, unit: str) -> CameraModel:
-    """Make a camera from its fields in a view, in a result or in the header of live key points.
+    """Make a camera from its JSON fields in a view, a result or the header of a stream of key points.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def _head_points(node: Node, unit: str) -> dict[str, Array] | None:
 
 
 def _refuse_objects(image: Node) -> None:
-    """Refuse the view of an object that is not a person: its frames have no joint of a body."""
+    """Refuse image points without any joint of a person: they belong to another object."""
     names = image.object()
     if len(names) > 1 and not any(name in POINTS for name in names):
         raise image.refused("the joints of a person", "recover another articulated object with --linkage")
@@ -254,8 +254,9 @@ def read_object(document: Any, path: str | Path, points: Sequence[str]) -> dict[
     Returns
     -------
     dict
-        ``image`` (F, P, 2) in pixels, ``truth`` (F, P, 3), ``time`` (F,), ``aspect``, and ``scale`` in pixels per
-        metre, None if unknown. Lengths are metres, or in the object's own unit if the file's ``unit`` is null.
+        ``image`` (F, P, 2) in pixels; ``truth`` (F, P, 3), the true positions; ``time`` (F,) in seconds; ``aspect``,
+        the ratio of a pixel's width to its height; ``scale`` in pixels per metre, None if unknown. Lengths are in
+        metres, or in the object's own unit if the file's ``unit`` is null.
 
     Raises
     ------
