@@ -87,7 +87,7 @@ def points_motion(
     up_by_custom : str
         Axis that points up by the format's convention.
     partial : bool
-        Whether files of this format may contain markers only. Such a file is read without joints, with a warning.
+        Whether points that fit no layout are accepted as markers. The motion then has no joints, but a warning.
     **fields
         Further fields of `Motion`.
 
@@ -132,7 +132,7 @@ def points_motion(
 def _layout_of(
     points: Array, names: Sequence[str], source: str, options: Options, layout: Layout | None, partial: bool
 ) -> Layout:
-    """Return the stated layout, or a layout that fits the names or the points; an empty layout for markers only."""
+    """Return the stated layout, or a layout that fits the names or the points; an empty layout if markers fit none."""
     if options.layout:
         layout = load_layout(options.layout)
         if layout.kind != "points":
@@ -177,7 +177,7 @@ def unnamed(points: Array, source: str, options: Options) -> Layout:
         remedy = f"name their order with --layout {named or 'NAME'}, or a TOML file of your own"
         raise refusal(source, "points", got, named or f"as many as {known}", remedy)
     layout = min(fits, key=lambda one: _misfit(one, points))
-    options.note(f"points are in the order of {layout.name}, in which they form a body")
+    options.note(f"points are in the order of {layout.name}: in this order they form a body")
     return layout
 
 

@@ -116,7 +116,7 @@ def parse(data: bytes, source: str) -> Bvh:
     names, parents, offsets, channels, sites = zip(*joints, strict=True)
     width = sum(map(len, channels))
     if width == 0:
-        raise refusal(source, "CHANNELS", "none", "channels of at least one joint", "nothing moves in it")
+        raise refusal(source, "CHANNELS", "none", "channels of at least one joint", "it has no motion")
     return Bvh(
         text=document,
         names=names,
@@ -255,7 +255,7 @@ def holds(document: Bvh, motion: Motion) -> bool:
 def with_values(document: Bvh, values: Array) -> Bvh:
     """Return the file with new values (T, C); unchanged numbers keep their text byte for byte."""
     if values.shape != document.values.shape:
-        raise refusal("", "values", f"shape {values.shape}", f"{document.values.shape}", "keep the frames")
+        raise refusal("", "values", f"shape {values.shape}", f"{document.values.shape}", "keep the shape")
     head = _HEAD.match(document.text, _MOTION.search(document.text).end())  # type: ignore[union-attr]
     start = head.end()  # type: ignore[union-attr]
     parts = re.split(r"(\S+)", document.text[start:])  # white space and words in turn

@@ -1,7 +1,7 @@
 """Cameras in files: OpenCV's YAML, XML and JSON, ROS's camera_info, NPZ arrays, and TOML of Pose2Sim and Anipose.
 
-All these formats have named fields, with different names. One reader finds intrinsics, distortion, pose and image size
-under their usual names. Pose2Sim states ``fisheye`` for every camera; its unit is metres, and its z axis points up.
+These formats store the same values in fields of different names. One reader finds intrinsics, distortion, pose and
+image size under their usual names. Pose2Sim states ``fisheye`` for every camera; its unit is metres, its z axis is up.
 Anipose's unit is that of its calibration board, mostly millimetres. In Caliscope's files, ``rotation_count`` (quarter
 turns of the pictures) determines which axis is up.
 """
@@ -280,7 +280,7 @@ def write_toml(path: str | Path, cameras: Mapping[str, PinholeCamera]) -> None:
     ups = {camera.up for camera in cameras.values()}
     if len(ups) > 1:
         got = f"worlds that point up along {', '.join(map(shown, sorted(ups)))}"
-        raise refusal(path, "up", got, "the same up axis for all", "write one file for each")
+        raise refusal(path, "up", got, "the same up axis for all", "write one file per axis")
     tables: dict[str, dict[str, Any]] = {}
     for number, (name, camera) in enumerate(cameras.items(), start=1):
         if one_line(name) != name:

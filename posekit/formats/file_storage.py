@@ -73,7 +73,7 @@ def parse_xml(data: bytes, source: str) -> dict[str, Any]:
         raise refusal(source, "", f"no plain XML: {reason}", "XML without a document type") from None
     if root.tag != "opencv_storage":
         raise refusal(
-            source, "", f"<{cut(root.tag)}>", "cameras in <opencv_storage>", "name a robot by its URDF"
+            source, "", f"<{cut(root.tag)}>", "cameras in <opencv_storage>", "give a robot with --urdf"
         )
     return {element.tag: _xml_value(element) for element in root}
 

@@ -3,7 +3,7 @@
 The format is that of Khronos Group, *glTF 2.0 Specification* (2021), in metres, with y up. Each joint is a node with
 its name and position; the capsule of its link is a child of the node. A motion is one animation: rotations of nodes and
 the translation of the pelvis, interpolated linearly between frames. Numbers of an animation are 32-bit floats.
-They are relative to a root node at whole metres near the person, and so exact to 1e-6 m far from the origin.
+Positions are relative to a root node at whole metres near the person, so they are exact to 1e-6 m far from the origin.
 """
 
 from __future__ import annotations

@@ -158,7 +158,7 @@ def _coco(root: Node, rows: Rows, label: str) -> None:
 
 
 def _results(root: Node, rows: Rows, label: str) -> None:
-    """Read a flat list of people: COCO results, or AlphaPose's, in which the picture's id is its name."""
+    """Read a flat list of people: results of COCO, or of AlphaPose, whose picture id is the picture's name."""
     rows.film = None
     for one in root.list():
         identity = one.at("image_id").value
@@ -217,7 +217,7 @@ def _openpose(root: Node, rows: Rows, label: str) -> None:
 
 
 def _by_three(node: Node) -> Array:
-    """Return a flat list of x, y and flag or confidence of each point as rows (K, 3)."""
+    """Convert a flat list of numbers to rows (K, 3): x, y, and visibility flag or confidence of each point."""
     flat = node.array(None, unknown=True)
     if not len(flat) or len(flat) % 3:
         raise node.refused("a list [x, y, v, x, y, v, …]", got=f"{len(flat)} numbers")

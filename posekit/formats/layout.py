@@ -1,4 +1,4 @@
-"""Layouts: the mapping from a file's point names or indices to joints, from TOML in ``urdf/layouts`` or of the user."""
+"""Layouts: mappings from a file's point names or indices to joints, from TOML files (built-in or the user's)."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Layout:
     points : tuple of str
         Names of the format's points in order; empty if files state the names.
     landmarks : dict
-        By landmark (`LANDMARKS`), the names of the file's points whose mean is the landmark.
+        For each landmark (`LANDMARKS`), the names of the file's points; the landmark is the mean of these points.
     feet : dict
-        By toe or heel (`posekit.skeleton.FEET_POINTS`), the names of the file's points.
+        For each toe and heel (`posekit.skeleton.FEET_POINTS`), the names of the file's points.
     fields : dict
-        All other fields of the TOML: ``source``, ``up``, ``unit``, ``counts``, ``parts``, ``robot``, ``needs``,
-        ``joints``, and the arrays or columns of a robot's root.
+        All other fields of the TOML file, such as ``source``, ``up`` and ``unit``; for a robot also the arrays or
+        columns of the root.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Layout:
 
     @property
     def sources(self) -> dict[str, tuple[str, ...]]:
-        """The file's names for each landmark and foot point."""
+        """Names of the file's points for each landmark, toe and heel."""
         return {**self.landmarks, **self.feet}
 
     def gather(self, points: Array, names: Sequence[str] = ()) -> dict[str, Array]:

@@ -44,7 +44,7 @@ def parse(data: bytes, source: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the file is damaged or too large, or contains objects except arrays, numbers, strings and plain containers.
+        If the file is damaged or too large, or contains anything but arrays, numbers, strings and plain containers.
     """
     try:
         with warnings.catch_warnings():

@@ -61,7 +61,7 @@ def parsed(path: str | PathLike[str]) -> tuple[str, Any]:
 
     The document of JSON and TOML is a dict or a list. The document of arrays (NPZ, NPY, pickles) is a dict of arrays,
     numbers, strings and plain containers; an array without a name has the key "". The document of a table is a
-    `posekit.formats.tables.Table`, for Parquet with metadata in `about`. The document of a folder is its `Path`.
+    `posekit.formats.tables.Table`, whose `about` has the metadata of Parquet. The document of a folder is its `Path`.
     """
     given, path = str(path), Path(path)
     if given and path.is_dir():

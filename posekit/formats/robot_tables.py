@@ -361,7 +361,7 @@ def root_quaternion(
     if off.max(initial=0.0) > UNIT_LENGTH_ERROR:
         options.warn(f"lengths of quaternions differ from 1 by up to {off.max():.1%}: they are normalized")
     if zero.any():
-        options.warn(f"the quaternion is zero: no rotation is known in {zero.sum()} of {len(zero)} frames")
+        options.warn(f"the quaternion is zero in {zero.sum()} of {len(zero)} frames: no rotation is known")
     values = values / np.where(zero, np.nan, length)[:, None]
     known = np.isfinite(values).all(axis=1)
     if not known.any():
@@ -372,7 +372,7 @@ def root_quaternion(
 
 
 def _likely(both: Mapping[str, Array], place: Array, options: Options) -> str:
-    """Return the order of quaternions in which the robot stands, or in which it heads along its path."""
+    """Return the order of quaternions in which the robot leans less or, if that is equal, heads along its path."""
     lean = {name: min(median_lean(q, Z), median_lean(q, Y)) for name, q in both.items()}
     first, second = sorted(lean, key=lambda name: (lean[name], name != "xyzw"))
     off = {name: _off_heading(q, place) for name, q in both.items()}

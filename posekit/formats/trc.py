@@ -147,7 +147,7 @@ def _whole(text: str) -> int | None:
 
 
 def _read_mot(table: Table, end: int, path: str, options: Options) -> Motion:
-    """Read the joint angles of OpenSim's inverse kinematics; the user states their body model as a URDF."""
+    """Read the joint angles of OpenSim's inverse kinematics; the user states the URDF of the model."""
     header = " ".join(table.lines[:end]).lower()
     names = table.parted(table.lines[end + 1]) if end + 1 < len(table.lines) else []
     if not names or names[0].casefold() != "time":
