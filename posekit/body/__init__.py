@@ -1,4 +1,4 @@
-"""The figure: a URDF, its lengths and capsules, and the closed forms that convert joint positions to configurations."""
+"""The figure: a URDF, its lengths and capsules, and closed-form conversion of joint positions to configurations."""
 
 from posekit.body.angles import ClosedForm as ClosedForm
 from posekit.body.angles import Limits as Limits

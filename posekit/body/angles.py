@@ -1,12 +1,12 @@
-r"""Closed-form joint angles of a posture: all Euler branches, and the choice among them by joint limits.
+r"""Compute joint angles of a posture in closed form; joint limits decide between the Euler branches.
 
 A ball joint of the figure is three revolute joints, :math:`R = R_y(\alpha) R_x(\beta) R_z(\gamma)` in the parent's
-frame (x forward, y left, z up); a hinge below it rotates about y by :math:`\varepsilon`. At zero angles a limb hangs
-along -z, so that its upper segment points along
-:math:`R(-e_z) = (-\sin\alpha \cos\beta, \sin\beta, -\cos\alpha \cos\beta)`.
+frame (x forward, y left, z up); the hinge after it (elbow or knee) rotates about y by :math:`\varepsilon`. At zero
+angles a limb hangs along -z, so that its upper segment points along :math:`R(-e_z) = (-\sin\alpha \cos\beta, \sin\beta,
+-\cos\alpha \cos\beta)`.
 
-Functions return the angles of the URDF's joints: each is the angle of the formula times the sign of the joint's axis.
-An angle is free if the posture does not determine it.
+Functions return the angles of the URDF's joints: the angles of the formula, times -1 if the URDF's axis points along
+-x, -y or -z. An angle is free if the posture does not determine it.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ LIMBS: Final = tuple(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """Signs and limits of consecutive revolute joints.
+    """Axis signs and angle limits of K consecutive revolute joints.
 
     Parameters
     ----------
     sign : array (K,) or (N, K)
-        +1 or -1: the URDF axis is sign times the coordinate axis of the formula.
+        +1 or -1: the joint's URDF axis is the coordinate axis x, y or z times this sign.
     lower, upper : array (K,) or (N, K)
         Radians.
     """
@@ -90,8 +90,8 @@ class Limits:
     def cost(self, angles: Array) -> Array:
         """Return the cost (...) of Euler branches (..., K): the largest violation of a limit, radians.
 
-        The violation by a whole limb's axial rotation (K = 4) is multiplied by the sine of the hinge angle, because
-        axial rotation hardly moves the lower segment of an almost straight limb.
+        For a whole limb (K = 4), the violation by the axial rotation is multiplied by the sine of the hinge angle.
+        Axial rotation hardly moves the lower segment of an almost straight limb.
         """
         outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
         if self.sign.shape[-1] == N_LIMB_ANGLES:
@@ -110,12 +110,14 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Limits of all 22 angles. They decide among Euler branches; a free angle is set inside its limits.
+        Limits of all 22 angles. Of two Euler branches, the branch with the smaller violation of these limits is used.
+        An angle that the posture does not determine is set inside its limits.
     head_offsets : array (5, 3)
         Vectors from the neck to the head points, in the head link's frame, metres.
     middle_pelvis : bool
-        Whether the pelvis joint is between the hips. The spine then determines the orientation of the hips, and the
-        pelvis gets the smallest flexion for which the flexion of both hips is inside the limits, if possible.
+        Whether the pelvis joint is between the hips. If so, the direction from neck to pelvis determines the
+        orientation of the hips link. The pelvis then gets the smallest flexion that keeps both hip flexions inside
+        their limits, if possible.
     """
 
     limits: Limits
@@ -180,10 +182,10 @@ class ClosedForm:
 
     @cached_property
     def _choosing(self) -> Limits:
-        """Limits that decide among Euler branches; with a pelvis between the hips, hip flexion includes pelvis flexion.
+        """Limits for the choice of Euler branches; if the pelvis is between the hips, they add pelvis to hip flexion.
 
-        The posture does not determine how much of the flexion is the pelvis's: rotating the hips link about the line
-        between the hips changes only hip flexion.
+        Rotating the hips link about the line between the hips changes only hip flexion. The posture therefore does not
+        determine how the flexion divides between pelvis and hips.
         """
         if not self.middle_pelvis:
             return self.limits
@@ -196,13 +198,13 @@ class ClosedForm:
 
     @property
     def _pelvis_turn(self) -> tuple[float, float]:
-        """Limits of pelvis flexion, radians, with the sign of hip flexion."""
+        """Lower and upper limit of pelvis flexion, radians, in the sign convention of hip flexion."""
         sign = self.limits.sign[PELVIS_FLEXION] * self.limits.sign[HIP_FLEXIONS[0]]
         ends = (sign * self.limits.lower[PELVIS_FLEXION], sign * self.limits.upper[PELVIS_FLEXION])
         return min(ends), max(ends)
 
     def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
-        """Give each pelvis the smallest flexion that brings both hips into their limits (angles (N, 22))."""
+        """Set, in angles (N, 22), the smallest pelvis flexion that brings both hip flexions into their limits."""
         low, high = self._pelvis_turn
         least, most = np.full(len(angles), low), np.full(len(angles), high)
         for k in HIP_FLEXIONS:
@@ -234,14 +236,14 @@ def ball_branch(R: Array, branch: int = 0) -> Array:
 
 
 def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
-    """Return alpha, beta, gamma and epsilon (N, 4), radians, in the Euler branch with cos beta >= 0 and epsilon >= 0.
+    """Return a limb's alpha, beta, gamma and epsilon (N, 4), radians; cos beta >= 0 and epsilon >= 0.
 
     Parameters
     ----------
     R_parent : array (N, 3, 3)
-        R_cam_torso or R_cam_hips.
+        Frame of torso or hips, R_cam_torso or R_cam_hips.
     upper, lower : array (N, 3)
-        Unit directions of both segments, camera frame.
+        Unit directions of the upper and the lower segment, camera frame.
     """
     alpha, beta = direction_branches(rotate_back(R_parent, upper))[0].T
     x, y, z = into_ball(rotate_back(R_parent, lower), alpha, beta).T
@@ -249,16 +251,16 @@ def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
-    r"""Compute the three angles of a ball joint and the angle of the hinge below it.
+    r"""Compute a limb's angles: three of the ball joint (shoulder or hip) and one of the hinge (elbow or knee).
 
-    There are four solutions: two Euler branches times two signs of the hinge. The axial rotation is free if the limb is
-    straight. The first angle is free if the upper segment lies along the abduction axis. If no solution is inside the
-    limits, the free angles are changed to bring a solution inside.
+    There are four solutions: two Euler branches times two signs of the hinge. A straight limb does not determine its
+    axial rotation. An upper segment along the abduction axis does not determine the first angle. If no solution is
+    inside the limits, such an undetermined angle is changed to bring a solution inside.
 
     Parameters
     ----------
     upper, lower : array (N, 3)
-        Unit directions of the two segments in the parent's frame.
+        Unit directions of the upper and the lower segment in the frame of torso or hips.
     limits : Limits
         Limits of the four revolute joints of each limb (N, 4): ball joint, then hinge.
 
@@ -295,11 +297,12 @@ def _upper_angles(upper: Array, limits: Limits) -> Array:
 
 
 def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
-    r"""Return elevation, plane of elevation, and axial turn (N,), radians, of an arm with zero axial rotation.
+    r"""Return elevation, plane of elevation, and axial turn (N,), radians, of an arm whose third joint angle is zero.
 
-    The axial turn is the twist of the swing-twist decomposition minus the twist that carrying the arm around the
-    vertical causes: :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)`
-    minus :math:`(1 - \cos e)(90^\circ - p)`, with elevation e and plane p.
+    The axial turn is a difference of two twists. The first is the twist of the swing-twist decomposition,
+    :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)`. The second is the
+    twist of an arm that moves around the vertical, :math:`(1 - \cos e)(90^\circ - p)`, with elevation e and plane of
+    elevation p.
     """
     forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
     down = np.cos(flexion) * np.cos(abduction)
@@ -313,9 +316,9 @@ def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
 def other_branch(angles: Array) -> Array:
     r"""Return the angles of the same rotation in the other Euler branch.
 
-    :math:`(\alpha, \beta, \gamma) \to (\alpha + \pi, \pi - \beta, \gamma + \pi)` for rotations about three mutually
-    perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). The first two angles alone preserve the direction
-    of the third axis. A fourth angle, the hinge's, is unchanged.
+    The angles change by :math:`(\alpha, \beta, \gamma) \to (\alpha + \pi, \pi - \beta, \gamma + \pi)` for rotations
+    about three mutually perpendicular axes (Diebel 2006, *Representing Attitude*, §5.6). The first two angles of both
+    branches give the same direction of the third axis. A fourth angle, of a hinge, is unchanged.
 
     Parameters
     ----------
@@ -329,7 +332,7 @@ def other_branch(angles: Array) -> Array:
 
 
 def continuous(angles: Array) -> Array:
-    """Replace angles (T, J, 3) by angles of the same rotations that change least from frame to frame.
+    """Replace Euler angles (T, J, 3) by angles of the same rotations that change least from frame to frame.
 
     The first frame is unchanged. Full turns, and jumps to the other Euler branch (a + pi, pi - b, c + pi), are removed
     (Diebel 2006, *Representing Attitude*, section 5.6).
@@ -347,7 +350,7 @@ def continuous(angles: Array) -> Array:
 
 
 def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
-    """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment from `into_ball`."""
+    """Return the four angles (N, 4) of limbs, radians, in the solution whose hinge angle has the sign `side`."""
     across = np.hypot(local[:, 0], local[:, 1])
     gamma = np.where(across < STRAIGHT_LIMB_SINE, 0.0, np.arctan2(-side * local[:, 1], -side * local[:, 0]))
     epsilon = side * np.arctan2(across, -local[:, 2])
@@ -355,11 +358,11 @@ def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: 
 
 
 def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits) -> Array:
-    r"""Return the angles (N, 4) of limbs, with free angles changed if that reduces the violation of the limits.
+    r"""Return the angles (N, 4) of limbs; undetermined angles are changed if that reduces the violation of the limits.
 
-    A straight limb's axial rotation is clipped to its limits. At beta = +-90 deg,
-    :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends only on :math:`\gamma \mp \alpha`. If some alpha and gamma are
-    both inside their limits, then a pair with alpha zero, or with one of the two angles at a limit, is inside as well.
+    A straight limb's axial rotation is clipped to its limits. At beta = +-90 deg, :math:`R_y(\alpha) R_x(\beta)
+    R_z(\gamma)` depends only on :math:`\gamma \mp \alpha`, so many pairs of alpha and gamma give the same rotation. If
+    any pair is inside the limits, then so is a pair with alpha zero, or with alpha or gamma at a limit.
     """
     branches = direction_branches(upper)
     pinned, straight = _along_abduction_axis(upper), _parallel(upper, lower)
@@ -380,17 +383,17 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
 
 
 def _parallel(upper: Array, lower: Array) -> Flags:
-    """Return which limbs are straight or folded: both directions (N, 3) lie on one line."""
+    """Return a mask (N,) of straight or folded limbs, whose two segment directions (N, 3) are parallel."""
     return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE_ANGLE_SINE)
 
 
 def _along_abduction_axis(upper: Array) -> Flags:
-    """Return which directions (N, 3) lie along the abduction axis, so that the first angle is free."""
+    """Return a mask (N,) of the directions (N, 3) that are parallel to the abduction axis."""
     return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
 def direction_branches(upper: Array) -> Array:
-    """Return alpha and beta (2, N, 2) of directions (N, 3) in both Euler branches."""
+    """Return the angles alpha and beta (2, N, 2) of upper-segment directions (N, 3) in both Euler branches."""
     alpha = np.arctan2(-upper[:, 0], 0.0 - upper[:, 2])  # alpha is 0 along the abduction axis
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
@@ -398,7 +401,7 @@ def direction_branches(upper: Array) -> Array:
 
 
 def into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
-    """Convert directions to the frame after the rotations alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
+    """Convert directions (N, 3) to the frame after the rotations alpha and beta: (R_y(alpha) R_x(beta))^T lower."""
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     x, y, z = lower[:, 0], lower[:, 1], lower[:, 2]
     forward = sa * x + ca * z

@@ -35,9 +35,9 @@ class Capsule:
     link : str
         The URDF link.
     start, end : tuple of int
-        Points whose mean is the start of the axis, and points whose mean is its end.
+        Indices of points. The axis goes from the mean of the `start` points to the mean of the `end` points.
     center : float
-        Distance from the start to the capsule's middle along the axis, metres.
+        Distance along the axis from the mean of the `start` points to the capsule's middle, metres.
     half_length : float
         Half the length of the capsule's axis, metres.
     radius : float
@@ -53,7 +53,7 @@ class Capsule:
 
     @property
     def points(self) -> tuple[int, ...]:
-        """The points that determine the capsule's place."""
+        """Indices of the points that determine the capsule's position."""
         return self.start + self.end
 
     def place(self, points: Array) -> tuple[Array, Array]:
@@ -89,12 +89,12 @@ def read_capsules(
     Returns
     -------
     capsules, pairs
-        The capsules, and the pairs to check as indices of capsules.
+        The capsules, and the pairs to check for collision as indices of `capsules`.
 
     Raises
     ------
     FigureError
-        If a link has no capsule or another shape, or if a capsule's size is not positive or its axis is off its line.
+        If a link has no capsule, a size is not positive, or an axis is not on the line between the link's points.
     """
     import coal
     import pinocchio as pin
@@ -104,8 +104,10 @@ def read_capsules(
     capsules = []
     links = [model.frames[body.parentFrame].name for body in geometry.geometryObjects]
     if sorted(links) != sorted(CAPSULE_AXES):
-        expected = f"one on each of {', '.join(CAPSULE_AXES)}"
-        raise refusal(source, "collision bodies", f"those on {', '.join(links)}", expected, error=FigureError)
+        expected = f"one body on each of {', '.join(CAPSULE_AXES)}"
+        raise refusal(
+            source, "collision bodies", f"bodies on {', '.join(links)}", expected, error=FigureError
+        )
     for link, body, placement in zip(links, geometry.geometryObjects, geometry_data.oMg, strict=True):
         shape, field = body.geometry, f"link {shown(link)}, collision"
         if not isinstance(shape, coal.Capsule):
@@ -130,10 +132,10 @@ def read_capsules(
 
 
 def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule, ...]:
-    """Scale capsules with their links, from the neutral points (19, 3) of one figure to those of another.
+    """Scale capsules from a figure with the neutral points `old` (19, 3) to a figure with the neutral points `new`.
 
-    A capsule's position and length along its line scale with the line's length. Its radius has the same scale, except
-    that the torso's radius scales with the width of the shoulders.
+    The position, length and radius of a capsule scale with the length of its link. Only the torso's radius scales with
+    the width of the shoulders.
     """
     shoulders = float(np.linalg.norm(new[1] - new[2]) / np.linalg.norm(old[1] - old[2]))
     found = []

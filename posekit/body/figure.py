@@ -1,4 +1,4 @@
-"""The stick figure: one URDF, its Pinocchio model, and closed forms that convert joint positions to q and back."""
+"""The stick figure: a URDF, its Pinocchio model, and closed-form forward and inverse kinematics."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ SAME_POINT_METRES: Final = 1e-6
 
 
 class Configurations(NamedTuple):
-    """Configurations, and the distances between their joints and the postures' joints.
+    """Configurations of given postures, and the largest position error of each.
 
     Attributes
     ----------
     q : array (N, nq)
-        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. Angles of unknown joints are NaN; the neck
-        angles are zero if the head is unknown.
+        In Pinocchio's order: position (m), unit quaternion (x, y, z, w), joint angles (rad). Angles of unknown joints
+        are NaN; the neck angles are zero if the head is unknown.
     distance : array (N,)
         The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
     """
@@ -98,7 +98,7 @@ class Figure(Robot):
         Whether it is known if the shoulders lie in front of the line from neck to pelvis or behind it. A URDF
         determines the side; lengths do not.
     moved_lengths : mapping
-        Changes that `scaled` made to lengths that no torso or hips can have, metres, by segment name.
+        Changes that `scaled` made to impossible lengths of torso or hips, metres, by segment name.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class Figure(Robot):
     moved_lengths: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the texts and settings only: the model is built from them in milliseconds."""
+        """Pickle only texts and settings; unpickling builds the model from them in milliseconds."""
         settings = {one.name: getattr(self, one.name) for one in fields(self)}
         return _figure, (settings | {"moved_lengths": dict(self.moved_lengths)},)
 
@@ -167,7 +167,7 @@ class Figure(Robot):
 
     @property
     def shoulder_side(self) -> Literal["front", "behind", "undecided"]:
-        """Side of the line from neck to pelvis on which the shoulders lie; undecided if unknown or on it."""
+        """Side of the line from neck to pelvis on which the shoulders lie; undecided if unknown or on the line."""
         if not self.side_known or self.shoulder_offset == 0:
             return "undecided"
         return "behind" if self.shoulder_offset < 0 else "front"
@@ -180,7 +180,7 @@ class Figure(Robot):
 
     @cached_property
     def head_points(self) -> Array:
-        """Neck and the five head points (6, 3) in the paper's head frame: origin neck, x forward, y up, z right."""
+        """Neck and five head points (6, 3) in Lee and Chen's head frame: origin neck, x forward, y up, z right."""
         head = self.neutral_points[[0, *HEAD]]
         return np.stack([head[:, 0], head[:, 2], -head[:, 1]], axis=-1)
 
@@ -200,7 +200,7 @@ class Figure(Robot):
 
     @cached_property
     def limits(self) -> Limits:
-        """Signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
+        """Axis signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
         signs = np.empty(len(DOFS))
         for k, dof in enumerate(DOFS):
             joint = self.model.joints[self.model.getJointId(urdf_joint_name(dof))]
@@ -237,18 +237,19 @@ class Figure(Robot):
     ) -> Figure:
         """Return a figure with other lengths; capsules scale with their links.
 
-        Lengths that no torso or hips can have are replaced by the nearest possible lengths (`posekit.body.lengths`),
-        and `moved_lengths` has the changes. Lengths do not determine whether the shoulders lie in front of the line
+        If no torso or hips with these lengths exist, the nearest possible lengths are used (`posekit.body.lengths`).
+        Their changes are in `moved_lengths`. Lengths do not determine whether the shoulders lie in front of the line
         from neck to pelvis or behind it. The new figure's `side_known` is False unless `behind` is given or the torso
         is unchanged.
 
         Parameters
         ----------
         lengths : mapping, optional
-            Metres, by segment name ``a-b``, a before b in tree order. Left and right are separate. Other lengths are
-            unchanged.
+            Metres, by segment name, such as ``neck-pelvis`` (`posekit.skeleton.SEGMENT_NAMES`). Left and right are
+            separate. Other lengths are unchanged.
         head_points : mapping, optional
-            Head points in the paper's head frame, metres; if ``neck`` is given, the other points are relative to it.
+            Head points in the frame of `Figure.head_points`, metres; if ``neck`` is given, it is subtracted from the
+            others.
         stature : float, optional
             Height of the person, metres. Lengths that are not given are estimated from it (`lengths_from_stature`), and
             the head scales with it.
@@ -306,7 +307,7 @@ class Figure(Robot):
         return points
 
     def with_side_within(self, known: LengthUncertainty) -> Figure:
-        """Return the figure, with `side_known` False if uncertain lengths do not determine the shoulders' side."""
+        """Return the figure; set `side_known` to False if lengths of this uncertainty do not determine the side."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
         return replace(self, side_known=False)
@@ -377,7 +378,7 @@ class Figure(Robot):
         Parameters
         ----------
         joints : array (N, 14, 3) or (N, 19, 3)
-            Joints, and in the second form the five head points, metres, in any right-handed frame.
+            14 joints, or 14 joints and five head points, metres, in any right-handed frame.
         head : array (N, 5, 3), optional
             The head points, metres; unknown points are NaN.
         start
@@ -409,7 +410,7 @@ class Figure(Robot):
         return q
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
-        """Return the five head points in the head link's frame, with the given points replaced."""
+        """Return the figure's head points (5, 3) in the head link's frame, metres, after replacing the given points."""
         for name, point in head_points.items():
             if name not in ("neck", *HEAD_POINTS) or np.shape(point) != (3,):
                 got, expected = f"shape {np.shape(point)}", f"x, y, z of neck, {', '.join(HEAD_POINTS)}"
@@ -433,11 +434,11 @@ class Figure(Robot):
         if not near.all():
             place = f"the joint before {POINTS[int(np.argmin(near))]}"
             expected = "limbs along -z, joint origins without rpy, the stick figure's order of joints"
-            raise refusal(self.source, place, "another layout", expected, error=FigureError)
+            raise refusal(self.source, place, "a different geometry", expected, error=FigureError)
 
 
 def with_head(joints: ArrayLike, head: Array | None = None) -> Array:
-    """Append head points (N, 5, 3), unknown by default, to postures (N, 14, 3); leave (N, 19, 3) unchanged."""
+    """Append head points (N, 5, 3), by default NaN, to postures (N, 14, 3); return postures (N, 19, 3) unchanged."""
     joints = np.asarray(joints, dtype=np.float64)
     if joints.ndim != 3 or joints.shape[1] not in (len(JOINTS), len(POINTS)) or joints.shape[2] != 3:
         expected = f"(N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"

@@ -1,7 +1,7 @@
 """Coordinate frames of the torso and the hips, computed from a posture's points.
 
-Each is a rotation R_cam_part with the part's URDF axes (x forward, y left, z up) as columns. The paper names the same
-three directions of the torso differently: y down, z left, x forward.
+Each frame is a rotation matrix R_cam_torso or R_cam_hips. Its columns are the axes in camera coordinates: x forward, y
+left, z up. Lee and Chen (1985) name the torso's axes differently: x forward, y down, z left.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MIDDLE_PELVIS_PART: Final = 0.1
 
 
 def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis: Array) -> Array:
-    """Return the torso's frame: down is from neck to pelvis, left is along the shoulders and perpendicular to down.
+    """Return the torso's frame: down is from neck to pelvis; left is the shoulder line made perpendicular to down.
 
     Lee and Chen 1985, §3.1.
 
@@ -43,11 +43,11 @@ def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis
 
 
 def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | None = None) -> Array:
-    """Return the hips' frame: left is from right to left hip, down is from the pelvis and perpendicular to left.
+    """Return the hips' frame: left is from right to left hip; down is from pelvis to hips, made perpendicular to left.
 
-    A pelvis between the hips defines no plane with them. Then down is from the neck to the pelvis, made perpendicular
-    to the hips' line. The frame is continuous unless the spine is parallel to the line between the hips. It does not
-    determine the flexion of the pelvis.
+    If the pelvis lies between the hips, the three points define no plane. Down is then from the neck to the pelvis,
+    made perpendicular to left. The frame then varies continuously unless this direction is parallel to the line between
+    the hips. It does not determine the flexion of the pelvis.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
 
 
 def trunk_frames(points: Array, middle_pelvis: bool = False) -> tuple[Array, Array]:
-    """Return R_cam_torso and R_cam_hips (N, 3, 3) of postures (N, 14 or more, 3).
+    """Return the frames R_cam_torso and R_cam_hips (N, 3, 3) of postures (N, 14 or more, 3).
 
     `middle_pelvis` is whether the pelvis is between the hips; see `hips_frame`.
     """

@@ -2,11 +2,11 @@
 
 Masses, centres of mass and radii of gyration are from de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment
 inertia parameters", J Biomech 29:1223, Table 4. They are means of women and men, as fractions of body mass and segment
-length. The trunk extends from the cervicale to the middle of the hips, the shank to the centre of the ankle. Body parts
-that are no segment of the figure use another length: head and trunk use the distance from the neck to the middle of the
-hips, the hand uses the forearm's length, and the foot (placed at the ankle) uses the shank's length. The trunk below
-the navel belongs to the hips link. The torso link has the moments of the whole trunk minus the moments of the lower
-trunk (Steiner's theorem).
+length. In this table, the trunk extends from the seventh cervical vertebra to the middle of the hips, and the shank
+ends at the centre of the ankle. Body parts that are not segments of the figure use another length. Head and trunk use
+the distance from the neck to the middle of the hips. The hand uses the forearm's length. The foot, placed at the ankle,
+uses the shank's length. The trunk below the navel belongs to the hips link. The torso link has the moments of the whole
+trunk minus the moments of the lower trunk (Steiner's theorem).
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def inertias(lengths: Mapping[str, float]) -> dict[str, tuple[float, Array, Arra
     Returns
     -------
     dict
-        By link: mass, kg; centre of mass (3,), metres; moments about the centre (3,), kg m^2. Axes are the link's: x
-        forward, y left, z up.
+        By link name: mass, kg; centre of mass (3,), metres; moments about the centre of mass (3,), kg m^2. Axes are the
+        link's: x forward, y left, z up.
     """
     body = MASS_OF_STATURE_SQUARED * stature_from_lengths(lengths) ** 2
     to_pelvis = lengths["neck-pelvis"]

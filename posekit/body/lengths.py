@@ -1,14 +1,15 @@
-r"""Segment lengths: rigid parts from their lengths, the nearest possible lengths, and lengths from stature.
+r"""Segment lengths: shapes of torso and hips, nearest possible lengths, and lengths from stature.
 
-Six lengths determine a torso, and three determine hips. Lengths are possible (they close) if points with these
-distances exist in space. Medians over frames, taped lengths and rounded lengths may not close by a small amount. The
-nearest lengths that close lie on the boundary of the feasible set, where the torso's points are in one plane or the
-hips' points on one line:
+Six distances determine the shape of the torso's four points; three distances determine the shape of the hips' three
+points. Lengths close if points with these distances exist in space. Medians over frames, lengths from a tape and
+rounded lengths may fail to close by a small amount. The nearest lengths that close lie on the boundary of the feasible
+set, where the torso's points are in one plane or the hips' points on one line:
 
 .. math:: \min_p \sum_i \left(\frac{\log d_i(p) - \log l_i}{\sigma_i}\right)^2
 
-over positions p of the points in that plane or on that line, for lengths l with relative standard deviations
-:math:`\sigma`. An unknown common size has no effect, since closing does not depend on size.
+Here p are positions of the points in that plane or on that line, and :math:`d_i(p)` their distances. The given lengths
+:math:`l_i` have the relative standard deviations :math:`\sigma_i`. A common error of all lengths has no effect, because
+closing does not depend on scale.
 """
 
 from __future__ import annotations
@@ -103,11 +104,12 @@ def shoulders_are_behind(joints: Array) -> bool | None:
 def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     r"""Compute positions of neck, right shoulder, left shoulder and pelvis from their six distances.
 
-    With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that line: height
-    :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for neck-shoulder a,
-    neck-pelvis b, shoulder-pelvis c. The distance between the shoulders determines the angle between them about that
-    line. The left axis is the component of the shoulders' line perpendicular to the spine. The distances do not
-    determine whether the shoulders are in front or behind.
+    The neck is at the origin, the pelvis straight below. Each shoulder lies on a circle about the line from neck to
+    pelvis. The circle is :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and has the radius :math:`\sqrt{a^2 - h^2}`,
+    for distances a from neck to shoulder, b from neck to pelvis, and c from shoulder to pelvis. The distance between
+    the shoulders determines the angle between them about the line. The y axis is the direction from right to left
+    shoulder, made perpendicular to z. The distances do not determine whether the shoulders are in front of the line or
+    behind it.
 
     Parameters
     ----------
@@ -124,8 +126,8 @@ def torso_points(lengths: Lengths, *, behind: bool = False) -> Array:
     Raises
     ------
     FigureError
-        If no such torso exists: a triangle does not close, or the distance between the shoulders is too large or too
-        small.
+        If no torso has these lengths: a triangle does not close, or the distance between the shoulders is too large or
+        too small.
     """
     right, left, forward_squared = _torso(lengths)
     if forward_squared < -FLAT_DEPTH_SQUARED:
@@ -155,17 +157,18 @@ def hips_points(lengths: Lengths) -> Array:
 
 
 def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: float = 3.0) -> bool:
-    r"""Return whether uncertain lengths distinguish a torso from its mirror image.
+    r"""Return whether the torso differs from its mirror image by more than the uncertainty of its lengths.
 
-    The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. The
-    standard deviation of f is the standard deviation of :math:`f^2` divided by :math:`2 f`.
+    The shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of the line from neck to pelvis or behind it. A
+    shoulder has distance a from the neck, lies h below the neck, and has the sideways position y. The standard
+    deviation of f is the standard deviation of :math:`f^2` divided by :math:`2 f`.
 
     Parameters
     ----------
     lengths : mapping
         Metres, by segment name.
     known : LengthUncertainty
-        Their uncertainty.
+        Uncertainty of the lengths.
     deviations : float
         Number of standard deviations by which f must differ from zero.
     """
@@ -187,20 +190,20 @@ def side_is_certain(lengths: Lengths, known: LengthUncertainty, *, deviations: f
 def closed_lengths(
     lengths: Lengths, known: LengthUncertainty = MEASURED_LENGTHS
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the nearest lengths that close; lengths that already close are unchanged.
+    """Return the nearest lengths with which torso and hips exist; possible lengths are unchanged.
 
     Parameters
     ----------
     lengths : mapping
         All 17, metres, by segment name.
     known : LengthUncertainty
-        Uncertainty of each length. If a length of the torso is exact, all lengths of the torso have equal weights; the
-        same holds for the hips.
+        Uncertainty of each length. If a length of the torso is exact, all lengths of the torso have equal weights.
+        Lengths of the hips follow the same rule.
 
     Returns
     -------
     lengths, moved : dict
-        Metres, by segment name; `moved` has the changes of the lengths that were changed.
+        Metres, by segment name; `moved` has the differences of changed lengths.
 
     Raises
     ------
@@ -230,9 +233,10 @@ LAID_SQUARE_METRES, UNLAID_SQUARE_METRES = 1e-8, 1e-4
 def lay(joints: Array, lengths: Array) -> Array:
     r"""Move postures (F, 14, 3) to the nearest postures with given segment lengths (F, 17).
 
-    Newton steps minimise :math:`|x - x_0|^2` subject to :math:`|x_a - x_b|^2 = l^2`. If they do not converge, e.g.
-    because a segment has length zero, joints are placed one by one from the neck outward, along the given directions.
-    Segments with an unknown end are ignored.
+    Newton steps minimise the squared displacement :math:`|x - x_0|^2` of all joints subject to :math:`|x_a - x_b|^2 =
+    l^2` for each segment from a to b. They may fail to converge, e.g. if a segment has length zero. Joints are then
+    placed one by one from the neck outward, along the given segment directions. Segments with an unknown end are
+    ignored.
     """
     a, b = np.array(SEGMENTS).T
     x, known = np.nan_to_num(joints), np.isfinite(joints[:, :, 0])
@@ -269,9 +273,9 @@ def stature_from_lengths(lengths: Lengths) -> float:
 def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]:
     """Estimate the 17 lengths of a person of a given stature.
 
-    Limbs and widths are fractions of stature. Neck and pelvis have the reference figure's proportions: their sideways
-    offsets scale with the widths of shoulders and hips, and their heights scale with the height of the shoulders above
-    the hips.
+    Limb lengths and the widths of shoulders and hips are fractions of stature. Neck and pelvis have the reference
+    figure's proportions. Their sideways offsets scale with the widths of shoulders and hips. Their heights scale with
+    the height of the shoulders above the hips.
 
     Parameters
     ----------
@@ -309,10 +313,10 @@ def lengths_from_stature(stature: float, reference: Lengths) -> dict[str, float]
 
 
 def _torso(lengths: Lengths) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
-    """Return distance below the neck, distance from the spine and leftward position of right and left shoulder, metres.
+    """Return the positions of right and left shoulder, metres, and the square of their forward position, m^2.
 
-    The third value is the squared forward position of the shoulders; it is negative if the six distances are
-    impossible.
+    Each position has the distance below the neck, the distance from the line through neck and pelvis, and the leftward
+    coordinate. The square is negative if the six distances are impossible.
     """
     right = _apex("neck", "right_shoulder", "pelvis", lengths)
     left = _apex("neck", "left_shoulder", "pelvis", lengths)
@@ -338,7 +342,7 @@ def _apex(start: str, apex: str, end: str, lengths: Lengths) -> tuple[float, flo
     squared = near**2 - along**2
     if squared < -FLAT_DEPTH_SQUARED:
         field, got = f"lengths of the triangle {start}, {apex}, {end}", f"{base:g}, {near:g} and {far:g} m"
-        raise refusal("figure", field, got, "each at most the sum of the other two", error=FigureError)
+        raise refusal("figure", field, got, "each length at most the sum of the other two", error=FigureError)
     return along, math.sqrt(max(squared, 0.0))
 
 
@@ -389,7 +393,7 @@ def _torso_start(lengths: Lengths) -> Array:
 
 
 def _hips_start(lengths: Lengths) -> Array:
-    """Return initial values (2,) for `_nearest`: the hips on both sides of the pelvis, or on one if that is nearer."""
+    """Return initial hip positions (2,) for `_nearest`: on both sides of the pelvis, or on one side if nearer."""
     right, left, width = (lengths[name] for name in HIPS_LENGTHS)
     if width >= max(right, left):
         return np.array([-right, left])

@@ -6,8 +6,9 @@ of both ends have independent errors of standard deviation :math:`\sigma`, the l
 
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 
-over the eight segments i of arms and legs; mid is the mean of the middle half. The median absolute deviation (Rousseeuw
-& Croux 1993, J Am Stat Assoc 88:1273) and the middle half are robust against wrong frames and drifting limbs.
+Here i are the eight segments of arms and legs, t are the frames, med is the median, and mid is the mean of the middle
+half of the sorted values. The median absolute deviation (Rousseeuw & Croux 1993, J Am Stat Assoc 88:1273) and the
+middle half are robust against wrong frames and drifting limbs.
 """
 
 from __future__ import annotations
@@ -76,9 +77,9 @@ class Person(Record):
     hips_forward: float
 
     def noise_of(self, segment: str) -> float:
-        """Return the standard deviation of the coordinates of a segment's ends, metres; wrists and ankles are noisier.
+        """Return the standard deviation of the measured coordinates of a segment's ends, metres.
 
-        0 if the recording has too few frames for an estimate.
+        It is 0 if the recording has too few frames for an estimate.
         """
         if math.isnan(self.noise):
             return 0.0
@@ -129,7 +130,7 @@ def _hips_forward(joints: Array) -> float:
 
 
 def _shoulders_behind(joints: Array) -> bool | None:
-    """Return the shoulders' side in frames whose knees bend forward: in others left and right may be exchanged."""
+    """Return `Person.behind` from frames whose knees bend forward: in other frames left and right may be exchanged."""
     neck, pelvis, right, left = (
         joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
     )
@@ -149,9 +150,9 @@ def _shoulders_behind(joints: Array) -> bool | None:
 def figure_of(base: Figure, lengths: Sequence[tuple[str, float]], behind: bool | None) -> Figure:
     """Return a figure with the plausible lengths of a person.
 
-    Implausible lengths are replaced by the figure's lengths at the person's size. If no plausible body is near the
-    lengths, all lengths except the limbs' are replaced. Results are cached, so that clips of one skeleton share a
-    figure.
+    Implausible lengths are replaced by the lengths of `base`, scaled to the person's size. If no possible torso
+    and hips are near these lengths, all lengths except those of limbs are replaced. Results are cached, so that clips
+    of one skeleton share a figure.
 
     Parameters
     ----------

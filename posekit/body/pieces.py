@@ -1,7 +1,7 @@
-r"""Motion of a measured body as rigid pieces: torso, hips, head and eight limb segments, each rotated about its start.
+r"""Motion of a measured body that consists of 11 rigid pieces: torso, hips, head and eight limb segments.
 
-A point is its parent point plus a vector that rotates with a piece: :math:`x_p = x_{parent(p)} + R_{piece(p)} b_p`.
-Rotations change no length.
+Each point is its parent point plus a vector b that the rotation of its piece turns: :math:`x_p = x_{parent(p)} +
+R_{piece(p)} b_p`. Rotations change no length.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ PIECE_OF_POINT: Final = _piece_of_points()
 
 
 def vectors_of(points: Array) -> Array:
-    """Return the vector that ends at each point (N, P, 3); the neck's vector is its position."""
+    """Return the vector to each point from its parent point (N, P, 3); the neck's vector is its position."""
     vectors = points.copy()
     vectors[:, 1:] -= points[:, list(PIECE_PARENTS[1:])]
     return vectors
 
 
 def placed(vectors: Array) -> Array:
-    """Return the points (N, P, 3) that have these vectors: the inverse of `vectors_of`."""
+    """Return the points (N, P, 3) of vectors from parent points: the inverse of `vectors_of`."""
     points = vectors.copy()
     for point in range(1, len(NAMES)):  # parents come before their points
         points[:, point] += points[:, PIECE_PARENTS[point]]
@@ -72,7 +72,8 @@ def placed(vectors: Array) -> Array:
 def turns_between(start: Array, end: Array) -> Array:
     """Return the rotations (N, 11, 3, 3) of the pieces that best map postures `start` (N, P, 3) to postures `end`.
 
-    A piece with one known vector has the shortest rotation. A piece with no known vector has the identity.
+    A piece with one known vector gets the shortest rotation between its two directions. A piece with no known vector
+    gets the identity matrix.
     """
     R = np.tile(np.eye(3), (len(start), N_PIECES, 1, 1))
     before, after = vectors_of(start), vectors_of(end)
@@ -102,7 +103,7 @@ def moved(points: Array, step: Array) -> Array:
 
 
 def carried(start: Array, end: Array, share: Array) -> Array:
-    """Interpolate postures (N, P, 3): pieces rotate, and the neck moves, by a fraction (N,) of the difference."""
+    """Interpolate postures (N, P, 3): apply a fraction (N,) of each piece's rotation and of the neck's translation."""
     turn = vector_from_rotation(turns_between(start, end)).reshape(len(start), 3 * N_PIECES)
     shift = end[:, :1] - start[:, :1]
     return turned(start, share[:, None] * turn) + share[:, None, None] * shift

@@ -1,4 +1,4 @@
-"""Uncertainty of a body's lengths: of the size that all lengths share, and of each segment beside it."""
+"""Uncertainty of a body's segment lengths: one scale error of all lengths, and one independent error per segment."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ TRUNK_BENDS: Final = {"neck-pelvis": 0.017, "right_shoulder-pelvis": 0.027, "lef
 class LengthUncertainty(Record):
     r"""Standard deviations of the logarithms of a body's 17 lengths; small values are relative standard deviations.
 
-    With a size s that all lengths share and an independent term :math:`t_i` of each segment, a length is
-    :math:`l_i = e^{s + t_i} \bar l_i`. The covariance of the logarithms is
-    :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
+    A true length is :math:`l_i = e^{s + t_i} \bar l_i`: :math:`\bar l_i` is the assumed length, s the common error of
+    all lengths, and :math:`t_i` the independent error of segment i. With their standard deviations :math:`\sigma_s` and
+    :math:`\sigma_i`, the covariance of the logarithms is :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
 
     Parameters
     ----------
     common : float
-        Standard deviation of the size that all lengths share.
+        Standard deviation of the common error s.
     own : mapping of str to float
-        Standard deviation of each segment's own term, by name of `posekit.skeleton.SEGMENT_NAMES`; 0 if a segment is
-        not named.
+        Standard deviation of each segment's independent error, by name of `posekit.skeleton.SEGMENT_NAMES`; 0 if a
+        segment is not named.
 
     Raises
     ------
@@ -76,9 +76,10 @@ class LengthUncertainty(Record):
 
     @staticmethod
     def uniform(deviation: float) -> LengthUncertainty:
-        """Return an uncertainty whose size and segments all have one relative deviation.
+        """Return an uncertainty with the same deviation of the common error and of every independent error.
 
-        Trunk lengths also vary by `TRUNK_BENDS`, limited to three times the deviation so that exact lengths stay exact.
+        Trunk lengths also have the deviations `TRUNK_BENDS`, limited to three times `deviation`; zero means exact
+        lengths.
         """
         own = dict.fromkeys(SEGMENT_NAMES, deviation)
         for name, bend in TRUNK_BENDS.items():
@@ -86,7 +87,7 @@ class LengthUncertainty(Record):
         return LengthUncertainty(common=deviation, own=own)
 
     def widened(self, times: float) -> LengthUncertainty:
-        """Return the uncertainty with all deviations multiplied, up to `MAX_LENGTH_DEVIATION`."""
+        """Return the uncertainty with all deviations multiplied by `times`, but at most `MAX_LENGTH_DEVIATION`."""
         own = {name: min(times * one, MAX_LENGTH_DEVIATION) for name, one in self.own.items()}
         return LengthUncertainty(common=min(times * self.common, MAX_LENGTH_DEVIATION), own=own)
 
@@ -97,21 +98,21 @@ class LengthUncertainty(Record):
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations of the segments' own terms (17,), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
+        """Standard deviations of the independent errors (17,), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
         return np.array([self.own[name] for name in SEGMENT_NAMES])
 
     @property
     def covariance(self) -> Array:
-        """The covariance of the logarithms (17, 17), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
+        """Covariance of the logarithms of the lengths (17, 17), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
         return np.asarray(self.common**2 + np.diag(self.deviations**2))
 
     def total(self, segment: str) -> float:
-        """Return the standard deviation of one length's logarithm."""
+        """Return the standard deviation of the logarithm of one segment's length."""
         return math.hypot(self.common, self.own[segment])
 
 
 def _varying(deviation: float, non_rigid: float) -> dict[str, float]:
-    """Return one deviation for `NON_RIGID_SEGMENTS` and another for all other segments."""
+    """Return `non_rigid` for each of `NON_RIGID_SEGMENTS`, and `deviation` for all other segments."""
     return {name: non_rigid if name in NON_RIGID_SEGMENTS else deviation for name in SEGMENT_NAMES}
 
 

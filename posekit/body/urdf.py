@@ -1,4 +1,4 @@
-"""Changes of the figure's URDF text to other lengths or limits."""
+"""Change segment lengths or joint limits in the text of the figure's URDF."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
 
 @lru_cache(maxsize=4)
 def _parsed(text: str) -> ElementTree.Element:
-    """Parse the URDF of a figure; the tree is shared, so callers change a copy."""
+    """Parse the URDF of a figure; the result is cached, so callers change only a copy."""
     return parse_xml(text, "stick figure")
 
 

@@ -12,8 +12,9 @@ from posekit.geometry.vectors import Array, unit
 def beyond_hull(points: Array, corners: Array, normal: Array) -> Array:
     r"""Return the signed distances of points from convex hulls, both projected onto a plane.
 
-    The distance from a convex set is :math:`\max_u \, u \cdot x - \max_i u \cdot p_i` over unit directions u. The
-    maximum is at the normal of an edge, or at the direction from the nearest corner to the point.
+    The signed distance of a point x from the convex hull of corners :math:`p_i` is :math:`\max_u (u \cdot x - \max_i u
+    \cdot p_i)` over unit directions u. The maximum is at the normal of an edge, or at the direction from the nearest
+    corner to the point.
 
     Parameters
     ----------

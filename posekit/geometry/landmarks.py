@@ -17,7 +17,7 @@ NECK_OFFSET: Final = (0.06720811867953341, 0.0, -0.002995656796876607)
 
 
 def middles(found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the midpoints (..., D) of shoulders and hips; a pair is omitted if one of its landmarks is missing."""
+    """Return the midpoints (..., D) of the shoulders and of the hips; without both landmarks, a midpoint is omitted."""
     return {
         f"mid_{part}s": (found[f"right_{part}"] + found[f"left_{part}"]) / 2
         for part in ("shoulder", "hip")
@@ -26,11 +26,11 @@ def middles(found: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def hips_from_markers(right: Array, left: Array, back: Array) -> tuple[Array, Array]:
-    """Estimate the right and left hip (T, 3) from markers on the pelvis's anterior spines and on the sacrum (T, 3).
+    """Estimate right and left hip (T, 3) from markers (T, 3) on both anterior superior iliac spines and the sacrum.
 
-    The hips lie 0.36 sideways, 0.19 backward and 0.30 down from the midpoint of the spines, as fractions of the
-    distance between the spines (Bell, Brand & Pedersen 1989, *Prediction of hip joint centre location from external
-    landmarks*, Human Movement Science 8).
+    Each hip lies 0.36 sideways, 0.19 backward and 0.30 down from the midpoint of the two iliac spines. The numbers are
+    fractions of the distance between these spines (Bell, Brand & Pedersen 1989, *Prediction of hip joint centre
+    location from external landmarks*, Human Movement Science 8).
     """
     width = np.linalg.norm(left - right, axis=-1, keepdims=True)
     to_left, middle = unit(left - right), (left + right) / 2
@@ -40,7 +40,7 @@ def hips_from_markers(right: Array, left: Array, back: Array) -> tuple[Array, Ar
 
 
 def place_neck(found: Mapping[str, Array]) -> Array:
-    """Estimate the neck (T, 3) from shoulders and pelvis, at an offset proportional to the median spine length."""
+    """Estimate the neck (T, 3): midpoint of the shoulders plus an offset proportional to the median spine length."""
     spine = np.linalg.norm(found["mid_shoulders"] - found["mid_hips"], axis=-1)
     spine = spine[np.isfinite(spine)]
     left = unit(found["left_shoulder"] - found["right_shoulder"])

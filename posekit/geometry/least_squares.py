@@ -1,4 +1,4 @@
-"""Least-squares smoothing of sequences, and the smallest steps that bring states inside bounds."""
+"""Least-squares smoothing of time series, and Newton steps that move states inside bounds."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def into_bounds(
     free: Sequence[int],
     margins: Callable[[Array], Array],
 ) -> Array:
-    """Move states (n, …) inside bounds by the shortest steps: damped Newton steps that raise negative margins to zero.
+    """Move states (n, …) inside bounds: damped Newton steps of least length raise negative margins to zero.
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ def into_bounds(
     size : int
         Number of entries of a step.
     free : sequence of int
-        Entries of a step that may differ from zero.
+        Indices of the entries of a step that may differ from zero.
     margins : callable
-        Returns the margins (n, K) of states, metres, negative where a bound is violated. Its derivatives are finite
-        differences.
+        Returns the margins (n, K) of states, metres, negative where a bound is violated. Derivatives of the margins are
+        computed by finite differences.
 
     Returns
     -------
@@ -72,8 +72,9 @@ def into_bounds(
 def smoothed(values: Array, loose: Flags, strength: float) -> Array:
     r"""Smooth values (T, K, …) over time in the frames that a mask `loose` (T, K) selects.
 
-    Minimises :math:`|y - x|^2 + \lambda |D^3 y|^2` over the selected frames, and keeps the values of all other frames
-    (Whittaker 1923; Eilers 2003, *A perfect smoother*, Anal. Chem. 75:3631), with :math:`\lambda` the strength.
+    The smoothed values y minimise :math:`|y - x|^2 + \lambda |D^3 y|^2` (Whittaker 1923; Eilers 2003, *A perfect
+    smoother*, Anal. Chem. 75:3631). Here x are the given values, :math:`D^3` is the third difference, and
+    :math:`\lambda` is `strength`. Frames that are not selected keep their values.
     """
     from scipy import sparse
     from scipy.sparse.linalg import spsolve

@@ -16,7 +16,7 @@ def quaternion_rotate(q: Array, vectors: Array) -> Array:
 
 
 def median_lean(q: Array, up: Array, axis: ArrayLike = (0.0, 0.0, 1.0)) -> float:
-    """Return the median angle between an axis (3,) turned by unit quaternions (N, 4) and a unit vector up, degrees."""
+    """Rotate an axis (3,) by unit quaternions (N, 4); return its median angle to the unit vector `up`, degrees."""
     turned = quaternion_rotate(q, np.tile(axis, (len(q), 1)))
     return float(np.degrees(np.arccos(np.clip(np.median(turned @ up), -1, 1))))
 
@@ -37,8 +37,8 @@ def shorter_quaternion(q: Array) -> Array:
 def quaternion_from_rotation(R: Array, *, shorter: bool = True) -> Array:
     """Convert rotation matrices to unit quaternions.
 
-    The squares of the four entries sum to one. The largest is computed first, so that the square root of a small
-    number is never a divisor (Shepperd 1978, *Quaternion from rotation matrix*, J. Guidance and Control 1(3)).
+    The entry with the largest absolute value is computed first, so that no divisor is small (Shepperd 1978, *Quaternion
+    from rotation matrix*, J. Guidance and Control 1(3)).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Base of the public frozen dataclasses, with a short repr and read-only arrays."""
+"""Base class of the public frozen dataclasses, with a short repr and read-only arrays."""
 
 from __future__ import annotations
 
@@ -27,11 +27,13 @@ class Record:
     """
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
-        """Make an instance; a name that is no field is refused with the field that was probably meant."""
+        """Make an instance; for a name that is not a field, the error suggests the most similar field."""
         known = getattr(cls, "__dataclass_fields__", given)
         for name in given:
             if name not in known:
-                raise refusal(cls.__name__, name, "an unknown field", "one that it has", nearest(name, known))
+                raise refusal(
+                    cls.__name__, name, "an unknown field", "a field of the class", nearest(name, known)
+                )
         return super().__new__(cls)
 
     def __repr__(self) -> str:
@@ -92,7 +94,7 @@ def short(value: Any) -> str:
 
 
 def cut_text(text: str, most: int) -> str:
-    """Return a text on one line, cut to a number of characters."""
+    """Return a text on one line, cut to at most `most` characters."""
     line = " ".join(text.split())
     return line if len(line) <= most else f"{line[: most - 1]}…"
 

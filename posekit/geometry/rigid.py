@@ -1,4 +1,4 @@
-"""Rotations and similarities that align points, and distances between postures."""
+"""Rotations and similarity transformations that align points, and distances between postures."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ NO_EXTENT: Final = 1e-12
 
 
 def best_rotation(matrix: Array) -> tuple[Array, Array]:
-    r"""Return the rotations nearest to matrices: they maximise :math:`tr(R^T M)`.
+    r"""Return the rotations R nearest to 3 x 3 matrices M: they maximise :math:`tr(R^T M)`.
 
-    With :math:`M = U D V^T` the singular value decomposition, :math:`R = U S V^T` where
-    :math:`S = diag(1, 1, \det U V^T)` ensures that R is no reflection (Kabsch 1976, Acta Cryst. A32; Umeyama 1991, IEEE
-    Trans. PAMI 13(4), eqs. 40-43). For a covariance :math:`\sum_p y_p x_p^T` R rotates the x onto the y with the least
-    squared distance. For a rotation matrix with rounding errors, R is the polar factor (Higham 1989).
+    With :math:`M = U D V^T` the singular value decomposition, :math:`R = U S V^T` where :math:`S = diag(1, 1, \det U
+    V^T)` ensures that R is no reflection (Kabsch 1976, Acta Cryst. A32; Umeyama 1991, IEEE Trans. PAMI 13(4), eqs.
+    40-43). If M is the covariance :math:`\sum_p y_p x_p^T`, R rotates points x onto points y with the least sum of
+    squared distances. If M is a rotation matrix with rounding errors, R is its orthogonal polar factor (Higham 1989).
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def fit_rotation(offsets: Array, turned: Array) -> Array:
 
 
 class Alignment(NamedTuple):
-    r"""Similarities :math:`x \mapsto c\,R\,x + t`.
+    r"""Similarity transformations :math:`x \mapsto c\,R\,x + t`.
 
     Attributes
     ----------
@@ -90,19 +90,19 @@ class Alignment(NamedTuple):
 
 
 def align(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Alignment:
-    r"""Find the similarity that minimises the squared distance of points from their targets.
+    r"""Find the similarity transformation that minimises the squared distances of points from their targets.
 
     .. math:: \min_{c, R, t} \sum_p |y_p - (c R x_p + t)|^2
 
-    With R and D S of `best_rotation` for the covariance about the means, :math:`c = tr(D S) / \sum_p |x_p|^2`
-    (Umeyama 1991, IEEE Trans. PAMI 13(4), eqs. 40-43).
+    R, D and S are those of `best_rotation` for the covariance of y and x about their means. The scale is :math:`c =
+    tr(D S) / \sum_p |x_p|^2`, with x relative to its mean (Umeyama 1991, IEEE Trans. PAMI 13(4), eqs. 40-43).
 
     Parameters
     ----------
     points, target : array (..., P, 3)
         Corresponding points, in one unit; NaN marks an unknown point. Leading axes broadcast.
     scale : bool
-        Fit c; otherwise it is one (rigid alignment).
+        Whether the scale c is fitted; otherwise c = 1 (rigid alignment).
 
     Returns
     -------
@@ -127,12 +127,12 @@ def align(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Alignm
 
 
 def mpjpe(points: ArrayLike, target: ArrayLike) -> Array:
-    r"""Return the mean per-joint position error, :math:`\sum_p d_p / P` (Ionescu et al. 2014, §5.1).
+    r"""Return the mean per-joint position error: the mean of P distances, :math:`\sum_p d_p / P` (Ionescu 2014, §5.1).
 
     Parameters
     ----------
     points, target : array (..., P, 3)
-        Measured and true points, in one unit; points that are NaN in either are left out.
+        Measured and true points, in one unit; points that are NaN in either set are left out.
 
     Returns
     -------
@@ -149,8 +149,8 @@ def pa_mpjpe(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Arr
 def rms_distance(points: ArrayLike, target: ArrayLike, *, aligned: bool = True) -> Array:
     r"""Return the root mean square distance between corresponding points, :math:`\sqrt{\sum_p d_p^2 / P}`.
 
-    By default it is measured after "the rotation, translation and scale factor that best aligned the two data sets"
-    (Taylor 2000, §3.2); parameters as for `mpjpe`.
+    By default, the points are first aligned by "the rotation, translation and scale factor that best aligned the two
+    data sets" (Taylor 2000, §3.2). Parameters are those of `mpjpe`.
     """
     if aligned:
         points = align(points, target).apply(points)

@@ -49,7 +49,7 @@ def vector_from_rotation(R: Array) -> Array:
 
 
 def coordinate_rotation(axis: int, angle: Array) -> Array:
-    """Return the rotations (..., 3, 3) by angles (...), radians, about a coordinate axis, 0 to 2."""
+    """Return the rotations (..., 3, 3) by angles (...), radians, about coordinate axis 0, 1 or 2 (x, y, z)."""
     j, k = (axis + 1) % 3, (axis + 2) % 3
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
@@ -63,8 +63,8 @@ def coordinate_rotation(axis: int, angle: Array) -> Array:
 def frame_along(axis: Array) -> Array:
     """Return rotations (..., 3, 3) whose first columns are given unit vectors (..., 3).
 
-    The basis is continuous except at z = 0 (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1),
-    listing 3).
+    The result is a continuous function of the given vector except where its z is 0 (Duff et al. 2017, *Building an
+    Orthonormal Basis, Revisited*, JCGT 6(1), listing 3).
     """
     x, y, z = axis[..., 0], axis[..., 1], axis[..., 2]
     sign = np.where(z >= 0.0, 1.0, -1.0)
@@ -105,7 +105,7 @@ def turned_near(angles: Array, middle: Array | float, *, half_turn: float = np.p
     middle : array (...) or float
         Centre of the returned interval; broadcast.
     half_turn : float
-        Half a turn in their unit: 180 for degrees.
+        Half a turn in the unit of the angles: pi for radians, 180 for degrees.
 
     Returns
     -------

@@ -15,10 +15,10 @@ PARALLEL: Final = 1e-30
 def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
     r"""Return the distance between two segments, in closed form.
 
-    Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained minimiser
-    is clamped in s; then t is computed and clamped, and s is computed again (Ericson 2005, *Real-Time Collision
-    Detection*, §5.1.9). For nearly parallel segments this is ill-conditioned, so the distances of the four ends from
-    the other segment are computed as well.
+    Points of segment a are :math:`s\,h_a` and points of segment b are :math:`g + t\,h_b`, with s and t in [-1, 1], gap
+    g and half segments h. The unconstrained minimiser is clamped in s; then t is computed and clamped, and s is
+    computed again (Ericson 2005, *Real-Time Collision Detection*, §5.1.9). For nearly parallel segments this solution
+    is ill-conditioned, so the distances of the four ends from the other segment are computed as well.
 
     Parameters
     ----------

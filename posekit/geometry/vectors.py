@@ -1,4 +1,4 @@
-"""Numbers of users, products of vectors (..., K), and runs in boolean arrays."""
+"""Conversion of a user's numbers to arrays, vector algebra, and runs of True in boolean arrays."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ Flags = NDArray[np.bool_]
 def numbers(
     values: Any, source: str, field: str = "", expected: str = "numbers", remedy: str = "give an array"
 ) -> Array:
-    """Return values in double precision; None is an unknown number, NaN.
+    """Return a user's values as an array in double precision; None becomes NaN.
 
     Raises
     ------
     InputError
-        If they are not real numbers, or rows differ in length. The other arguments are those of `refusal`.
+        If they are not real numbers, or rows differ in length. The other parameters, parts of its message, are those of
+        `refusal`.
     """
     try:
         found = np.asarray(values)
@@ -68,7 +69,7 @@ def norm(vectors: Array) -> Array:
 
 
 def runs(which: Flags) -> list[tuple[int, int]]:
-    """List the runs of consecutive True in an array (N,) as pairs (start, stop) of slices.
+    """List the runs of consecutive True in an array (N,) as index pairs (start, stop), stop exclusive.
 
     Examples
     --------
@@ -81,5 +82,5 @@ def runs(which: Flags) -> list[tuple[int, int]]:
 
 
 def groups(at: Ints, apart: int) -> list[Ints]:
-    """Split ascending frame numbers (N,) into groups where neighbours differ by more than `apart`."""
+    """Split ascending frame numbers (N,) wherever two neighbours differ by more than `apart`."""
     return np.split(at, np.flatnonzero(np.diff(at) > apart) + 1) if len(at) else []

@@ -24,15 +24,15 @@ SHORTEST: Final = 1e-3
 def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     """Build the collision bodies of a robot with capsules in place of meshes.
 
-    Each capsule lies along a segment between two mapped joints. A segment that spans several joints, such as the
-    spine, is cut at these joints, and each moving body carries one piece. A piece has the name of its segment, with a
-    number if the segment has several pieces.
+    Each capsule lies along a segment between two points of the joint map. A segment that spans several joints, such as
+    the spine, is cut at these joints, and each moving body carries one piece. The capsule of a piece has the name of
+    its segment, with a number if the segment has several pieces.
 
     Parameters
     ----------
     robot : Robot
-        The robot keeps its primitive shapes. A humanoid without any body gets a capsule for every part. A robot that is
-        not a humanoid gets no capsule, because its shape is not known.
+        Its boxes, spheres, cylinders and capsules are kept. A humanoid without collision bodies gets a capsule on every
+        body part. A robot that is not a humanoid gets no capsule, because its shape is not known.
     figure : Robot
         The stick figure, which determines the proportions of the capsules.
     """
@@ -89,7 +89,7 @@ def _proportions(figure: Robot) -> dict[str, tuple[float, float, float]]:
 
 
 def _neutral(robot: Robot) -> tuple[pin.Data, dict[str, Array]]:
-    """Return Pinocchio's data and the mapped points (3,), metres, at Pinocchio's neutral configuration."""
+    """Return Pinocchio's data and the joint-map points (3,), metres, at Pinocchio's neutral configuration."""
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
     return data, {name: data.oMi[site.joint].act(site.offset) for name, site in robot.joint_map.items()}

@@ -34,8 +34,8 @@ def set_pairs(
 ) -> None:
     """Choose the pairs of bodies to check for a robot whose SRDF disables no pair.
 
-    Neighbours and pairs that touch in the neutral configuration are removed. Capsules of a humanoid's parts are checked
-    only if the stick figure checks the same parts: `parts` has the names of its pairs of bodies.
+    Pairs of neighbouring bodies, and pairs that touch in the neutral configuration, are not checked. A pair of capsules
+    on body parts is checked only if the stick figure checks the same pair: `parts` has the stick figure's pairs.
     """
     checked_parts = {frozenset(map(_part, pair)) for pair in parts}
     pairs, bodies = [(pair.first, pair.second) for pair in geometry.collisionPairs], geometry.geometryObjects
@@ -86,11 +86,11 @@ class Contacts(NamedTuple):
     hit : bool array (N,)
         Whether any pair touches, as `pinocchio.computeCollisions` returns it.
     frame, pair : int arrays (K,)
-        Row of the configuration and index of the pair, for each pair nearer than the margin; sorted.
+        Index of the configuration and index of the pair, for each pair nearer than the margin; sorted by configuration.
     distance : array (K,)
-        Signed distance in metres, negative for penetration. For meshes that touch it is the depth of their convex
-        hulls, an upper bound of their own depth. For meshes that do not touch it is the distance of their hulls, a
-        lower bound, or their own distance if the hulls overlap.
+        Signed distance in metres, negative for penetration. For meshes that touch, it is the penetration depth of their
+        convex hulls, an upper bound of the meshes' depth. For meshes that do not touch, it is the distance of their
+        convex hulls, a lower bound. If these hulls overlap, it is the distance of the meshes.
     """
 
     hit: Flags
@@ -161,7 +161,7 @@ class SelfCollision:
         return Contacts(hit, row[kept], pair[kept], distance[kept])
 
     def _near(self, q: Array, margin: float) -> tuple[Ints, Ints, Array]:
-        """Return rows and pairs possibly nearer than the margin, and their distances; NaN where coal is needed."""
+        """Return indices of configurations and pairs that may be nearer than the margin, and distances or NaN."""
         frames, centre = self._kinematics.place(q)
         axes = np.einsum("jbin,bjk->ikbn", frames, self._axes).reshape(3, 3, -1)
         places, count = centre.transpose(1, 0, 2), len(q)

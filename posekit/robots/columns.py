@@ -31,7 +31,7 @@ class Mimic(NamedTuple):
 
 
 def mimics_of(robot: Element) -> tuple[Mimic, ...]:
-    """List the mimicking joints of a checked URDF. If a target mimics another joint, the target comes first."""
+    """List the mimicking joints of a checked URDF. A mimicking joint is listed before the joints that mimic it."""
     found: dict[str, Mimic] = {}
     for joint in robot.findall("joint"):
         mimic, name = joint.find("mimic"), joint.get("name", "")

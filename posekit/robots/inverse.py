@@ -38,7 +38,7 @@ SEEDS: Final = 4
 
 
 class _Problem:
-    """The least-squares problem of one robot: N postures with targets (N, P, 3) of its P mapped points, metres."""
+    """The least-squares problem of one robot: targets (N, P, 3), metres, of the P joint-map points in N postures."""
 
     def __init__(self, robot: Robot, joints: Array) -> None:
         model = robot.model
@@ -64,7 +64,7 @@ class _Problem:
         return np.where(self.known[rows, :, None], positions - self.targets[rows], 0.0)
 
     def away(self, q: Array, start: Array) -> Array:
-        """Return the differences of single-axis joints from the start, in v (n, nv); zero for other joints."""
+        """Return the differences (n, nv) of hinges and slides from the start, ordered as v; zero for other joints."""
         out = np.zeros((len(q), self.model.nv))
         out[:, self.at_v] = q[:, self.at_q] - start[:, self.at_q]
         return out
@@ -77,7 +77,7 @@ class _Problem:
     def step(self, q: Array, start: Array, rows: Ints, damping: Array) -> Array:
         """Return damped Gauss-Newton steps (n, nv).
 
-        An entry at a limit does not move if the gradient pushes it outward (Bertsekas 1982).
+        A joint at a limit does not move if the gradient pushes it outward (Bertsekas 1982).
         """
         positions, jacobian = self.kinematics.jacobians(q)
         gap = self.gaps(positions, rows).reshape(len(q), -1)
@@ -102,7 +102,7 @@ class _Problem:
         return self.inside(out.reshape(len(q), self.model.nq))
 
     def inside(self, q: Array) -> Array:
-        """Clip configurations (n, nq) to the limits, and let mimicking joints follow their targets."""
+        """Clip configurations (n, nq) to the limits, and set mimicking joints."""
         return self.robot.with_mimics(np.clip(q, self.robot.lower, self.robot.upper))
 
     def worst(self, q: Array) -> Array:
@@ -111,7 +111,7 @@ class _Problem:
         return np.asarray(np.linalg.norm(gaps, axis=2).max(axis=1, initial=0.0))
 
     def laid(self, q: Array) -> Array:
-        """Return a configuration (nq,) for each posture, with the floating root placed where the trunk fits best."""
+        """Repeat a configuration (nq,) for each posture; place the root where the trunk fits its targets best."""
         out = np.tile(q, (len(self.targets), 1))
         if not self.robot.free_flyer:
             return out
@@ -127,10 +127,11 @@ class _Problem:
 
 
 def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) -> tuple[Array, Array]:
-    r"""Find configurations within the limits whose mapped joints are nearest to given positions.
+    r"""Find configurations within the limits whose joint-map points are nearest to given joint positions.
 
     Minimise :math:`\tfrac12 \sum_p |p(q) - y_p|^2` by Levenberg-Marquardt on the configuration manifold, for all
-    postures at once. If a known point is farther than `MET` from its target, the search is repeated from other starts.
+    postures at once. Here p(q) are points of the robot and :math:`y_p` their targets. If a known point is farther than
+    `MET` from its target, the search is repeated from other starts.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def solve(robot: Robot, joints: ArrayLike, *, start: ArrayLike | None = None) ->
     Returns
     -------
     q : array (N, nq)
-        Mimicking joints follow their targets.
+        Mimicking joints have the values that their URDF elements ``<mimic>`` state.
     distance : array (N,)
         Largest distance of a known joint from its target, metres; NaN if no joint is known.
 
@@ -195,7 +196,7 @@ def _descend(problem: _Problem, q: Array, start: Array, rows: Ints) -> tuple[Arr
 
 
 def _seed(robot: Robot, seed: int) -> Array:
-    """Return another start (nq,): the middle of the limits, or a random configuration inside them."""
+    """Return another initial configuration (nq,): the middle of the limits, or a random configuration inside them."""
     q = robot.neutral.copy()
     bounded = np.flatnonzero(np.isfinite(robot.lower) & np.isfinite(robot.upper))
     low, high = np.maximum(robot.lower[bounded], -np.pi), np.minimum(robot.upper[bounded], np.pi)

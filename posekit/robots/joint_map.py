@@ -59,9 +59,9 @@ def find_joint_map(model: pin.Model) -> JointMap:
 def _derived(model: pin.Model) -> JointMap:
     """Derive a map from the names of the moving joints; empty if an elbow, a knee, a shoulder or a hip is missing.
 
-    If a shoulder or a hip has several joints, its middle joint is used: all axes pass near it. Elbows, wrists, knees
-    and ankles use their first joint. The neck is the midpoint of the shoulders, on the body that carries both arms. The
-    pelvis is the origin of the body that carries both legs.
+    If several robot joints form a shoulder or a hip, the middle one is used, because all their axes pass near it.
+    Elbows, wrists, knees and ankles use the joint nearest to the root. The neck is the midpoint of the shoulders, fixed
+    to the body that carries both arms. The pelvis is the origin of the body that carries both legs.
     """
     words = read_table("names", "joint_maps", ("names",), "posekit.joint_names/1", "joint map")
     chains: dict[str, list[int]] = {}

@@ -33,9 +33,9 @@ class Kinematics:
     """Batched positions and Jacobians of points that are fixed to the joints of a model.
 
     The results equal Pinocchio's `forwardKinematics` and joint Jacobians up to rounding, at about 30 times the speed of
-    a loop over configurations. Arrays inside have the batch as their last axis, and a frame lists its axes x, y, z as
-    rows. Inside, the frame of each joint is chosen so that the joint rotates about z, or slides along z; a hinge then
-    changes the axes x and y alone.
+    a loop over configurations. Internal arrays have the batch as their last dimension, and the rows of a rotation are
+    the frame's axes x, y, z. Internally, the frame of each joint is chosen so that the joint rotates about z or slides
+    along z. A hinge then changes only the axes x and y.
 
     Parameters
     ----------
@@ -153,14 +153,14 @@ def frame_places(model: pin.Model, q: Array, frames: Sequence[int]) -> Array:
 def _mix(parent: Array, translation: Array, rotation: Array) -> Array:
     """Return the axes x, y, z and the origin of a frame (4, 3) in the chosen axes of its parent.
 
-    `rotation` (3, 3) and `translation` (3,), metres, place the frame in its parent; the rotation `parent` (3, 3) maps
-    the chosen axes of the parent to the parent's frame.
+    `rotation` (3, 3) and `translation` (3,), metres, are the frame's pose in its parent. The rotation `parent` (3, 3)
+    maps the chosen axes of the parent to the parent's frame.
     """
     return np.vstack([rotation.T, translation]) @ parent
 
 
 def _mixed(mix: Array, axes: Array) -> Array:
-    """Return axes and origins (4, K, 3, N) of K frames, from coordinates (K, 4, 3) in their parents' axes."""
+    """Rotate axes and offsets (K, 4, 3) of K frames from their parents' axes (3, K, 3, N) to the world."""
     flat = mix @ axes.reshape(len(mix), 3, axes.shape[2] * axes.shape[3])
     return np.asarray(flat.reshape(len(mix), 4, *axes.shape[2:]).transpose(1, 0, 2, 3))
 

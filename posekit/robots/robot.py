@@ -1,4 +1,4 @@
-"""A robot: Pinocchio's model of a checked URDF, with limits, names, collision bodies and the 14 joints."""
+"""A robot: Pinocchio's model of a checked URDF, with limits, names, collision bodies and a joint map."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Robot(Record):
     srdf : str or None
         Text of the SRDF, which names pairs of links that are not checked for collision.
     name, source : str
-        The robot's name, and its file, for error messages.
+        Name of the robot, and name of its file in error messages.
     package_dirs : tuple of Path
         The only directories from which meshes are read.
     fixed_base : bool
@@ -64,7 +64,7 @@ class Robot(Record):
     Raises
     ------
     InputError
-        If a text or a mesh is damaged or violates the URDF format. The message names the place in one line.
+        If a text or a mesh is damaged or violates the URDF format. The message of one line names the faulty element.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Robot(Record):
 
     @cached_property
     def tree(self) -> ElementTree.Element:
-        """The checked elements of the URDF. Change only copies."""
+        """The element ``<robot>`` of the URDF, after the checks. Change only copies."""
         return check_urdf(self.urdf, self.source)
 
     @cached_property
@@ -116,7 +116,7 @@ class Robot(Record):
 
     @cached_property
     def geometry(self) -> pin.GeometryModel:
-        """Pinocchio's collision bodies and the pairs to check."""
+        """Pinocchio's collision bodies, and the pairs of bodies to check for collision."""
         if self.bodies == "none":
             return pin.GeometryModel()
         parts: tuple[tuple[str, str], ...] = ()
@@ -165,12 +165,12 @@ class Robot(Record):
 
     @cached_property
     def mimics(self) -> tuple[Mimic, ...]:
-        """The joints that mimic a target joint. If a target mimics another joint, the target comes first."""
+        """The mimicking joints of the URDF. A mimicking joint is listed before the joints that mimic it."""
         return mimics_of(self.tree)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
-        """Pinocchio's names of the collision bodies: link and number."""
+        """Pinocchio's names of the collision bodies: the link's name and a number."""
         return tuple(body.name for body in self.geometry.geometryObjects)
 
     @cached_property
@@ -191,7 +191,7 @@ class Robot(Record):
 
     @cached_property
     def joint_map(self) -> JointMap:
-        """The site on the robot of each of the 14 joints; empty if the robot is not a humanoid.
+        """The point of the robot that represents each joint of the human model; empty if the robot is not a humanoid.
 
         It is the given map, a built-in map, or a map derived from the names of the robot's joints.
 
@@ -206,7 +206,7 @@ class Robot(Record):
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """Batched kinematics of the mapped points."""
+        """Batched kinematics of the points of `joint_map`."""
         return Kinematics(self.model, list(self.joint_map.values()))
 
     def checked(self, q: ArrayLike, source: str = "q") -> Array:
@@ -274,8 +274,9 @@ class Robot(Record):
         Parameters
         ----------
         names : sequence of str
-            Names of the columns: entries of `configuration_names`, or joints. A continuous joint has one column with
-            an angle in radians, or two with its cosine and sine. Case and a final ``_joint`` do not matter.
+            Names of the columns: entries of `configuration_names`, or names of joints. A continuous joint has one
+            column with an angle in radians, or two with its cosine and sine. Letter case and a final ``_joint`` are
+            ignored.
         values : array (N, len(names))
             Radians and metres.
 
@@ -299,7 +300,7 @@ class Robot(Record):
         Raises
         ------
         InputError
-            If the given joint map does not fit, or q is not as `checked` requires.
+            If the given joint map does not fit the robot, or `checked` refuses q.
         """
         out = np.full((len(q := self.checked(q)), len(POINTS), 3), np.nan)
         out[:, [POINTS.index(name) for name in self.joint_map]] = self.kinematics.positions(q)
@@ -365,7 +366,7 @@ class Robot(Record):
         return SelfCollision(self.model, self.geometry)
 
     def _limits(self, given: Array, none: float) -> Array:
-        """Return limits (nq,) for joints with one entry of q; the entries of other joints have the limit `none`."""
+        """Return the given limits (nq,) of joints with one entry of q; entries of other joints get the value `none`."""
         return read_only(np.where(np.repeat(self.model.nqs, self.model.nqs) == 1, given, none))
 
 
@@ -389,12 +390,12 @@ def load_robot(
     bodies : {"meshes", "capsules", "none"}
         Collision bodies: see `Robot`. Capsules need no mesh files.
     package_dirs : sequence of path
-        More directories with the packages of the robot's meshes. The folders of the URDF's own package are always
-        searched.
+        Additional directories that contain the packages of the robot's meshes. The folders of the URDF's own package
+        are always searched.
     fixed_base : bool
         Whether the root is fixed, as for an arm.
     joint_map : str or path
-        Name or TOML file of the joint map; by default a map that fits the robot.
+        Name or TOML file of the joint map; by default a built-in map, or a map derived from joint names.
 
     Raises
     ------

@@ -29,8 +29,9 @@ SAME: Final = 1e-9
 def scaled(robot: Robot, joints: ArrayLike) -> Robot:
     """Return the robot with the median segment lengths of postures.
 
-    Limb segments have the person's lengths in every configuration. Distances within torso and hips equal the person's
-    at the neutral configuration. Bodies scale with their segments; hands, feet and head keep their size.
+    Limb segments have the person's lengths in every configuration. Distances between joints of the torso, and between
+    joints of the hips, equal the person's at the neutral configuration. Bodies scale with their segments; hands, feet
+    and head keep their size.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def segment_lengths(joints: Array) -> Array:
 
 
 def _wanted(own: Array, joints: Array, source: str) -> Array:
-    """Return positions (14, 3) of the joints at neutral with the segment lengths of postures, metres.
+    """Return the robot's joint positions (14, 3), metres, at neutral with the segment lengths of postures.
 
     Torso and hips have the median shape of the postures in which all their joints are known, aligned with the robot's
     joints. Limb segments keep the directions that they have on the robot.

@@ -1,7 +1,7 @@
 """URDF and SRDF texts: parsed once, checked, and reduced to the elements that a model is made of.
 
 Pinocchio's reader drops bodies that it does not understand, accepts reversed limits and axes of zero length, and
-overflows its stack on long chains. These faults are refused here, in one line that names the place.
+overflows its stack on long chains. Such a fault raises an `InputError` whose one-line message names the faulty element.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ Need = Callable[[object, str, str, str, str], None]
 
 
 def need(source: str | Path, ok: object, place: str, got: str, expected: str, remedy: str) -> None:
-    """Raise a refusal unless a condition is true."""
+    """Raise an `InputError` with these parts of its message unless `ok` is true."""
     if not ok:
         raise refusal(source, place, got, expected, remedy)
 
@@ -168,7 +168,7 @@ def text_with(robot: Element, *kinds: str) -> str:
 
 
 def numbers(element: Element, attribute: str, default: str = "") -> list[float]:
-    """Return the numbers of a checked attribute."""
+    """Return the numbers in a checked attribute of an XML element."""
     return [float(word) for word in element.get(attribute, default).split()]
 
 
