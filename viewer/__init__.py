@@ -43,8 +43,8 @@ def draw(
         Output file: ``.png`` (frames or alternative postures side by side), ``.gif`` or ``.mp4`` (animation),
         ``.html`` (interactive page that works offline), ``.svg`` or ``.pdf`` (plot).
     view : View or Motion, optional
-        View of a result; its image points and its camera are drawn too. For a report: its motion or motions, so that
-        the page shows the body in each frame.
+        View of a result; its image points and its camera are drawn too. For a report, its motion or
+        motions; the page then shows the body in each frame.
     frame : int or (int, int), optional
         Frame, or first and last frame, numbered from 0. Default: a few frames of a motion; all frames of an animation.
     which : str
@@ -53,12 +53,12 @@ def draw(
     size : (int, int)
         Width and height, pixels.
     azimuth, elevation : float, optional
-        Position of the virtual camera, degrees. The azimuth is measured from the person's front, or from the camera of
-        a result, to the person's left; the elevation from the horizontal plane. Default: 35 and 8.
+        Position of the virtual camera, degrees. Azimuth 0 is the person's front, or the camera of a result; larger
+        azimuths are to the person's left. The elevation is above the horizontal plane. Default: 35 and 8.
     over : path, optional
         Picture, folder of pictures or film; bodies are drawn over it with the camera of the view.
     urdf : str
-        Robot of configurations whose robot is not known.
+        URDF, or name of a robot; default: the robot that the motion names.
 
     Raises
     ------

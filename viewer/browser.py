@@ -157,7 +157,7 @@ class Browser:
         return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
 
     def _ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """Send a command and wait for its result; keep the request events that arrive before it."""
+        """Send a command and wait for its result; record the network requests of the page that arrive before it."""
         self._count += 1
         message: dict[str, Any] = {"id": self._count, "method": method, "params": params}
         if self._session is not None:

@@ -52,7 +52,8 @@ def overlaid(
     ----------
     source : Recovery, View with truth, or Motion in the world of the view's camera
     pictures : Path
-        Picture, folder of pictures or film. Pictures correspond to frames by name, otherwise by number or by time.
+        Picture, folder of pictures or film. Each picture is matched to a frame by its name, otherwise
+        by its number or time.
     view : View
         Camera and image points. If the source is a view, the same view.
     frame : int or (int, int), optional
@@ -96,7 +97,7 @@ def overlaid(
 
 
 def _of_recovery(recovery: Recovery, which: str) -> list[list[Posture]]:
-    """Return the postures of each frame; the first is drawn as a body."""
+    """Return the postures of each frame; the caller draws the first as a body, the others as bones."""
     table, answer, found = recovery.survivors, recovery.answer, []
     scale, head = np.asarray(table.scale), np.asarray(table.head)
     for k, best in enumerate(np.asarray(answer.survivor).tolist()):
@@ -226,7 +227,7 @@ def _by_name(files: list[Path], names: tuple[str, ...]) -> list[int] | None:
 
 
 def _order(path: Path) -> list[tuple[int, int | str]]:
-    """Return a sorting key that compares the numbers in names by value."""
+    """Return a sorting key of a file name; numbers in names are compared by value."""
     return [(0, int(word)) if word.isdecimal() else (1, word) for word in re.split(r"(\d+)", path.name)]
 
 
@@ -253,7 +254,7 @@ def _film_facts(path: Path) -> tuple[int, float]:
 
 
 def _film(path: Path, wanted: list[int]) -> Iterator[Any]:
-    """Read the pictures of a film with given ascending numbers."""
+    """Read the pictures with the given ascending numbers from a film."""
     with av_library().open(str(path)) as film:
         left = list(wanted)
         for number, picture in enumerate(film.decode(video=0)):

@@ -65,7 +65,7 @@ def plotted(
     frame : int or (int, int), optional
         Frames to draw.
     view : View, optional
-        View of a result. If it has true joints, their angles are drawn too.
+        View of a result. If the view has true joints, their angles are drawn too.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def plotted(
 
 
 def angles(source: Motion | Recovery, frame: int | tuple[int, int] | None, view: View | None) -> Figure:
-    """Plot joint angles over time, one panel per angle. Grey marks angles beyond limits; a band shows all survivors."""
+    """Plot joint angles over time, one panel per angle. Grey areas are beyond limits; a band covers all survivors."""
     from matplotlib.figure import Figure
 
     limits = np.degrees(np.array([load_figure().limits.lower, load_figure().limits.upper]))

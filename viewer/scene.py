@@ -96,7 +96,7 @@ class Stage:
     subjects : sequence of Subject
         Bodies with equal numbers of frames.
     camera : (array (K, 2, 3), array (K, 3)), optional
-        Lines of a camera and its image, world frame, metres, and their colours; see `camera_lines`.
+        Lines that show a camera and its image, world frame, metres, and their colours; see `camera_lines`.
     """
 
     def __init__(self, subjects: Sequence[Subject], camera: tuple[Array, Array] | None = None) -> None:
@@ -149,7 +149,7 @@ class Stage:
         return visualizer
 
     def _draw_ground(self, low: Array, high: Array) -> None:
-        """Draw a ground grid with a spacing of 0.5 m under the lowest link; a longer path has a wider spacing."""
+        """Draw a ground grid with a spacing of 0.5 m under the lowest link; the spacing is wider for a long path."""
         wide = GRID_METRES * max(1, np.ceil(((high - low)[:2].max() + 4) / MOST_GRID_LINES / GRID_METRES))
         self.grid = float(wide)
         first, last = np.floor(low[:2] / wide - 2) * wide, np.ceil(high[:2] / wide + 2) * wide
@@ -244,7 +244,7 @@ def camera_lines(
         Joints at the ends of the rays, camera frame, metres.
     R_world_cam : array (3, 3)
     offset : array (3,)
-        From the camera frame to the world.
+        Rotation and displacement from the camera frame to the world frame.
     """
     seen = np.isfinite(view.image[frame]).all(axis=1) & np.isfinite(joints).all(axis=1)
     parallel = not view.camera.perspective
@@ -289,7 +289,7 @@ def pictures(
     elevation : float, optional
         Elevation of the virtual camera above the horizontal plane, degrees.
     camera : (array (K, 2, 3), array (K, 3)), optional
-        Lines and colours of a camera, see `camera_lines`.
+        Lines that show a camera, and their colours; see `camera_lines`.
     image : array (P, 2), optional
         Image points, drawn in the upper left corner.
     seen_from : str
@@ -342,7 +342,7 @@ def pictures(
 def _captioned(
     picture: Any, stage: Stage, projection: Array, line: str, seen_from: str, image: Array | None, inset: int
 ) -> Pixels:
-    """Add the caption and the labels of the bodies below the picture, and the image points in a column."""
+    """Add the caption and the labels of the bodies below the picture, and the image points in a column on the left."""
     from PIL import Image, ImageDraw, ImageFont
 
     width, height = picture.size

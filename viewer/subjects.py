@@ -124,9 +124,9 @@ def subjects_of(
     frame : int or (int, int), optional
         Frame, or first and last frame, numbered from 0.
     urdf : str
-        Robot of configurations whose robot is not known.
+        URDF, or name of a robot; default: the robot that the motion names.
     view : View, optional
-        View of the result, for the tilt of its camera.
+        View of the result; its camera determines the up direction.
     azimuth : float, optional
         Azimuth of the virtual camera, degrees, from the front of a motion or from the camera of a result.
     moving : bool
@@ -190,7 +190,7 @@ def configured(motion: Motion, urdf: str = "") -> tuple[Robot, Array]:
 
 
 def upright(motion: Motion) -> Array:
-    """Return the rotation (3, 3) from a motion's up axis to z; an unknown up axis is estimated from the trunks."""
+    """Return the rotation (3, 3) from a motion's up axis to z; an unknown up axis is estimated from the trunk."""
     up = motion.up
     if not up and motion.joints is not None:
         joints = motion.figure_joints
@@ -204,7 +204,7 @@ def upright(motion: Motion) -> Array:
 
 
 def upright_camera(view: View | None) -> Array:
-    """Return the rotation (3, 3) from the camera frame to a world: z up, y the horizontal camera direction.
+    """Return the rotation (3, 3) from the camera frame to a frame with z up and y along the horizontal view.
 
     A camera of unknown pose is assumed to be level.
     """
@@ -219,7 +219,7 @@ def upright_camera(view: View | None) -> Array:
 
 
 def facing(robot: Robot, q: Array, R: Array) -> Array:
-    """Rotate about z so that the body in the first known frame faces the virtual camera (-y)."""
+    """Return R, rotated about z so that the body faces the virtual camera (-y) in the first known frame."""
     known = q[np.isfinite(q).all(axis=1)]
     if not len(known):
         return R

@@ -41,7 +41,7 @@ def write_page(
     frame : int or (int, int), optional
         Frame, or first and last frame, numbered from 0. Default: all frames.
     urdf : str
-        Robot of configurations whose robot is not known.
+        URDF, or name of a robot; default: the robot that the motion names.
 
     Raises
     ------

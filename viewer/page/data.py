@@ -103,7 +103,7 @@ def _judged(motion: Motion, urdf: str) -> Report:
 
 
 def _of_motions(motions: Sequence[Motion], report: Report, title: str, urdf: str) -> Json:
-    """Collect motions and their report; its rows are the frames of the motions, clip by clip."""
+    """Collect motions and their report; the rows of the report are the frames of the motions, clip by clip."""
     summary = _summary(report)
     if not motions:
         return {"kind": "report", "title": title, "frames": [], **summary}
@@ -174,7 +174,7 @@ def _joints(robot: Robot, q: Array) -> Array:
 
 
 def _skeleton(robot: Robot) -> Json:
-    """Return the segments between points, and the sizes of bodies relative to the lengths of their segments."""
+    """Return the segments between points, and the capsules, with sizes relative to their segment lengths."""
     colours = {name: red << 16 | green << 8 | blue for name, (red, green, blue) in drawn.COLOURS.items()}
     shared: Json = {"colours": {**colours, "alarm": 0xD4006A}, "groupColours": GROUP_COLOURS}
     if isinstance(robot, Figure):
@@ -226,7 +226,7 @@ def _skeleton(robot: Robot) -> Json:
 
 
 def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
-    """Move bodies onto z = 0 with the first known point above x = y = 0; return them and the displacement (3,)."""
+    """Move bodies onto z = 0 with the first known body above x = y = 0; return them and the displacement (3,)."""
     low = [float(np.nanmin(one[:1, :, 2])) for one in bodies if np.isfinite(one[:1, :, 2]).any()]
     if not low:
         raise refusal("render", "", "no known joint in any frame", "at least one", "give a known posture")
@@ -268,7 +268,7 @@ def packed(values: NDArray[Any]) -> Json:
 
 
 def _summary(report: Report) -> Json:
-    """Collect the decision, the counts of each check, and the clips, the worst first."""
+    """Collect the decision, the numbers of rejected frames by check, and the clips, the worst first."""
     checks = []
     for name, one in report.by_check().items():
         checks.append({"name": name, **one, "message": str(report.messages.get(name, ""))})
