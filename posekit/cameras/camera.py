@@ -10,10 +10,11 @@ import numpy as np
 from posekit.errors import CameraError, refusal, shown
 from posekit.geometry import FARTHEST_COORDINATE, Array, Flags, Record, dot, norm, read_only
 
-#: Half the distance (m) between the two candidates below which they count as one.
+#: Half the distance (m) between the near and the far position below which they count as one.
 #:
-#: The candidates are at distances of ``sqrt(l^2 - h^2)`` from the foot of the perpendicular on the ray. At a few metres
-#: from the camera, ``l^2 - h^2`` has a rounding error of about 1e-15 m^2, so closer candidates cannot be distinguished.
+#: Both are at the distance ``sqrt(l^2 - h^2)`` from the foot of the perpendicular on the ray (see `meet_sphere`). At a
+#: few metres from the camera, ``l^2 - h^2`` has a rounding error of about 1e-15 m^2, so closer positions cannot be
+#: distinguished.
 COINCIDENT_METRES: Final = 1e-7
 
 

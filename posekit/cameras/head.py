@@ -35,10 +35,10 @@ MAX_STEPS: Final = 60
 #: standard deviation.
 FIT_PRECISION: Final = 1e-10
 
-#: The same for a fit that leaves out one point: this precision is sufficient to compare errors.
+#: Relative decrease of the squared error that ends a fit without one of the points: sufficient to compare errors.
 MISFIT_PRECISION: Final = 1e-3
 
-#: Slope d of a head at half a metre from the camera, where a start from the scaled orthographic pose can fail.
+#: Initial d of a head at half a metre from the camera, where a start from the scaled orthographic pose can fail.
 NEAR_SLOPE: Final = 0.15
 
 #: Initial, smallest and largest damping, as a fraction of the normal equations' diagonal. Above the largest damping no
@@ -325,7 +325,7 @@ class _Problem(NamedTuple):
     def best(self) -> tuple[Array, Array, Array]:
         """Return the best fit from two starts: the scaled orthographic pose, and its depth reversal (Necker 1832).
 
-        For coarse image points, the squared error has a second minimum near the reversed pose. The reversal mirrors the
+        For noisy image points, the squared error has a second minimum near the reversed pose. The reversal mirrors the
         head along its thinnest direction and then along the optical axis; the two reflections together are a rotation.
         If f is unknown, a third fit starts with a head near the camera.
         """

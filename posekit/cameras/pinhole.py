@@ -57,7 +57,7 @@ class PinholeCamera(Camera):
     Raises
     ------
     CameraError
-        If the parameters describe no camera.
+        If a parameter has a wrong shape or an impossible value.
 
     Examples
     --------
@@ -203,8 +203,8 @@ def camera_from_fov(
 ) -> PinholeCamera:
     r"""Guess a camera from its angle of view :math:`\alpha`: :math:`f = d / (2 \tan(\alpha / 2))`.
 
-    Here d is the picture's diagonal, width or height, pixels. Pixels are square, the principal point is in the middle
-    of the picture, and there is no distortion.
+    Here d is the picture's diagonal, width or height (see `axis`), pixels. Pixels are square, the principal point is in
+    the middle of the picture, and there is no distortion.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def camera_from_fov(
     Raises
     ------
     CameraError
-        If the numbers describe no camera.
+        If the angle, the size or the deviation has an impossible value.
 
     Examples
     --------

@@ -122,7 +122,7 @@ class View(Record):
     def __post_init__(self) -> None:
         if not isinstance(self.camera, CameraModel):
             raise refusal(
-                "view", "camera", shown(type(self.camera).__name__), "a camera", "open a calibration"
+                "view", "camera", shown(type(self.camera).__name__), "a camera", "open a calibration file"
             )
         frames = len(self.time)
         shapes = {
@@ -146,9 +146,9 @@ class View(Record):
             _check_points(name, values)
             self._set(name, values)
         if np.isnan(self.time).any():
-            raise refusal("view", "time", "NaN", "a time for every frame", "number the frames if need be")
+            raise refusal("view", "time", "NaN", "a time for every frame", "give times or frame numbers")
         if np.isnan(self.image[..., 0]).all():
-            raise refusal("view", "image", "NaN", "a joint in at least one frame", "add one")
+            raise refusal("view", "image", "only NaN", "a joint in at least one frame", "add a joint")
         if self.pictures and len(self.pictures) != frames:
             raise refusal("view", "pictures", f"{len(self.pictures)} names", f"{frames}", "name every frame")
         self._check_figure()

@@ -77,7 +77,8 @@ def log_room(joints: Array) -> Array:
     Directions of a segment are points of the unit sphere. A solid angle :math:`d\omega` of them has the image area
     :math:`dA = |\cos\theta|\, d\omega`, with :math:`\theta` the angle between segment and ray. The same area of the
     image corresponds to more directions if the segment is parallel to the image than if it points to the camera.
-    Because noise blurs directions, :math:`\sqrt{\cos^2\theta + c^2}` replaces :math:`|\cos\theta|`.
+    Because noise blurs directions, :math:`\sqrt{\cos^2\theta + c^2}` with c = `LEAST_COSINE` replaces
+    :math:`|\cos\theta|`.
 
     Parameters
     ----------

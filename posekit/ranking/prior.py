@@ -72,7 +72,7 @@ class StudentMixture(Record):
         return replace(self, scale=self.scale + np.diag(variance))
 
     def excess(self, x: Array, count: int) -> Array:
-        """Return the log-density (N,) of the first `count` coordinates, minus its mean over the distribution.
+        """Return the log-density (N,) of the first `count` coordinates, minus its expected value.
 
         Parameters
         ----------
@@ -143,9 +143,9 @@ class Prior(Record):
         Each block has the names of some directions and their joint distribution. If the bool is true, only the
         conditional density of `up` given the other directions is used.
     temperature : float
-        Metres. For exact postures, the log-density of directions is divided by 1 + deviation / temperature, with the
-        standard deviation of the joints. Without this, errors of a centimetre change directions by more than the width
-        of the prior's peaks.
+        Metres. For exact postures, the log-density of directions is divided by 1 + deviation / temperature, where
+        deviation is the standard deviation of the joints. Errors of a centimetre change directions by more than the
+        width of the prior's peaks.
     weights, noisy : mapping of str to float
         Weights of the terms by name: for exact postures, and for modes of noisy image points.
     balance, contact : (float, float)
@@ -162,7 +162,7 @@ class Prior(Record):
     _wide: dict[tuple[int, float], StudentMixture] = field(default_factory=dict)
 
     def judge(self, found: Array, sine: float = 0.0) -> tuple[Array, Array]:
-        """Return the log-densities of directions (N, 10 or 11, 3), each minus its mean over the prior.
+        """Return the log-densities of directions (N, 10 or 11, 3), each minus its expected value under the prior.
 
         Parameters
         ----------
@@ -218,12 +218,15 @@ def load_prior(name: str = "people") -> Prior:
         )
     except (OSError, KeyError, ValueError, TypeError, np.linalg.LinAlgError) as error:
         raise refusal(
-            name, "", shown(str(error)), "a table as urdf/priors/people.toml", "correct it"
+            name, "", shown(str(error)), "a table like urdf/priors/people.toml", "correct it"
         ) from None
 
 
 def _block(table: Mapping[str, Any], dof: float) -> tuple[tuple[str, ...], StudentMixture, bool]:
-    """Read one block. A matrix is a text with one row per line; the scale matrix has only its lower triangle."""
+    """Read one block of a prior's file.
+
+    A matrix is a text with one row per line. The text of the scale matrix has only its lower triangle.
+    """
     names = tuple(table["directions"])
     scale = np.zeros((3 * len(names), 3 * len(names)))
     for row, line in enumerate(table["scale"].splitlines()):

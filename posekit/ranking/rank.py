@@ -105,8 +105,8 @@ def log_terms(
     The terms are ``image`` (fit to the image), ``posture`` (directions of segments in the torso's frame), ``gravity``
     (up direction given the posture), ``balance`` (centre of mass over the feet), ``contact`` (feet on one level) and
     ``foreshortening`` (`posekit.ranking.directions.log_room`). Modes of noisy image points also have ``volume``
-    (`log_volume`). Each term except chi2 is relative to its mean over true postures; a term that cannot be evaluated is
-    0.
+    (`log_volume`). The mean over true postures is subtracted from each term except chi2. A term that cannot be
+    evaluated is 0.
     """
     prior = prior or load_prior()
     # In this order NumPy's inner loops run over postures, not over x, y, z.
@@ -135,7 +135,7 @@ def log_terms(
 
 
 def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: float) -> Array:
-    """Return the log-density (N,) of the errors of rigid distances and of the length residual, relative to its mean."""
+    """Return the log-density (N,) of the errors of rigid distances and of `residual`, minus its expected value."""
     start, end = np.array(RIGID_SEGMENTS).T
     apart = joints[:, end] - joints[:, start]
     off = np.sqrt(dot(apart, apart)) - lengths[-len(RIGID_SEGMENTS) :]

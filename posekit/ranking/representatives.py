@@ -30,7 +30,7 @@ def representatives(shape: Array, frame: Ints, weight: Array, hold: Array) -> tu
     weight : array (N,)
         Probability of each posture; within a frame the sum is one.
     hold : array (K,)
-        Total probability that the representatives of each frame must reach, with the postures near them.
+        Total probability that the representatives of each frame and the postures near them must reach.
 
     Returns
     -------

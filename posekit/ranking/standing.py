@@ -1,8 +1,8 @@
 r"""Balance of a standing person: distance of the centre of mass from the base of support, and height of the ankles.
 
-One picture does not show the height of the ground. A standing person is supported by the lower foot, and by both feet
-if both are low. The base of support is a line from the lower ankle towards the higher ankle, shortened by the factor
-:math:`e^{-h^2 / 2 (10 cm)^2}`, with h the height difference of the ankles.
+One picture does not show the height of the ground. The lower foot supports a standing person; if both feet have almost
+the same height, both support the person. The base of support is a line from the lower ankle towards the higher ankle,
+shortened by the factor :math:`e^{-h^2 / 2 (10 cm)^2}`, with h the height difference of the ankles.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every posture behind a noisy view: the modes of the posterior of 14 joint positions.
+"""Every posture that fits a noisy view: the modes of the posterior of 14 joint positions.
 
 `solve` is the method. `Problem` holds the image points and the prior knowledge of a body, `Modes` the result, and
 `Limits` the joint ranges.

@@ -5,8 +5,8 @@ of torso or hips (x forward, y left, z up). The elbow or knee, a hinge, has the 
 four sets of these angles give the same directions of the limb's two segments. The limb is within its limits if at least
 one set has every angle between its bounds. A bound is a constant or a piecewise linear function of another angle (a
 coupling). A range may also shrink if other angles of the joint are near their limits (a joint sinus). If the table of
-joint ranges bounds elevation, arms are judged by elevation, plane of elevation and axial rotation. Flexion and
-abduction are singular for an arm that points sideways.
+joint ranges bounds the elevation of the arm, arms are judged by elevation, plane of elevation and axial rotation.
+Flexion and abduction are singular for an arm that points sideways.
 """
 
 from __future__ import annotations
@@ -250,7 +250,7 @@ class Limits:
         return bounds[0], bounds[1], turns, outward
 
     def residual(self, limb: int, rotations: Array, writing: Ints | None = None) -> tuple[Array, Ints]:
-        r"""Return the excess of limb angles over their limits (N, 4), radians, and the index (N,) of the set used.
+        r"""Return residuals (N, 4) of angles beyond their limits, radians, and the index (N,) of the angle set used.
 
         Without `writing`, the set of angles that violates its limits least is used. An axial rotation that exceeds its
         limit by v has the residual :math:`\sin\varepsilon\, v / \sqrt{1 + v^2}`. It vanishes for a straight limb,
@@ -275,7 +275,7 @@ def _couple(n: NDArray[Any], ranges: Mapping[str, Any], zeros: dict[str, Any]) -
     longest = max((len(one["points"]) for one in couplings), default=0)
     if len(couplings) > MAX_COUPLINGS or longest > MAX_KNOTS:
         got = f"{len(couplings)} couplings of up to {longest} points"
-        raise refusal("ranges", "coupling", got, f"at most {MAX_COUPLINGS} of {MAX_KNOTS}", "leave some out")
+        raise refusal("ranges", "coupling", got, f"up to {MAX_COUPLINGS} of {MAX_KNOTS} points", "omit some")
     for k, one in enumerate(couplings):
         kind = 0 if one["angle"].split(".")[0] in ("shoulder", "elbow") else 1
         side = int(one["end"] == "upper")
@@ -315,9 +315,9 @@ def _valgus(hinge: Array, end: Array, square: float) -> tuple[Array, Flags]:
 def _round_off(
     n: NDArray[np.void], limb: int, angles: Array, bounds: list[Array], means: list[Array], slack: float
 ) -> None:
-    """Apply a joint sinus in place: narrow abduction and rotation where the preceding angles are far from mid-range.
+    """Apply a joint sinus: narrow the bounds of abduction and rotation if preceding angles are far from mid-range.
 
-    The distance from mid-range is a fraction of half the range plus the tolerance `slack`, radians.
+    The distance from mid-range is divided by half the range plus the tolerance `slack`, radians.
     """
     limit, mean, power = n["limit"][limb], n["mean"][limb // 2], n["sinus"][limb // 2]
     used = np.zeros(angles.shape[:2])

@@ -48,7 +48,7 @@ class Modes:
     Parameters
     ----------
     problem : Problem
-        The frames.
+        Data of the frames.
     frame : int array (M,)
         Frame of each mode.
     x : array (M, 43)
@@ -82,7 +82,7 @@ class Modes:
 
     @property
     def log_evidence(self) -> Array:
-        r"""Laplace approximation of the logarithm of each mode's evidence (M,), up to a constant of its frame.
+        r"""Laplace approximation of the logarithm of each mode's evidence (M,), up to an additive constant per frame.
 
         It is :math:`-\chi^2 / 2 - \ln \det H / 2`, with H the information matrix of the unknowns.
         """

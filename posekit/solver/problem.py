@@ -80,7 +80,7 @@ class Problem:
     Parameters
     ----------
     records : records (F,) of `PROBLEM`
-        The frames, all seen by one kind of camera.
+        Data of the frames; all frames have the same kind of camera.
     limits : Limits, optional
         Joint ranges; angles beyond them have residuals.
     """

@@ -69,8 +69,8 @@ Pull = Callable[[Array], Array]
 class Normal:
     """Normal equations of N postures in C unknowns: the coordinates of F free joints, then the size.
 
-    The attributes `chi2` (N,), `gradient` (N, C) and `matrix` (N, C, C) are the quadratic model. `beyond` (N, K) are
-    the residuals of joint limits, zero within the limits; `slopes` (N, K, C - 1) are their derivatives.
+    The attributes `chi2` (N,), `gradient` (N, C) and `matrix` (N, C, C) are the quadratic model of chi2. `beyond` (N,
+    K) are the residuals of joint limits, zero within the limits; `slopes` (N, K, C - 1) are their derivatives.
     """
 
     def __init__(self, count: int, width: int) -> None:
@@ -177,10 +177,10 @@ def length_terms(records: Records, x: Array, some: Flags | slice = slice(None)) 
 
 
 def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Array, Array]]:
-    """Yield pairs: angles beyond their limits, radians, and their derivatives with respect to joint positions.
+    """Yield pairs: residuals of joint limits, radians, and their derivatives with respect to joint positions.
 
     If the trunk is free, the first pair (N, 3), (N, 3, 14, 3) belongs to the pelvis. Each free limb then has a pair (N,
-    5), (N, 5, 14, 3). Its fifth row has residual zero and adds only curvature (see `_limb_slopes`).
+    5), (N, 5, 14, 3). The fifth residual is zero; its derivatives add only curvature (see `_limb_slopes`).
     """
     frames = trunk_frames(joints, bool(limits.numbers["between_hips"]))
     if parts & 1:
@@ -204,7 +204,7 @@ def limit_terms(limits: Limits, joints: Array, parts: int) -> Iterator[tuple[Arr
 
 
 def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w: Array) -> None:
-    """Add to `d` (M, K, 14, 3) the derivatives of `w` (M, K, 3) times the rotation vector of torso or hips."""
+    """Add to `d` the gradients, with respect to joint positions, of `w` dot the rotation vector of torso or hips."""
     forward, left, up = (R[:, None, :, k] for k in range(3))
     between = bool(limits.numbers["between_hips"])
     (a, b), (s, t) = ((0, 3), (1, 2)) if torso else ((4, 5), (0, 3) if between else (3, 4))
@@ -218,7 +218,7 @@ def _put_turn(d: Array, limits: Limits, joints: Array, R: Array, torso: bool, w:
 
 
 def _pelvis_slopes(limits: Limits, joints: Array, torso: Array, hips: Array, some: Flags) -> Array:
-    """Return derivatives (N, 3, 14, 3) of pelvis angles by joint positions; zero where `some` (N, 3) is False."""
+    """Return the Jacobian (N, 3, 14, 3) of pelvis angles with respect to joint positions; zero where not `some`."""
     left, up = torso[:, :, 1], hips[:, :, 2]
     lean = dot(left, up)[:, None]
     square = np.maximum(1 - lean * lean, LEAST_COSINE**2)
@@ -235,8 +235,9 @@ def _limb_slopes(
 ) -> Array:
     """Convert the Jacobian (M, 4, 4) of a limb's residuals from its angles to joint positions (chain rule).
 
-    Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians. It matters if an
-    elbow or knee is almost straight: moving wrist or ankle sideways in any direction bends the joint to second order.
+    Returns (M, 5, 14, 3). The last row is the curvature of the hinge's residual `bent` (M,), radians. The curvature
+    matters if an elbow or knee is almost straight: moving wrist or ankle sideways in any direction bends the joint to
+    second order.
     """
     start, middle, end = lim.STARTS[limb], lim.MIDDLES[limb], lim.ENDS[limb]
     upper, lower = (one[:, None] for one in lim.limb_directions(joints, limb))
@@ -280,9 +281,9 @@ def descend(
     Parameters
     ----------
     problem : Problem
-        The frames.
+        Data of the frames.
     which : int array (N,)
-        The frame of each start.
+        Frame of each start.
     start : array (N, 43)
         Joint positions, camera frame, metres, and the logarithm of the size.
     parts : int
@@ -290,7 +291,8 @@ def descend(
     most : int
         Largest number of steps.
     hopeless : array (N,)
-        A start with a larger chi2 is abandoned, unless its next step is predicted to reduce chi2 by at least half.
+        A start whose chi2 exceeds this value is abandoned, unless its next step is predicted to reduce chi2 by at least
+        half.
     damping : array (N,)
         Damping of the first step, 1/m^2: `FIRST_DAMPING`, or the final damping of an earlier descent. A start with
         infinite damping does not move.
@@ -392,7 +394,8 @@ def distinct(
 
     The bodies `x` (N, 43) are sorted by group, then by chi2. Two bodies are the same if no joint of the body parts
     `parts`, relative to the neck, differs by more than `within` (N,) metres. They are also the same if no joint differs
-    by more than `reach` metres and their difference d in all unknowns has :math:`d^T H d` below `level`.
+    by more than `reach` metres and their difference d in all unknowns has :math:`d^T H d` below `level`, with H the
+    information matrix.
     """
     keep = np.zeros(len(which), dtype=np.bool_)
     free = free_joints(parts)

@@ -82,10 +82,10 @@ def necks(problem: Problem) -> tuple[Ints, Array]:
 def branches(
     problem: Problem, frame: Ints, joint: int, start: Array, ways: Array, hidden: Ints | int
 ) -> tuple[Ints, Array]:
-    """Return rows (S,), ascending, of the parent's positions `start` (N, 3), and positions (S, 3) of the joint.
+    """Place a joint around its parent's positions `start` (N, 3); return rows of `start` (S,) and positions (S, 3).
 
-    A seen joint is placed near and far on its ray. A hidden joint is placed in the first `hidden` of the directions
-    `ways` (N, W, 3) from its parent.
+    A seen joint is placed near and far on its ray. A hidden joint is placed once in each of the first `hidden`
+    directions of `ways` (N, W, 3).
     """
     seen = problem.seen_joints[frame, joint]
     row = np.repeat(np.arange(len(frame)), np.where(seen, 2, hidden))
@@ -97,7 +97,7 @@ def branches(
 
 
 def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
-    """Return frames (S,), ascending, and trunks (S, 6, 3): every neck position, each seen joint near and far."""
+    """Return frames (S,), ascending, and trunks (S, 6, 3) for every neck and every near-far choice of seen joints."""
     frame, neck = necks(problem)
     trunk = np.zeros((len(frame), TRUNK, 3))
     trunk[:, 0] = neck
@@ -114,8 +114,8 @@ def trunk_starts(problem: Problem) -> tuple[Ints, Array]:
 def _filled(problem: Problem, frame: Ints, trunk: Array, part: slice) -> tuple[Ints, Array]:
     """Place the hidden joints of torso or hips by fitting a straight trunk of the person's lengths to seen joints.
 
-    One or two seen joints leave a rotation undetermined. The trunk is then fitted with many different rotations: a
-    point beside the trunk is placed in each of the directions `DIRECTIONS`.
+    Fewer than three seen joints leave a rotation undetermined. The trunk is then fitted with many different rotations,
+    each of which turns a point beside the trunk towards one of `DIRECTIONS`.
     """
     seen = np.arange(TRUNK) < part.start + np.zeros((len(frame), 1))
     seen[:, part] = problem.seen_joints[frame, part]
@@ -155,11 +155,11 @@ def limb_starts(problem: Problem, frame: Ints, trunk: Array, limb: int) -> tuple
     Parameters
     ----------
     problem : Problem
-        The frames.
+        Data of the frames.
     frame : int array (T,)
         Frame of each trunk.
     trunk : array (T, 6, 3)
-        Metres.
+        Joint positions, metres.
     limb : int
         Index in `posekit.solver.limits.LIMBS`.
     """

@@ -47,7 +47,7 @@ def support_of(points: tuple[int, ...]) -> tuple[int, ...]:
 
 @lru_cache(maxsize=512)
 def bits(level: int, joints: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return, for each code of a level (2^level,), the bits of given joints as one integer, first joint highest."""
+    """Return, for every code (2^level,) of a level, the integer that the bits of the given joints form."""
     codes = np.arange(1 << level, dtype=np.int64)
     picked = np.zeros_like(codes)
     for joint in joints:

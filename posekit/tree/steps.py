@@ -14,9 +14,9 @@ try:
 except ImportError:
     compiled = None
 
-#: Kinds of steps. Numbers of a distance: the length. Numbers of a torso: coordinates of its four joints (12), and 1 if
-#: joints that fit its mirror image are undecided. Numbers of two capsules: centre and half length of each, sum of their
-#: radii, and least distance between them. Lengths are in metres.
+#: Kinds of steps. The numbers of a distance are its length. The numbers of a torso are coordinates of its four joints
+#: (12), and 1 if joints that fit its mirror image are undecided. The numbers of two capsules are centre and half length
+#: of each, sum of their radii, and least distance between them. Lengths are in metres.
 BRANCH, DISTANCE, TORSO, PELVIS, LIMB, CAPSULES = range(6)
 
 

@@ -94,7 +94,7 @@ class Trees:
 
     @cached_property
     def branches(self) -> NDArray[np.str_]:
-        """The 13 branches of each survivor (N,) as a string of 0 (near) and 1 (far)."""
+        """The branch of each survivor (N,) as a string of 13 digits: 0 near, 1 far."""
         digits = np.uint32(ord("0")) + (self.code[:, None] >> np.arange(DEPTH)[::-1] & 1)
         return digits.astype(np.uint32).view(f"U{DEPTH}")[:, 0]
 
@@ -208,7 +208,7 @@ def grow(
 
 
 class _Planned(NamedTuple):
-    """A check with its level, the points that it reads, and its compiled steps; if `check` is None, a branching."""
+    """A check with its level, points and compiled steps; if `check` is None, the near-far branching at a joint."""
 
     level: int
     check: Any
