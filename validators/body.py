@@ -123,8 +123,8 @@ class Body(Record):
     ) -> Body:
         """Return the `Body` of one recording: the data that its checks read.
 
-        If the motion has configurations only, its joints are computed by forward kinematics of `robot`. With `placed`
-        False they remain unknown.
+        If the motion has configurations only, its joints are computed by forward kinematics of `robot`. If `placed` is
+        False, these joints are NaN.
         """
         joints = motion.figure_joints
         if robot is not None and motion.joints is None and motion.q is not None:
@@ -153,7 +153,7 @@ class Body(Record):
         return len(self.joints)
 
     def knows(self, name: str) -> bool:
-        """Return whether the data of a name in `posekit.validators.check.READABLE` are known."""
+        """Return whether some data are known, by their name in `posekit.validators.check.READABLE`."""
         if name == "time":
             return self.motion and self.dt > 0
         if name == "ground":
@@ -235,7 +235,7 @@ class Body(Record):
         return np.concatenate([self.joints, self.head], axis=1)
 
     def noise_allowed(self, segment: str = "") -> float:
-        """Return the tolerance for noise of a segment's length or, without a name, of any distance, metres."""
+        """Return the noise tolerance of a segment's length, metres; without `segment`, that of any distance."""
         noise = self.settings.noise
         if noise is None:
             noise = self.person.noise_of(segment) if self.measured else 0.0
@@ -243,7 +243,7 @@ class Body(Record):
 
     @property
     def contact_margin(self) -> float:
-        """Minimum distance between capsules of the figure, metres; a negative distance allows overlap."""
+        """Minimum allowed distance between capsules of the figure, metres; a negative minimum allows overlap."""
         made_up = MADE_UP_METRES if self.measured else 0.0
         return self.settings.contact_margin - made_up - self.noise_allowed()
 
@@ -279,7 +279,7 @@ class Body(Record):
         )
 
     def allowed(self) -> dict[str, Any]:
-        """Return the tolerances, as reports state them."""
+        """Return the tolerances as named entries for the settings of a report."""
         if self.robot is not None:
             return {
                 "judged": "configurations",
@@ -299,11 +299,12 @@ class Body(Record):
 
 
 def spine_gives(lengths: Mapping[str, float]) -> float:
-    r"""Return by how much bending to the side shortens the distance from shoulder to pelvis at most, metres.
+    r"""Return the largest decrease of the distance from shoulder to pelvis by side bending of the spine, metres.
 
     A spine of length h that is bent to a circular arc of angle :math:`\varphi` has a chord of length
-    :math:`c = h \sin(\varphi/2) / (\varphi/2)`. The chord leans by :math:`\varphi/2`. With the shoulder at distance w
-    from the neck, the distance from shoulder to pelvis is :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}`.
+    :math:`c = h \sin(\varphi/2) / (\varphi/2)`. The chord leans by :math:`\varphi/2` toward the shoulder. With the
+    shoulder at distance w from the neck, the distance from shoulder to pelvis is
+    :math:`\sqrt{c^2 + w^2 - 2 c w \sin(\varphi/2)}`.
     """
     half = math.radians(SIDE_BENDING_DEGREES) / 2
     h, w = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"] / 2
@@ -317,7 +318,7 @@ def hips_share(lengths: Mapping[str, float]) -> float:
 
 
 def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
-    r"""Return how far the clavicles change the distances between shoulders and from shoulder to pelvis, metres.
+    r"""Return how much rotating clavicles change the distances between shoulders, and from shoulder to pelvis, metres.
 
     A clavicle of length c rotates by up to :math:`\varphi` about its inner end, forward or upward. Forward rotation of
     both clavicles shortens the distance between the shoulders by :math:`2 c (1 - \cos\varphi)`. Upward rotation raises
@@ -329,7 +330,7 @@ def girdle_gives(lengths: Mapping[str, float]) -> tuple[float, float]:
 
 
 def once(find: Callable[[Body], Found]) -> Callable[[Body], Found]:
-    """Cache the result of a function in the `Body` of its argument, so that several checks share the result."""
+    """Cache the result of a function of a `Body` in this `Body`, so that several checks share the result."""
 
     @wraps(find)
     def found(body: Body) -> Found:

@@ -14,9 +14,9 @@ A check is any object with the four members of `Check`. Checks of postures, conf
             return Judgement(("right_ankle", "left_ankle"), height, lower=0.0, tolerance=0.01)
 
 The docstring is the message of the findings. A check may have two more members. `points` is a sequence of the names of
-the points that the check reads: the interpretation tree applies the check as soon as these points have positions.
-`residuals(joints)` is a method that the solver uses for noisy postures (N, 14, 3). It returns residuals (N, K) in
-standard deviations: the excess over each bound, 0 inside the bounds.
+the points that the check reads. While `posekit.recover` searches its binary tree, it applies the check as soon as these
+points have positions. `residuals(joints)` is a method that the least-squares solver calls with postures (N, 14, 3). It
+returns residuals (N, K): the excess of each value over its bound, in standard deviations; 0 inside the bounds.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class Judgement(Record):
     tolerance : array broadcastable to (T, K)
         Allowed excess over a bound.
     scale : array broadcastable to (T, K), optional
-        Divisor of the margins in `share`, in the unit of the check. By default half the distance between the bounds
-        or, if only one bound is finite, its absolute value.
+        Divisor of the margins in `share`, in the unit of the check. By default half the distance between the bounds or,
+        if only one bound is finite, the absolute value of this bound.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class Judgement(Record):
 
     @cached_property
     def margin(self) -> Array:
-        """Distance to the nearer bound, widened by the tolerance (T, K): negative outside, NaN if undecided."""
+        """Distance (T, K) of values from the nearest bound, including tolerance: negative outside, NaN if undecided."""
         low, high = self.lower - self.tolerance, self.upper + self.tolerance
         with np.errstate(invalid="ignore"):  # an infinite value has no distance from an infinite bound
             nearer = np.fmin(self.value - low, high - self.value)
@@ -131,7 +131,7 @@ class Judgement(Record):
 
     @property
     def share(self) -> Array:
-        """Margins divided by half the range (T, K), comparable between checks: 1 in the middle, negative outside."""
+        """Margins (T, K) divided by `scale`, by default half the range: 1 in the middle, negative outside."""
         if self.scale is not None:
             return np.asarray(self.margin / self.scale)
         lower, upper = np.asarray(self.lower), np.asarray(self.upper)
@@ -144,7 +144,7 @@ class Judgement(Record):
 
     @classmethod
     def stacked(cls, parts: Sequence[Judgement]) -> Judgement:
-        """Concatenate judgements of the same frames along their places."""
+        """Join the columns of several judgements of the same frames into one judgement."""
         names = ["value", "lower", "upper", "tolerance"] + ["scale"] * (parts[0].scale is not None)
         columns = {
             name: np.concatenate(
@@ -209,7 +209,7 @@ class FunctionCheck:
         return {one.name: one.default for one in known if one.kind is one.KEYWORD_ONLY}
 
     def with_thresholds(self, **thresholds: Any) -> FunctionCheck:
-        """Return the check with other thresholds."""
+        """Return a copy of the check with the given thresholds."""
         return replace(self, thresholds={**self.thresholds, **thresholds})
 
     def judge(self, body: Body) -> Judgement:
@@ -319,7 +319,7 @@ def find_check(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _named(given: str, known: Mapping[str, Any]) -> Any:
-    """Return the check, or the class of checks, that has a name. Modules in the current folder are searched first."""
+    """Return the check, or its class, with the given name. Modules in the current folder are searched first."""
     name = given if ":" in given else given.replace("_", "-")
     if name in known:
         return known[name]

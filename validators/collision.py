@@ -1,7 +1,7 @@
 """Collision: arms, legs, torso and head do not penetrate each other (Lee & Chen 1985, §3.2.C).
 
-The collision bodies of the figure are capsules along the segments of the posture. The distance between two capsules is
-the distance between their axes minus both radii; it has a closed form.
+The collision bodies of the figure are capsules along its segments. The distance between two capsules is the distance
+between their axes minus both radii; it has a closed form.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Collision:
 
     @cached_property
     def parts(self) -> list[Collision]:
-        """Return checks of fewer pairs, grouped by their last joint in tree order; pairs with the head are separate."""
+        """Return one check for all pairs with the same last joint in tree order; pairs with the head are separate."""
         groups: dict[tuple[bool, int], list[tuple[str, str]]] = {}
         for pair in _pairs(load_figure()):
             read = [point for link in pair for ends in CAPSULE_AXES[link] for point in ends]
@@ -65,7 +65,7 @@ class Collision:
         return [Collision(pairs=tuple(pairs)) for pairs in groups.values()]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None for pairs with the head and for measured bodies."""
+        """Return the check for the C++ tree search; None for pairs with the head and for measured bodies."""
         if body.tolerance is None or any("head" in pair for pair in self.pairs):
             return None
         capsules = {capsule.link: capsule for capsule in body.figure.capsules}
@@ -122,7 +122,7 @@ def _pairs(figure: Figure) -> tuple[tuple[str, str], ...]:
 
 
 def _slimness(body: Body, link: str) -> float:
-    """Return the factor of a capsule's radius; it is below 1 for the legs of a person with narrow hips."""
+    """Return a factor that multiplies a capsule's radius: below 1 for the legs of a person with narrow hips."""
     if not body.measured or not link.endswith(("thigh", "shank")):
         return 1.0
     return min(hips_share(body.lengths) / hips_share(body.base_figure.lengths), 1.0)

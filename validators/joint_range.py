@@ -2,7 +2,7 @@
 
 `posekit.solver.Limits` computes the angles and ranges of limbs and pelvis for this check and for the solver. Several
 sets of Euler angles describe the same orientation of a limb. The orientation is valid if all angles of one set are
-within their ranges and couplings.
+within their ranges. Some ranges depend on other angles.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ PARTS: Final = ("neck", "pelvis", *LIMBS)
 class JointRange:
     """An angle of a joint is outside its range.
 
-    The axial rotation of an almost straight limb is poorly determined. Its tolerance is the tolerance of directions
-    divided by the sine of the bend. In recordings of people, the axial rotation is undecided if elbow or knee bends by
-    less than `STRAIGHT_DEGREES`.
+    The axial rotation of an almost straight limb is poorly determined. Its tolerance is the tolerance of segment
+    directions, divided by the sine of the angle between upper and lower segment. In recordings of people, the axial
+    rotation is undecided if elbow or knee bends by less than `STRAIGHT_DEGREES`.
 
     Parameters
     ----------
@@ -93,13 +93,13 @@ class JointRange:
 
     @cached_property
     def parts(self) -> list[JointRange]:
-        """Return checks of the neck, the pelvis, and each limb without and with its lower segment."""
+        """Return checks of the neck, the pelvis, each limb's upper segment, and each whole limb."""
         early = [JointRange(part=limb, upper_only=True) for limb in LIMBS]
         whole = [JointRange(part=part) for part in PARTS]
         return [*whole[:2], *early, *whole[2:]]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None for the neck or for measured bodies."""
+        """Return the check for the C++ tree search; None if only Python has it, as for the neck and measured bodies."""
         if body.tolerance is None or self.part == "neck" or _of_table1(body):
             return None
         limits = _limits(body.figure, body.settings.ranges, math.nan)[0]
@@ -114,7 +114,7 @@ class JointRange:
         return [step(LIMB, _places(limits, limb)[0], limb=limb, **given)]
 
     def judge(self, body: Body) -> Judgement:
-        """Measure the angles of the parts."""
+        """Judge the angles of `part`, or of all parts."""
         parts = (self.part,) if self.part else PARTS
         if self.upper_only:
             joints = body.joints.copy()
@@ -136,7 +136,7 @@ class JointRange:
 
 
 def _of_table1(body: Body) -> Mapping[str, Any] | None:
-    """Return the settings' table of ranges if it limits the angles of Lee & Chen; otherwise None."""
+    """Return the table of ranges in the settings if it limits the angles of Lee & Chen; otherwise None."""
     table = load_ranges(body.settings.ranges)
     return table if table is not None and table["kind"] in ("rotation", "projected") else None
 
@@ -144,8 +144,9 @@ def _of_table1(body: Body) -> Mapping[str, Any] | None:
 def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     """Judge the angles of one limb.
 
-    If the usual set of Euler angles is outside its ranges, the set with the smallest excess is judged. In motion of
-    measured people, neighbouring frames decide whether a hinge bends forward or backward.
+    The judged set of Euler angles is the set in which elbow or knee bends forward. If it is outside its ranges, the set
+    with the smallest excess over its ranges is judged instead. In motion of measured people, neighbouring frames decide
+    whether elbow or knee bends backward.
     """
     joints, (places, keep) = body.joints, _places(limits, limb)
     tolerance = body.angle_tolerance((STARTS[limb], MIDDLES[limb]), (MIDDLES[limb], ENDS[limb]))
@@ -160,9 +161,10 @@ def _limb(limits: Limits, body: Body, limb: int) -> Judgement:
     least = max(math.radians(tolerance) / math.pi, np.finfo(np.float64).tiny)
 
     def read(rows: NDArray[np.intp] | slice, writing: NDArray[np.intp] | None) -> tuple[Array, Array, Array]:
-        """Return value, lower, upper and tolerance of each set's angles (4, n, W, 4), and two excesses (n, W), degrees.
+        """Return value, lower, upper and tolerance of the four angles in W sets of Euler angles (4, n, W, 4), degrees.
 
-        An excess is the largest excess of the angles of a set: first without undetermined rotations, then with them.
+        Also return the largest excess of the angles of each set twice (n, W): without undetermined axial rotations, and
+        with them.
         """
         *angles, sine = limits.read(limb, rotations[rows], math.radians(tolerance), writing)
         value, lower, upper = np.degrees(np.stack(angles))
@@ -193,14 +195,15 @@ def bent_backward(upper: Array, lower: Array, legal: NDArray[np.bool_], dt: floa
     """Return whether an elbow or a knee bends backward in each frame (T,), by comparison with neighbouring frames.
 
     In one frame, a limb that bends backward looks like a limb that is rotated by half a turn about its upper segment.
-    Motion separates the two: an arm rotates about its axis by a few degrees in a frame, not by half a turn.
+    Motion distinguishes these two postures: from frame to frame, a limb rotates about its axis by a few degrees, not by
+    half a turn.
 
     Parameters
     ----------
     upper, lower : array (T, 3)
         Unit directions of the upper and the lower segment in successive frames.
     legal : bool array (T,)
-        Whether the limb is within its ranges if the hinge bends forward.
+        Whether the limb is within its ranges if elbow or knee bends forward.
     dt : float
         Seconds from a frame to the next.
     """
@@ -248,7 +251,7 @@ def _pelvis(limits: Limits, body: Body) -> Judgement:
 
 
 def _neck(ik: ClosedForm, body: Body) -> Judgement:
-    """Judge flexion, bending and rotation of the head on the torso; undecided without head points."""
+    """Judge flexion, bending and rotation of the head relative to the torso; undecided without head points."""
     R_torso = torso_frame(*(body.joints[:, JOINT[name]] for name in TORSO))
     value = np.degrees(ik.neck(R_torso, body.joints[:, 0], body.head))
     lower, upper = (np.degrees(one[:3]) for one in (ik.limits.lower, ik.limits.upper))
@@ -257,10 +260,10 @@ def _neck(ik: ClosedForm, body: Body) -> Judgement:
 
 @lru_cache(maxsize=32)
 def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedForm]:
-    """Return the limits of pelvis and limbs, and the closed form with the limits of the neck, by a table of ranges.
+    """Return limits of pelvis and limbs from a table of ranges, and inverse kinematics with its limits of the neck.
 
-    `forward` is the angle, in degrees, by which a measured person's hips lie in front of the trunk's line in the median
-    frame.
+    `forward` is the median angle, in degrees, by which a measured person's hips lie in front of the line from neck to
+    pelvis.
     """
     table = load_ranges(name)
     if table is None or table["kind"] != "anatomical":
@@ -276,5 +279,5 @@ def _limits(figure: Figure, name: str, forward: float) -> tuple[Limits, ClosedFo
 
 
 def _hips_outward(figure: Figure) -> float:
-    """Return the inward lean of straight thighs, degrees, of a figure whose hips are wider apart than usual."""
+    """Return how far straight thighs lean inward, degrees, because hips are wider apart than the built-in figure's."""
     return math.degrees(math.atan((hips_share(figure.lengths) - hips_share(load_figure().lengths)) / 2))

@@ -53,17 +53,17 @@ KNOWN: Final[dict[str, Check]] = {**POSTURE_CHECKS, **ROBOT_CHECKS, **MOTION_CHE
 
 
 class InvalidError(PosekitError, AssertionError):
-    """`assert_valid` found invalid postures; the message gives the first reasons."""
+    """`assert_valid` found invalid postures; the message lists the first findings."""
 
 
 def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[Check]:
-    """Return the checks that settings select, in the order of reports.
+    """Return the checks that settings select, in the order in which reports list them.
 
     Parameters
     ----------
     settings : Settings
-        Settings with the names of ``checks``. If they are None, the default checks are selected and, for motion, the
-        checks of the profile.
+        Settings whose field ``checks`` lists checks or their names. If the field is None, the default checks are
+        selected and, for motion, the checks of the profile.
     of_robot : bool
         Whether the checks judge configurations of a robot.
     in_time : bool
@@ -91,9 +91,10 @@ def chosen_checks(settings: Settings, *, of_robot: bool, in_time: bool) -> list[
 
 
 def early_checks(settings: Settings) -> list[Check]:
-    """Return the posture checks of settings for the interpretation tree.
+    """Return the checks of postures for the binary tree search of `posekit.recover`.
 
-    A check with `parts` is split into these smaller checks. A part reads few points, so that the tree applies it early.
+    A check with a member `parts` is replaced by these smaller checks. Each part reads few points, so that the search
+    applies it early.
     """
     asked = chosen_checks(settings, of_robot=False, in_time=False)
     postures = [check for check in asked if not getattr(check, "over_time", False)]
@@ -101,7 +102,7 @@ def early_checks(settings: Settings) -> list[Check]:
 
 
 class PostureJudge:
-    """Applies checks to postures (N, 14, 3) or (N, 19, 3) of a figure for the interpretation tree.
+    """Applies checks to postures (N, 14, 3) or (N, 19, 3) of a figure for the binary tree search.
 
     Parameters
     ----------
@@ -122,21 +123,21 @@ class PostureJudge:
         self.tolerance, self.up = tolerance, up
 
     def __call__(self, check: Check, points: Array) -> Judgement:
-        """Return the judgement of a check; it has no places if the check does not apply."""
+        """Return the judgement of a check, without columns if the check does not apply."""
         found = judge_postures(
             points, [check], self.figure, self.settings, tolerance=self.tolerance, up=self.up
         )
         return found.get(check.name) or Judgement((), np.empty((len(points), 0)))
 
     def steps(self, check: Any) -> list[Step] | None:
-        """Return the steps of a check for the compiled tree; None if the check has none."""
+        """Return a check in the form for the C++ tree search; None if it has no such form."""
         if not hasattr(check, "steps"):
             return None
         return _steps(check, self.figure, self._unnamed, self.tolerance)
 
     @cached_property
     def _unnamed(self) -> ValidateSettings:
-        """The settings without checks, as a key of the cache of `_steps`: users' checks may not be hashable."""
+        """Settings without ``checks``, for the cache of `_steps`, because users' checks may not be hashable."""
         return replace(self.settings, checks=None)
 
 
@@ -144,7 +145,7 @@ class PostureJudge:
 def _steps(
     check: Any, figure: Figure, settings: ValidateSettings, tolerance: Tolerance | None
 ) -> list[Step] | None:
-    """Return the steps of a posture check for the compiled tree."""
+    """Return a check of postures in the form for the C++ tree search."""
     none = np.empty((0, len(JOINTS), 3))
     body = Body(joints=none, base=figure, settings=settings, tolerance=tolerance, motion=False)
     found: list[Step] | None = check.steps(body)
@@ -180,7 +181,7 @@ def judge_postures(
 
 
 def _asked(checks: Iterable[Check], body: Body) -> tuple[dict[str, tuple[Check, Judgement]], dict[str, str]]:
-    """Return the checks that apply with their judgements, and the reasons why other checks do not apply, by name."""
+    """Return by name the applicable checks with their judgements, and the reasons why other checks do not apply."""
     found, not_asked = {}, {}
     for check in checks:
         try:
@@ -399,9 +400,9 @@ class Validator:
         ----------
         given : array or Motion
             Joint positions (14, 3) or (N, 14, 3), or with head points (N, 19, 3), metres, NaN where unknown. Or
-            configurations (nq,) or (N, nq). In configurations (N, nq - 7) the free root is omitted; it is then at
-            neutral. All postures are of one person. The order of the root's quaternion is x, y, z, w. The report warns
-            if a batch of robots is upright only in the order w, x, y, z.
+            configurations (nq,) or (N, nq). Configurations (N, nq - 7) omit the free root, which then has its neutral
+            pose. All postures are of one person. The order of the root's quaternion is x, y, z, w. The report warns if
+            a batch of robots is upright only in the order w, x, y, z.
         head : array (N, 5, 3), optional
             Positions of nose, eyes and ears, metres.
         tolerance : Tolerance, optional
@@ -511,7 +512,7 @@ def assert_valid(
     Raises
     ------
     InvalidError
-        If a posture is invalid or undecided. The error is an `AssertionError`; its message gives the first reasons.
+        If a posture is invalid or undecided. The error is an `AssertionError`; its message lists the first findings.
 
     Warns
     -----

@@ -1,9 +1,9 @@
 """Tables of joint ranges, read from TOML of schema ``posekit.ranges/1``.
 
 There are four kinds of table. ``anatomical``: mean and standard deviation over people of the lower and upper limit of
-each angle, and couplings between angles. ``rotation``: limits of the angles of Lee & Chen 1985, §3.2.A, defined as
-rotations from standing. ``projected``: limits of the same angles as printed in the paper. ``joints``: limits of a
-robot's joints.
+each angle, and how limits depend on other angles. ``rotation``: limits of the angles of Lee & Chen 1985, §3.2.A,
+defined as rotations from standing. ``projected``: limits of the same angles as printed in the paper. ``joints``: limits
+of a robot's joints.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def load_ranges(name: str) -> Mapping[str, Any] | None:
 
 
 def _angles(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the limits of a table, by the names of joint and angle."""
+    """Return the limits in a table, by names of the form ``joint.angle``."""
     joints = {joint: angles for joint, angles in table.items() if isinstance(angles, dict)}
     return {f"{joint}.{angle}": ends for joint, angles in joints.items() for angle, ends in angles.items()}
 
@@ -112,21 +112,20 @@ def limits_of(figure: Figure, table: Mapping[str, Any] | None) -> Limits:
 
 
 def of_person(table: Mapping[str, Any], forward: float, outward: float) -> Mapping[str, Any]:
-    """Widen anatomical ranges for a person whose hips lie in front of the trunk's line in the median frame.
+    """Widen anatomical ranges for a person whose median hip angles are unusual.
 
-    An unusual median angle of the hips has two possible causes. The skeleton may define its pelvis joint at another
-    position, which shifts the zero angles of pelvis and hips. Or the person usually stands so. A recording does not
-    separate the causes. Therefore each limit moves only outward: the shift applies to the limit that it widens, and the
-    opposite limit stays unchanged.
+    Unusual median angles have two possible causes. The skeleton may define its pelvis joint at another position, which
+    shifts the zero angles of pelvis and hips. Or the person usually stands in an unusual posture. A recording does not
+    separate the causes. Therefore ranges only widen: one limit moves outward, and the opposite limit stays unchanged.
 
     Parameters
     ----------
     table : mapping
         Ranges of kind ``anatomical``.
     forward : float
-        Angle by which the hips lie in front of the trunk's line, degrees.
+        Median angle by which the hips lie in front of the line from neck to pelvis, degrees.
     outward : float
-        Inward lean of straight thighs, degrees; positive if the hips are wider apart than usual.
+        Inward lean of straight thighs, degrees; positive if the hips are wider apart than the built-in figure's.
     """
     moved = copy.deepcopy(dict(table))
     ways = [(moved["hip"]["abduction"], -outward)]

@@ -65,7 +65,7 @@ class Span:
     value, bound, margin : float
         Value in the worst frame, the violated bound, and their difference, which is negative.
     severity : float
-        Excess over the bound in multiples of a slight excess (`SLIGHT`).
+        Excess over the bound, as a multiple of `SLIGHT`: 1 cm, 5 degrees, 0.05 m/s, or a tenth of the bound.
     places : sequence of str
         Names of all rejected joints or pairs, the worst first.
     """
@@ -108,13 +108,14 @@ class ClipDecision:
         ``keep``; ``repair?`` if `posekit.repair` can remove all findings and at most one check rejects most frames;
         otherwise ``drop``.
     reason : str
-        Name of the check that rejects the first span, or ``unknown joints``; empty for clips to keep.
+        Name of the check of the first rejected span in `spans`, or ``unknown joints``; empty for clips to keep.
     frames, invalid, undecided : int
         Numbers of all frames, rejected frames and undecided frames.
     severity : float
         Largest severity of the spans; 0 without rejected frames.
     spans : sequence of Span
-        Spans of the clip: rejections before undecided spans, causes before their effects, then by severity.
+        Spans of the clip. Rejected spans are before undecided spans. Among rejected spans, probable effects of another
+        span come last; otherwise higher severity is first.
     good : (int, int) or None
         First and last frame of the longest run of valid frames.
     """
@@ -212,19 +213,19 @@ class Report(Record):
 
     @cached_property
     def invalid(self) -> NDArray[np.bool_]:
-        """Whether any check rejects each frame (N,)."""
+        """For each frame (N,), whether a check rejects it."""
         found = np.zeros(len(self), dtype=np.bool_)
         found[self.findings["row"]] = True
         return locked(found)
 
     @cached_property
     def undecided(self) -> NDArray[np.bool_]:
-        """Whether no check rejects each frame (N,), but a joint is unknown or a check is undecided."""
+        """For each frame (N,), whether a joint is unknown or a check is undecided, and no check rejects it."""
         return locked(~self.invalid & (self.incomplete | self.silent.any(axis=1)))
 
     @cached_property
     def ok(self) -> NDArray[np.bool_]:
-        """Whether each frame is valid: every check is decided, and no check rejects it (N,)."""
+        """For each frame (N,), whether it is valid: all joints are known, and no check rejects it or is undecided."""
         return locked(~self.invalid & ~self.undecided)
 
     @cached_property
@@ -241,7 +242,7 @@ class Report(Record):
 
     @cached_property
     def _cells(self) -> Columns:
-        """Findings, and a row of NaN for each undecided check of a frame; sorted by frame and check."""
+        """Findings, and one row of NaN for each check that is undecided in a frame; sorted by frame and check."""
         rows, which = np.nonzero(self.silent & self.undecided[:, None])
         nothing = {"row": rows, "check": which, "place": np.full(len(rows), -1)}
         unknown = np.full(len(rows), np.nan)
@@ -385,7 +386,7 @@ class Report(Record):
         return f"{head}; {', '.join(reasons)}" if reasons else head
 
     def by_check(self) -> dict[str, dict[str, Any]]:
-        """Return numbers of rejected frames and clips, the most frequent place, and the worst finding, by check."""
+        """Return for each check the counts of rejected frames and clips, its most frequent place, and worst finding."""
         counts: dict[str, dict[str, Any]] = {}
         for k, name in enumerate(self.checks):
             found = {column: values[self.findings["check"] == k] for column, values in self.findings.items()}
@@ -515,7 +516,7 @@ GROUND_NOTE: Final = "Ground estimated"
 
 
 def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return notes without duplicates; one note replaces all notes about estimated grounds."""
+    """Return notes without duplicates; one note replaces the notes of several clips about their estimated ground."""
     grounds = sum(note.startswith(GROUND_NOTE) for note in notes)
     others = tuple(dict.fromkeys(note for note in notes if not note.startswith(GROUND_NOTE)))
     one = f"{GROUND_NOTE} in {plural(grounds, 'clip')}, from frames in which the body rests; state it with --ground."
@@ -524,17 +525,17 @@ def _joined_notes(notes: Sequence[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _known_checks() -> Mapping[str, Mapping[str, Any]]:
-    """Read ``urdf/checks.toml``: each check's rank among causes and effects, whether repair helps, and the advice."""
+    """Read ``urdf/checks.toml``: for each check, its causal rank, whether `posekit.repair` helps, and advice."""
     return tomllib.loads((DATA / "checks.toml").read_text(encoding="utf-8"))
 
 
 def rank_of(check: str) -> int:
-    """Return the causal rank of a check: 0 for causes, above 1 for effects of other defects, 1 for other checks."""
+    """Return a check's causal rank: 0 if its findings cause other findings, above 1 if they are effects, else 1."""
     return int(_known_checks().get(check, {}).get("rank", 1))
 
 
 def _in_order(spans: list[Span]) -> list[Span]:
-    """Sort spans: rejections before undecided spans, causes before neighbouring effects, then by severity."""
+    """Sort spans: rejected before undecided, then probable effects of nearby spans last, then by severity."""
     ranks = [rank_of(span.check) for span in spans]
     rejected = [span.verdict == "invalid" for span in spans]
 

@@ -35,9 +35,9 @@ class RigidParts:
         Pairs of joints; the check judges their distances.
     torso : bool
         Whether to judge the shape of the torso too. For exact postures the check aligns the figure's torso with the
-        posture's torso, as the closed-form inverse kinematics does, and compares points. For other postures it judges
-        only whether the shoulders lie in front of or behind the line from neck to pelvis, as in the figure, because
-        distances do not determine this.
+        posture's torso, as the closed-form inverse kinematics does, and judges the distances between corresponding
+        joints. For other postures it compares only the side on which the shoulders lie: in front of or behind the line
+        from neck to pelvis. Segment lengths do not determine this side.
     """
 
     name = "rigid-parts"
@@ -55,12 +55,12 @@ class RigidParts:
 
     @cached_property
     def parts(self) -> list[RigidParts]:
-        """Return a check of each rigid segment of trunk and hips, and a check of the torso."""
+        """Return one check for each rigid segment of trunk and hips, and one for the shape of the torso."""
         torso = RigidParts(segments=(), torso=True)
         return [*(replace(torso, segments=(segment,), torso=False) for segment in RIGID_SEGMENTS), torso]
 
     def steps(self, body: Body) -> list[Step] | None:
-        """Return the check as steps of the compiled tree; None if postures are not exact."""
+        """Return the check for the C++ tree search; None if postures are not exact."""
         if body.tolerance is None or not body.tolerance.exact:
             return None
         found = [
@@ -80,7 +80,7 @@ class RigidParts:
         return found
 
     def judge(self, body: Body) -> Judgement:
-        """Compare segment lengths and the torso with those of the figure."""
+        """Compare segment lengths and the shape of the torso with the figure's."""
         names = [segment_name(segment) for segment in self.segments]
         length = np.array([body.lengths[name] for name in names])
         value = body.segment_lengths[[SEGMENTS.index(segment) for segment in self.segments]].T
@@ -95,9 +95,9 @@ class RigidParts:
 
     @staticmethod
     def _side(body: Body) -> tuple[Array, float, float]:
-        """Return the shoulders' offset from the trunk's line, positive on the figure's side (N,), and its bounds.
+        """Return a shoulder's distance from the neck-pelvis line, positive on the figure's side (N,), and its bounds.
 
-        The offset is NaN if the side is unknown.
+        The side is front or back. The distance is NaN if the figure's side is unknown.
         """
         figure = body.figure
         offset = figure.shoulder_offset if figure.shoulder_side != "undecided" else np.nan
@@ -110,7 +110,7 @@ class RigidParts:
 
     @staticmethod
     def _placement(body: Body) -> tuple[Array, float, float]:
-        """Return the largest distance (N,) of a torso joint from the figure's aligned torso, and its bounds."""
+        """Return the largest distance (N,) of a torso joint from the same joint of the figure, and its bounds."""
         figure, points = body.figure, body.joints[:, TORSO_POINTS]
         R = torso_frame(*np.moveaxis(points, 1, 0))
 

@@ -36,9 +36,9 @@ LESS_LEAN_DEGREES: Final = 30.0
 
 
 def order_doubts(body: Body) -> list[str]:
-    """Return a warning if a humanoid stands when its quaternions are read as w, x, y, z, and not as they are.
+    """Return a warning if a humanoid is upright only when its quaternions are read in the order w, x, y, z.
 
-    One posture shows nothing: any quaternion is the orientation of some body.
+    A single posture causes no warning, because a robot may also lie on the ground.
     """
     robot, up = body.robot, np.eye(3)[2] if body.up is None else body.up
     known = np.empty((0, 4)) if body.q is None else body.q[np.isfinite(body.q).all(axis=1), 3:7]
@@ -92,7 +92,7 @@ def _of(body: Body) -> tuple[Robot, Array]:
 def mimic_joints(body: Body) -> Judgement:
     """Joints do not follow the joints that they mimic.
 
-    The value is the difference between a mimic joint and the position that its target joint prescribes.
+    The value is the position of a mimic joint minus the position that the mimicked joint prescribes.
     """
     robot, q = _of(body)
     if not robot.mimics:
@@ -105,9 +105,9 @@ def mimic_joints(body: Body) -> Judgement:
 def robot_collision(body: Body) -> Judgement:
     """Two bodies of the robot penetrate each other.
 
-    The value is the distance between two bodies. The place ``bodies`` is the nearest pair. Distances above
-    `NEAR_METRES` are reported as infinite. So are distances between meshes that do not touch, because measuring them
-    would double the time of the check.
+    The value is the distance between two bodies. The place ``bodies`` is the pair with the smallest distance. Distances
+    above `NEAR_METRES` are reported as infinite. Distances between meshes that do not touch are also infinite:
+    measuring them would double the time of the check.
     """
     robot, q = _of(body)
     if not robot.collision_pairs:
@@ -149,7 +149,7 @@ CONFIGURATION_CHECKS: Final = (reach, robot_range, robot_travel, mimic_joints, r
 
 @lru_cache(maxsize=4)
 def _soles(robot: Robot) -> tuple[list[int], Array] | None:
-    """Return the joint indices of toes and heels, and their positions in the joints' frames (4, 3); None without feet.
+    """Return parent joints of toes and heels, and positions (4, 3) in the frames of these joints; None without feet.
 
     Toes and heels are the front and back corners of the bounding boxes of the foot bodies.
     """
@@ -189,7 +189,7 @@ def _box(shape: Any) -> Array:
 
 
 def sole_points(robot: Robot, q: Array) -> Array:
-    """Return the positions of toes and heels (N, 4, 3) in configurations, metres; NaN if the robot has no feet."""
+    """Return the positions of toes and heels (N, 4, 3), metres, by forward kinematics; NaN if a robot has no feet."""
     points = np.full((len(q), len(FEET_POINTS), 3), np.nan)
     soles = _soles(robot)
     if soles is not None:

@@ -1,19 +1,19 @@
-r"""Joint ranges of the angles of Lee & Chen 1985, §3.2.A, defined as rotations from standing or as printed.
+r"""Joint ranges of the angles of Lee & Chen 1985, §3.2.A, defined as rotations from standing or as in the paper.
 
-The torso's frame has x forward, y down and z left. The angles of kind ``rotation`` are continuous in all postures that
-limbs reach:
+In the coordinate frame of the torso, x points forward, y down and z to the left. The angles of kind ``rotation`` are
+continuous in all postures that limbs reach:
 
 For an arm, let u be the direction of the upper arm. The shortest rotation from y to u has the angle
-:math:`\rho = \arccos u_y`. The z component of its rotation vector is flexion, the x component is abduction:
-:math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)`. A thigh has the printed flexion
-:math:`\operatorname{atan2}(u_x, u_y)`; its abduction is the angle between thigh and plane of flexion. Elbow and knee
-bend about z', the image of the axis z under the rotation of the upper segment. Let v be the direction of the lower
-segment and :math:`\psi` the angle between u and v. The flexion of an elbow is
-:math:`\psi\,(v \times u) \cdot z' / \sin\psi`; a knee has the opposite sign. The angles of pelvis and neck are the z, y
-and x components of the rotation vector of their plane.
+:math:`\rho = \arccos u_y`. The z component of this rotation's vector is flexion, the x component is abduction:
+:math:`(\theta, \varphi) = \frac{\rho}{\sin\rho} (u_x, \pm u_z)`. The flexion of a thigh is
+:math:`\operatorname{atan2}(u_x, u_y)`, as in the paper; its abduction is the angle between the thigh and the xy plane.
+Elbow and knee bend about the axis z', which is z rotated together with the upper segment. Let v be the direction of the
+lower segment and :math:`\psi` the angle between u and v. The flexion of an elbow is
+:math:`\psi\,(v \times u) \cdot z' / \sin\psi`; a knee has the opposite sign. The angles of pelvis and neck are
+components z, y and x of a rotation vector: of the plane of the hips, or of the head, relative to the torso.
 
-The printed angles (kind ``projected``) are angles of projections onto the planes of the torso's frame. An angle is
-undecided if the projection is too short. It jumps if a limb passes the normal of the plane.
+The angles in the paper (kind ``projected``) are those of segments projected onto the coordinate planes of the torso. An
+angle is undecided if its projection is short. It jumps if a limb passes through the normal of the plane.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _plane(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judg
 
 
 def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judgement:
-    """Judge a limb (§3.2.A i and ii); the range of a hip is wide only if the knee is flexed (Table 1, note a)."""
+    """Judge a limb (§3.2.A i and ii); hip flexion has a wider range if the knee is flexed (Table 1, note a)."""
     side, ball = part.split("_")
     hinge, end = ("elbow", "wrist") if ball == "shoulder" else ("knee", "ankle")
     joints = [JOINT[f"{side}_{name}"] for name in (ball, hinge, end)]
@@ -120,7 +120,7 @@ def _limb(body: Body, axes: Array, table: Mapping[str, Any], part: str) -> Judge
 def _ball(
     u: Array, joint: str, outward: float, table: Mapping[str, Any], tolerance: float
 ) -> tuple[Array, Array]:
-    """Return flexion and abduction (N, 2), degrees, and the factors of their tolerances."""
+    """Return flexion and abduction of shoulder or hip (N, 2), degrees, and factors (N, 2) of their tolerances."""
     one = np.ones((len(u), 2))
     if table["kind"] == "projected":
         least = table.get("shortest_projection", 0.1) * np.linalg.norm(u, axis=1)
@@ -173,8 +173,8 @@ def _hinge(u: Array, v: Array, joint: str, table: Mapping[str, Any], tolerance: 
 def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING_DEGREES) -> Array:
     """Return the angle from the y axis towards x, degrees; NaN if the projection (x, y) is too short.
 
-    The angle is between -180 and 180. Within the tolerance of -180 it continues above 180: an arm that points straight
-    up is flexed by 180, not by -180.
+    The angle is between -180 and 180. Angles within the tolerance of -180 are increased by 360: an arm that points
+    straight up is flexed by 180, not by -180.
     """
     angle = np.degrees(np.arctan2(x, y))
     angle = np.where(angle < max(tolerance, ROUNDING_DEGREES) - 180, angle + 360, angle)

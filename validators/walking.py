@@ -2,12 +2,12 @@
 
 The body plane contains the line from neck to pelvis and is normal to the moving direction. In a single posture the
 moving direction is the mean of the directions that shoulders and hips face. In a sequence it is the direction of the
-neck's motion (`WalkingRules.heading`). The paper uses the direction that the head faces (walkers ``paper-printed``).
-But then a person who stands and turns the head by 15 degrees violates Rule 2, because arm and leg of one side seem to
-swing together.
+neck's motion (`WalkingRules.heading`). The paper uses the direction that the head faces (setting ``walkers``:
+``paper-printed``). But then a person who stands and turns the head by 15 degrees violates Rule 2, because arm and leg
+of one side seem to swing together.
 
 The *swing* of a joint is its displacement out of the body plane, minus its displacement in the neutral posture of the
-figure. Rules about a swing near zero are undecided.
+figure. A rule is undecided if a swing in it is near zero.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def _swings(body: Body, forward: Array, limits: Mapping[str, float]) -> Array:
 
 
 def _together(swing: Array, one: str, other: str) -> Array:
-    """Return the smaller swing of two joints (N,), positive if both swing to the same side."""
+    """Return the smaller absolute swing of two joints (N,), with sign: positive if both swing to the same side."""
     a, b = swing[:, JOINT[one]], swing[:, JOINT[other]]
     return np.sign(a * b) * np.minimum(np.abs(a), np.abs(b))
 

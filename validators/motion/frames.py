@@ -2,8 +2,8 @@
 
 Jumps, exchanged labels and shuffled frames also exceed bounds of speed, acceleration and jerk. To report each defect
 once, `explained` searches for defects in a fixed order: time stamps, repeated frames, frames out of order, exchanged
-sides, jumps. Each search skips the frames with defects found earlier. The other checks of motion judge the remaining
-joints: sides are corrected, frames are resampled to slots of equal duration, and frames with a defect are NaN.
+sides, jumps. Each search skips the frames with defects found earlier. The other checks of motion judge corrected
+joints: sides are exchanged back, frames are assigned to slots of equal duration, and frames with a defect are NaN.
 """
 
 from __future__ import annotations
@@ -103,7 +103,8 @@ def timing(body: Body, *, missing: float = 0.5, displaced: float = 0.5) -> Judge
     Parameters
     ----------
     missing : float
-        Allowed number of missing frames before a frame. It is a fraction if time stamps are inexact.
+        Allowed number of missing frames between a frame and its predecessor. The number is computed from time stamps,
+        so that it may be a fraction.
     displaced : float
         Allowed difference between a frame's index and its index in the order of time stamps or of motion, frames.
     """
@@ -151,7 +152,8 @@ def swap(body: Body, *, most: float = 0.0) -> Judgement:
     Parameters
     ----------
     most : float
-        0 reports each exchange, 1 none. `posekit.validators.motion.sides` detects the exchanges.
+        Any value below 0.5 reports every exchange; 1 reports no exchange. `posekit.validators.motion.sides` detects the
+        exchanges.
     """
     if len(body) < 2 or body.q is not None:
         raise NotAskedError(
@@ -264,7 +266,7 @@ class Explained:
     repeats : int array (T,)
         Length of the run of duplicates that contains each frame; 0 for frames that are not duplicates.
     displaced : int array (T,)
-        Index of each frame minus its index in the order that the motion suggests.
+        Index of each frame in the order that the motion suggests, minus its index in the clip.
     exchanged : bool array (T, 6)
         Whether right and left of each pair of joints are exchanged.
     jumps : array (S, 15)
@@ -327,16 +329,16 @@ def explained(body: Body) -> Explained:
 
 
 def duplicates(joints: Array) -> NDArray[np.intp]:
-    """Return the length of the run of duplicates that contains each frame (T,); 0 unless it copies the frame before.
+    """Return for each frame (T,) the length of its run of duplicates; 0 if it does not copy the previous frame.
 
     A run counts only if the body moves by more than `MOVED_METRES` per frame shortly before and shortly after the run.
-    At the start or end of the clip, motion on the other side is enough. In slower motion rounding alone may make two
+    A run at the start or end of the clip requires motion on one side only. In slower motion rounding alone may make two
     frames equal.
 
     Parameters
     ----------
     joints : array (T, 14, 3)
-        Metres, in the order of time. A joint that is unknown in two frames counts as equal.
+        Joint positions, metres, in the order of time. A joint that is unknown in both of two frames counts as equal.
     """
     count = len(joints)
     lengths = np.zeros(count, dtype=np.intp)
@@ -356,7 +358,7 @@ def duplicates(joints: Array) -> NDArray[np.intp]:
 
 
 def displaced(joints: Array) -> NDArray[np.intp]:
-    """Return how far each frame is from its index in the order of the motion (T,), in frames; 0 in smooth motion.
+    """Return each frame's index in the order that the motion suggests, minus its index in `joints` (T,).
 
     Parameters
     ----------
@@ -395,7 +397,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
 
 
 def _without_sides(joints: Array) -> Array:
-    """Return coordinates of postures that exchanged labels of right and left do not change (T, 20, 3), metres.
+    """Return coordinates of postures that are independent of right and left labels (T, 20, 3), metres.
 
     The coordinates are the positions of neck, pelvis and the midpoint of each pair, and entries of d dᵀ / |d|, where d
     is half the vector from left to right joint of a pair. These entries are equal for d and -d.
@@ -427,7 +429,7 @@ def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _shortest(points: Array) -> NDArray[np.intp]:
-    """Return an order (N,) of points (N, K) with a much shorter path; if none is found, the given order."""
+    """Return an order (N,) of points (N, K) whose path is much shorter; else the given order."""
     squares = (points**2).sum(axis=1)
     ways = np.sqrt(np.maximum(squares[:, None] + squares - 2 * points @ points.T, 0.0))
     given = np.arange(len(points))

@@ -1,17 +1,17 @@
-r"""The ground of a clip, estimated from resting parts of the body, and the heights of frames above it.
+r"""The ground of a clip, estimated from resting parts of the body, and the heights of the body above it.
 
 Files do not state the height of the ground, but parts of the body rest on it. The estimate uses the heights of the
-lowest point in frames in which a part rests. Their 5th percentile is the lowest level of the ground, and their 98th
-percentile is the highest level. The levels differ because feet are seldom horizontal, some stand on stairs, and floors
-are not quite level. A point below the lowest level penetrates the ground. A body above the highest level without a
-resting part is in the air. Heights between the levels are not judged.
+lowest point in frames in which a part rests. The 5th percentile of these heights is the lowest level of the ground, and
+their 98th percentile is the highest level. The levels differ because feet are seldom horizontal, people climb stairs,
+and floors are not quite level. A point below the lowest level penetrates the ground. A body above the highest level
+without a resting part is in the air. Heights between the levels are not judged.
 
-Frames may also be shifted up or down as a whole relative to neighbouring frames. Then all points of the body make the
-same vertical step between two frames, which does not happen on the feet. Let d be the vertical displacement from frame
-to frame. The step at frame t is the median over points of
+A recording may also contain frames that are shifted up or down as a whole. Then all points of the body make the same
+vertical step between two frames. While a foot rests, real motion has no such steps. Let d be the vertical displacement
+from frame to frame. The step at frame t is the median over points of
 :math:`d_t - \mathrm{median}(d_{t-2}, d_{t-1}, d_{t+1}, d_{t+2})`, if nine tenths of the points agree on its sign. A
-foot must rest before and after the step, because bodies in the air may make such steps. The shifted frames lie between
-a step and the next opposite step.
+foot must rest before and after the step, because all points of a body in the air may move together. The shifted frames
+lie between a step and the next step in the opposite direction.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class Ground:
     centre : array (T,)
         Height of the centre of mass.
     in_air : bool array (T,)
-        Whether no part rests, and the body is higher above all levels of the ground than toes and hands reach.
+        Whether no part rests, and the whole body, including hands and toes, is above all levels of the ground.
     """
 
     low: float
@@ -224,8 +224,8 @@ def ground_of(body: Body) -> Ground:
 def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: float) -> NDArray[np.bool_]:
     """Return the frames in which a resting part carries the body.
 
-    Frames in which parts rest in the air are excluded: at a level that the body reached neither by a step nor by a
-    jump.
+    The result excludes frames in which parts rest in the air, at a level that the body reached neither by a step nor by
+    a jump.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
 
 
 def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
-    """Return whether heights (N,) of a centre of mass fall with at least a share of gravity; True if unknown.
+    """Return whether a centre of mass with heights (N,) accelerates downward by at least `share` g; True if unknown.
 
     The acceleration is that of a fitted parabola.
     """

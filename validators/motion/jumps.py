@@ -1,10 +1,10 @@
 r"""Jumps: distances of joints, and of the body, from the positions that neighbouring frames predict.
 
 A jump either lasts one frame, or displaces the body permanently within up to a sixth of a second. Forces limit real
-displacements. If a body moves by D in a time T, in addition to its motion at the velocities before and after, its
-acceleration is at least :math:`4 D / T^2`, forward in the first half of the time and backward in the second. In rolls,
-kicks and flips people exceed this limit, but then their joints move in different directions. The joints of a displaced
-body move in the same direction.
+displacements. Let D be the displacement in a time T, in addition to motion at constant velocity. It requires an
+acceleration of at least :math:`4 D / T^2`: forward in the first half of T, backward in the second half. In rolls, kicks
+and flips people exceed `PUSHED_ACCELERATION`, but then their joints move in different directions. The joints of a
+displaced body move in the same direction.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 
 
 def _filter(at: int) -> tuple[Array, Array]:
-    """Return filters over seven frames that measure the jump of one frame (7,) and the other frames' misfit (2, 7).
+    """Return linear filters over seven frames: for the jump of one frame (7,), and the other frames' misfit (2, 7).
 
-    The filters are those of the least-squares fit of a cubic and a jump of frame `at`. The fit has two remaining
-    degrees of freedom, which measure the misfit. Their filters have unit length.
+    A least-squares fit determines a cubic polynomial in time and the jump of frame `at` away from it. The fit leaves
+    two degrees of freedom, which measure the misfit.
     """
     times = np.arange(7.0) - at
     design = np.column_stack([np.vander(times, 4, increasing=True), times == 0])
@@ -54,14 +54,14 @@ def jumps_of(joints: Array, step: float) -> Array:
     Returns
     -------
     array (S, 15)
-        Jumps in excess of the neighbours' misfit, metres; NaN if unknown. The first 14 columns are jumps of the joints
-        relative to the body, the last column is the jump of the body (the median joint).
+        Jumps minus a multiple of the neighbouring frames' misfit, metres; NaN if unknown. The first 14 columns are
+        jumps of the joints relative to the body. The last column is the jump of the body: the median over the joints.
 
     Notes
     -----
-    The jump of one frame is its distance from the cubic that fits three frames on each side; in the first and last
-    frame it is the third difference. A multiple of the neighbours' misfit is subtracted. `displaced_by` measures
-    permanent displacements of the body.
+    The jump of one frame is its distance from the cubic polynomial fitted to three frames on each side. In the first
+    and last frame it is the third difference. The misfit is the deviation of the neighbouring frames from the
+    polynomial. `displaced_by` measures permanent displacements of the body.
     """
     count = len(joints)
     offset, misfit = (centred(one, count, SIDE_FRAMES) for one in _measured(joints, SIDE_FRAMES))
@@ -91,9 +91,9 @@ def jumps_of(joints: Array, step: float) -> Array:
 
 
 def _measured(joints: Array, at: int) -> tuple[Array, Array]:
-    """Measure the jump (N, 14, 3) of frame `at` among every seven frames, and the misfit (N, 14) of the other frames.
+    """Measure the jump (N, 14, 3) of frame `at` in each window of seven frames, and the misfit (N, 14) of the others.
 
-    The misfit is multiplied by the uncertainty of the jump, which grows with the distance of `at` from the middle.
+    The misfit is multiplied by the relative uncertainty of the jump, which is 1 if `at` is the middle of the window.
     """
     jump, misfit = _FILTERS[at]
     unsure = np.linalg.norm(jump) / np.linalg.norm(_FILTERS[SIDE_FRAMES][0])
@@ -135,7 +135,7 @@ def displaced_by(joints: Array, step: float) -> Array:
     Returns
     -------
     array (S,)
-        Displacement in each slot, metres, minus the parts due to forces and to the motion of joints; NaN in slots
+        Displacement in each slot, metres, minus what forces or different motion of the joints may cause; NaN in slots
         without a displacement.
     """
     timed = step > 0
@@ -170,10 +170,11 @@ def displaced_by(joints: Array, step: float) -> Array:
 def _beyond(
     joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
 ) -> Array:
-    """Return the unexplained displacement over the `count` slots after each slot (S,), metres, at least 0.
+    """Return the body's displacement beyond `pushed` over `count` slots after each slot (S,), metres, at least 0.
 
     `centre` (S, 3) is the mean of the joints. `gaps` (S + 1,) is the cumulative number of empty slots. `pushed` is the
-    displacement that forces explain, metres.
+    largest displacement that forces cause, metres. `side` is the number of slots, on each side, that determine the
+    velocity.
     """
     weights = np.zeros(count + 2 * side + 1)
     share = count / (2.0 * side)
@@ -190,7 +191,7 @@ def _beyond(
 
 
 def middle(values: Array) -> Array:
-    """Return the median over the known joints of (S, 14, ...)."""
+    """Return the median of values (S, 14, ...) over the known joints."""
     ordered = np.sort(values, axis=1)  # unknown joints come last
     number = np.isfinite(values).sum(axis=1, keepdims=True)
     low, high = (

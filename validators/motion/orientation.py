@@ -46,8 +46,8 @@ def orientation(body: Body, *, upside_down: float = 0.8, aligned: float = 0.9) -
     """Bodies are upside down, or lie as if another axis pointed up.
 
     A body is upside down if the ankles are above the pelvis, the pelvis is above the neck, and hands do not carry the
-    body. There are two signs that another axis points up. First, trunk and legs are straight along this axis, as in
-    standing, and the body travels or its lowest joint rises and sinks, unlike in lying. Second, the body does not stand
+    body. There are two signs that another axis points up. First, trunk and legs are straight along this axis, and the
+    body travels or its lowest joint changes its height. A lying body does neither. Second, the body does not stand
     upright along the stated axis, and its lowest knee or ankle stays on a plane through the origin. This plane is
     perpendicular to the other axis instead of the stated axis.
 
@@ -105,6 +105,6 @@ def _other_up(body: Body, trunk: Array, cosine: Array, share: float) -> Array | 
 
 
 def _on_origin(height: Array) -> bool:
-    """Return whether the lowest joint mostly stays on the plane through the origin, by heights (T, J), metres."""
+    """Return whether the lowest joint mostly stays near the height 0, given heights of joints (T, J), metres."""
     low, middle, high = np.nanpercentile(np.fmin.reduce(height, axis=1), STEADY_PERCENTILES)
     return bool(SOLE_METRES[0] < middle < SOLE_METRES[1] and high - low < STEADY_METRES)

@@ -1,9 +1,9 @@
-"""Published rules for selecting motion data, computed as by their authors; the profiles of their names use them.
+"""Published rules for selecting motion data, computed as by their authors, for profiles such as ``phuma``.
 
 PHUMA (Lee et al. 2025, arXiv:2510.26236, section 3.1 and code) judges windows of four seconds that overlap by half a
 second. It uses vertices of the feet of SMPL-X; here toes, heels and ankles replace them. ProtoMotions (Tessler et al.
-2024, data filters) and HoloMotion (2025, data curation) limit values of single frames. `skating` is the measure of
-Guided Motion Diffusion (Karunratanakul et al. 2023, ICCV). Unlike `sliding` it rejects many steps of real walks.
+2024, data filters) and HoloMotion (2025, data curation) judge single frames. `skating` is the measure of Guided Motion
+Diffusion (Karunratanakul et al. 2023, ICCV). Unlike `sliding` it rejects many steps of real walks.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def skating(
     Parameters
     ----------
     height : float
-        Largest height above the ground, in this frame and the previous frame, of a foot that touches it, metres.
+        Height above the ground below which a foot counts as touching it, in this frame and the previous frame, metres.
     way : float
         Largest allowed displacement along the ground per frame at `rate`, metres.
     rate : float
@@ -63,15 +63,15 @@ def skating(
 
 @check("contact-share", unit="1", reads=("joints", "up", "time", "ground"), over_time=True)
 def contact_share(body: Body, *, least: float = 0.6, window: float = 0.05) -> Judgement:
-    """Feet touch the ground in too few frames, over seconds.
+    """Feet touch the ground in too few frames of a four-second window.
 
     Parameters
     ----------
     least : float
-        Minimum share of the frames.
+        Minimum share of the frames in which a foot touches the ground.
     window : float
-        Height of the interval in which soles count as on the ground, metres. It is placed where it contains the soles
-        of most frames.
+        Size of the interval of heights in which soles count as on the ground, metres. The interval is placed where it
+        contains the lowest sole in as many frames as possible.
     """
     level = _voted(body, window)
     touches = np.asarray((np.abs(_soles(body) - level) <= window / 2).any(axis=1), dtype=np.float64)
@@ -95,7 +95,7 @@ def root_height(body: Body, *, least: float = 0.6, most: float = 1.5, window: fl
 
 @check("support-distance", unit="m", reads=("joints", "up", "time", "ground"), over_time=True)
 def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) -> Judgement:
-    """Hips and pelvis are not over the feet, over seconds.
+    """Hips and pelvis are not over the feet, on average over a four-second window.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def support_distance(body: Body, *, root: float = 0.06, pelvis: float = 0.11) ->
 
 @check("root-jerk", unit="m/s³", reads=("joints", "time"), over_time=True)
 def root_jerk(body: Body, *, most: float = 50.0, cutoff: float = 3.0) -> Judgement:
-    """Hips jerk, over seconds, by more than a humanoid can follow.
+    """Hips jerk by more than a humanoid can follow, on average over a four-second window.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def above_ground(
     lowest : float
         Minimum allowed height of the lowest point above the ground, metres (negative).
     highest : float
-        Largest height of the lowest point above the ground that may last longer than `lasting`, metres.
+        Height of the lowest point above the ground that the body may exceed for at most `lasting` seconds, metres.
     lasting : float
         Longest allowed time above `highest`, seconds.
     """
@@ -204,7 +204,8 @@ def _speeds(body: Body, points: Array) -> Array:
 def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) -> Array:
     """Return for each frame the worst mean (T, K) of values (T, K) over the windows that contain the frame.
 
-    The mean excludes the last `inside` slots of a window, because differences that start there end outside the window.
+    The mean excludes the last `inside` slots of a window, because finite differences that start in them extend beyond
+    the window.
     """
     if len(body) * body.dt < LEAST_SECONDS:
         raise NotAskedError(f"it needs {LEAST_SECONDS:g} s of motion")
@@ -223,14 +224,14 @@ def _of_parts(body: Body, values: Array, *, worst: np.ufunc, inside: int = 0) ->
 
 
 def _soles(body: Body) -> Array:
-    """Return the heights of toes and heels (T, P) along up, metres; of ankles if toes and heels are unknown."""
+    """Return heights of the soles below toes and heels (T, P), metres; below ankles if toes and heels are unknown."""
     height = soles(body)[1]
     toes = height[:, : len(FEET_POINTS)]
     return np.asarray(toes if np.isfinite(toes).any() else height[:, len(FEET_POINTS) :])
 
 
 def _voted(body: Body, window: float) -> float:
-    """Return the stated height of the ground, or the middle of the interval with the soles of most frames, metres."""
+    """Return the height of the ground, metres: as stated, or the height near which the lowest sole is most often."""
     if body.settings.ground is not None:
         return body.settings.ground
     lowest = np.sort(np.fmin.reduce(_soles(body), axis=1))

@@ -8,9 +8,9 @@ same. Therefore falls and balance show the frame rate:
   with the horizontal coordinates of :math:`c - \ddot c \, h / (g + \ddot h)`, where h is the height of c (Vukobratović
   & Borovac 2004, Int. J. Humanoid Robot. 1:157). While a person stands on one foot, this point is under that foot.
 
-If a clip has neither falls nor steps, the tempo of joints is compared: the ratio of their accelerations to their
-speeds, which is proportional to the rate. Over recordings the tempo varies by a factor of 1.35 (one standard
-deviation), so that the tempo detects one in four wrong rates.
+If a clip has neither falls nor steps, the tempo of joints is compared with the usual tempo of people. The tempo is the
+ratio of acceleration to speed, which is proportional to the frame rate. Over recordings the tempo varies by a factor of
+1.35 (one standard deviation), so that the tempo detects one in four wrong rates.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def rate_doubts(body: Body) -> list[str]:
 
 
 def _by_falls(body: Body, rise: Array, span: int) -> tuple[float, str] | None:
-    """Return the ratio of likely to stated frame rate according to upward accelerations (S,) in g, and the reason."""
+    """Return the likely frame rate divided by the stated rate, from upward accelerations (S,) in g, and the reason."""
     in_air = timeline_of(body).spread(ground_of(body).in_air.astype(np.float64)) > 0
     inside = np.zeros(len(rise), dtype=np.bool_)
     for start, stop in runs(in_air):
@@ -154,7 +154,7 @@ def _by_falls(body: Body, rise: Array, span: int) -> tuple[float, str] | None:
 
 
 def _by_balance(body: Body, centre: Array, acceleration: Array, span: int) -> tuple[float, str] | None:
-    """Return the ratio of likely to stated frame rate according to the zero moment point, and the reason."""
+    """Return the likely frame rate divided by the stated rate, from the zero moment point, and the reason."""
     line, up, ground = timeline_of(body), up_of(body), ground_of(body)
     joints, feet = line.spread(body.joints), line.spread(soles(body)[0])
     load = GRAVITY_ACCELERATION + acceleration @ up
@@ -189,7 +189,7 @@ def _by_balance(body: Body, centre: Array, acceleration: Array, span: int) -> tu
 
 
 def _by_tempo(body: Body, span: int) -> tuple[float, str] | None:
-    """Return the ratio of likely to stated frame rate according to the tempo of joints, and the reason."""
+    """Return the likely frame rate divided by the stated rate, from the tempo of joints, and the reason."""
     joints, seconds = timeline_of(body).spread(body.joints), span * body.dt
     paths = np.concatenate([joints, joints - joints[:, [JOINT["pelvis"]]]], axis=1)
     speed, change = (

@@ -1,10 +1,11 @@
 """Detection of exchanged right and left joints, by continuity, segment lengths and the direction that a body faces.
 
 In every frame each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is either labelled correctly
-or exchanged: 64 states. The energy of a state has three terms: lengths of the segments between pairs, the direction
-that the body faces, and distances of right and left joints from their previous positions. Dynamic programming finds the
-sequence of states with the lowest energy (Viterbi 1967, IEEE Trans. Inf. Theory 13). The state changes only at frames
-in which the motion of some pair suggests an exchange.
+or exchanged: 64 states. The energy of a state increases with errors of segment lengths, and with evidence that the body
+faces the opposite direction. It also increases with the distances of right and left joints from their positions in the
+previous frame. Dynamic programming finds the sequence of states with the lowest energy (Viterbi 1967, IEEE Trans. Inf.
+Theory 13). The state changes only at frames in which the motion of at least one pair suggests an exchange, or after a
+gap.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ EXCHANGED_COST: Final = 0.03
 def exchanged_pairs(
     joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_], noise: float
 ) -> NDArray[np.bool_]:
-    """Return whether right and left joint of each of `SIDE_PAIRS` are exchanged (T, 6).
+    """Return for each frame and each pair in `SIDE_PAIRS` whether right and left joint are exchanged (T, 6).
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def exchanged_pairs(
 
 
 def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
-    """Return joints (T, 14, 3) with right and left exchanged in the given pairs (T, 6)."""
+    """Return joints (T, 14, 3) with right and left joint exchanged in the pairs given by `swapped` (T, 6)."""
     if not swapped.any():
         return points
     mended, turned = points.copy(), swapped[..., None]
@@ -109,7 +110,7 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
 
 
 def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: float) -> Array:
-    """Return the evidence, -1 to 1, that pairs are labelled correctly (T, 7), in the order of `_AS_LABELLED`."""
+    """Return seven kinds of evidence for correct labels (T, 7), from -2 to 2, in the order of `_AS_LABELLED`."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
@@ -139,11 +140,12 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array, unsure: fl
 
 
 def _length(straight: Array, crossed: Array, torn: float) -> float:
-    """Return a segment's length: the median of the labelled lengths or, if they scatter, the mode of all lengths.
+    """Return a segment's length: the median of its labelled lengths or, if they scatter, the mode of all lengths.
 
-    Labelled lengths are between joints with the same side label, crossed lengths between joints with opposite labels.
-    Half of all these lengths are correct, whatever share of a clip is exchanged. The mode is the middle of the shortest
-    interval that contains two fifths of all lengths (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69, 1012-1016).
+    Labelled lengths are distances between joints with the same side label, crossed lengths are distances between joints
+    with opposite labels. Half of all these lengths are correct, whatever share of a clip is exchanged. The mode is the
+    middle of the shortest interval that contains two fifths of all lengths (Robertson & Cryer 1974, J. Am. Stat. Assoc.
+    69, 1012-1016).
     """
     middle = known_median(straight)
     if not known_median(np.abs(straight - middle)) > torn:
@@ -163,7 +165,8 @@ def _sure(evidence: Array) -> Array:
 def _continuity(joints: Array, across: Array) -> Array:
     """Return the evidence, -1 to 1, that each pair was exchanged since the previous frame (T - 1, 6).
 
-    The evidence is the decrease of both joints' displacements, relative to the trunk's, if their labels are exchanged.
+    The evidence compares displacements of the pair relative to the trunk, with and without an exchange of labels. It is
+    positive if the exchange makes the displacements smaller.
     """
     moved = np.diff(joints[:, :N_TRUNK_JOINTS], axis=0)
     known = np.isfinite(moved[..., 0])

@@ -119,7 +119,7 @@ def sliding(
 def _slides(
     body: Body, points: Array, down: Flags, count: int, bounds: tuple[float, float, float, float]
 ) -> Flags:
-    """Return whether a foot (S, 3, 3) slides in each slot (S,) of slides over at least `count` slots.
+    """Return whether a foot (S, 3, 3) slides in each slot (S,); shorter slides than `count` slots are ignored.
 
     `bounds` are `fastest`, `uneven` and `rising` of `sliding`, and the noise of a speed, metres per second.
     """
@@ -150,10 +150,10 @@ def _slides(
 
 
 def _stance_way(points: Array, low: Flags, up: Array) -> Array:
-    """Return the displacement along the ground of the slowest low point since the previous slot (S, 3), metres.
+    """Return the horizontal displacement since the previous slot (S, 3) of the slowest point near the ground, metres.
 
     A part that carries the body does not move, so that the displacement is near zero in clean motion. It is NaN in
-    slots without a low point.
+    slots without a point near the ground.
 
     Parameters
     ----------
@@ -174,8 +174,8 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
     """Find an interval of slots in which standing points have a common velocity.
 
     Returns start, stop and speed of the interval, or None without such an interval. The interval maximizes a sum over
-    slots: by how much the velocity (S, 3) is nearer to the common velocity than to zero (the maximum sum of consecutive
-    numbers: Bentley 1984, Commun. ACM 27:865).
+    its slots: the distance of the velocity (S, 3) from zero, minus its distance from the common velocity, minus a
+    penalty. The algorithm is that for the maximum sum of consecutive numbers (Bentley 1984, Commun. ACM 27:865).
     """
     known = np.isfinite(velocity[:, 0])
     count = max(round(CANDIDATE_SECONDS / step), 3)
@@ -206,7 +206,7 @@ def _drift(velocity: Array, step: float) -> tuple[int, int, float] | None:
 
 
 def _ends(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
-    """Return start and stop of a slide, moved outward by at most `most` slots to maximize the sum of gains (S - 1,)."""
+    """Return start and stop of a slide, extended by at most `most` slots to maximize the sum of `gained` (S - 1,)."""
     middle = (start + stop) // 2
     before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
     after = np.cumsum(gained[middle : stop + most])

@@ -57,7 +57,7 @@ def jerk(body: Body, *, trunk: float = 48_000.0, limbs: float = 144_000.0) -> Ju
 
 
 def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement:
-    """Judge a time derivative by finite differences with a step of 1/60 s, or of one frame if frames are longer."""
+    """Judge a time derivative of positions by finite differences over 1/60 s, or over one frame if it is longer."""
     found = explained(body)
     stride = max(round(SHORTEST_SECONDS / body.dt), 1)
     weights = [(-1.0) ** (order - k) * comb(order, k) for k in range(order + 1)]
@@ -73,7 +73,7 @@ def _derivative(body: Body, order: int, trunk: float, limbs: float) -> Judgement
 
 
 def _over_gaps(joints: Array) -> Array:
-    """Return the mean speeds (S, 14) of joints over the empty slots before each slot, metres per slot; else NaN."""
+    """Return the mean speeds (S, 14) of joints over the gap before each slot, metres per slot; NaN without a gap."""
     slots = np.arange(len(joints))[:, None]
     known = np.isfinite(joints[..., 0])
     last = np.maximum.accumulate(np.where(known, slots, -1), axis=0)

@@ -77,8 +77,8 @@ def floating(
     r"""Bodies are above the ground, and nothing holds them there.
 
     The centre of mass of a body in the air has the acceleration :math:`-g`. A body floats if it is above all levels of
-    the ground, no part of it rests, and its centre of mass falls with less than half of gravity. If the ground is
-    stated, a body also floats if its lowest resting parts are above the ground, or if it does not come near the ground
+    the ground, no part of it rests, and its centre of mass falls with less than half of gravity. If the height of the
+    ground is stated, a body also floats if its lowest resting parts are above this height, or if no part comes near it
     within 0.4 s.
 
     Parameters

@@ -26,12 +26,12 @@ class Timeline:
     Parameters
     ----------
     slots : int array (T,)
-        Slot of each frame, ascending with time; the distance between slots is one time step. -1 for a frame whose time
-        is that of an earlier frame.
+        Slot of each frame, ascending with time; the distance between slots is one time step. -1 for a frame with the
+        same time as an earlier frame.
     count : int
         Number of slots.
     place : int array (T,)
-        Index of each frame minus its index in the order of time.
+        Index of each frame in the order of time, minus its index in the clip.
     missing : array (T,)
         Number of missing time steps before each frame; NaN if times are unknown.
     """

@@ -57,7 +57,7 @@ _CURVATURE: Final = np.array([1.0, 0, 0, -2.0, 0, 0, 1.0]) / 9.0
 
 
 def trembling_of(joints: Array, noise: float = 0.0) -> Array:
-    """Return the standard deviation (S, 14), metres, of the jitter of each coordinate of joints (S, 14, 3) in slots.
+    """Return the standard deviation of jitter per coordinate (S, 14), metres, of joints (S, 14, 3) in time slots.
 
     Notes
     -----
@@ -80,7 +80,7 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
 
 
 def usual_trembling(joints: Array, percents: Sequence[float] = (50.0,)) -> Array:
-    """Return percentiles over frames of the median jitter of joints (T, 14, 3) at the start of a clip, metres."""
+    """Return percentiles, over the first frames of a clip, of the median jitter of joints (T, 14, 3), metres."""
     rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
     known = rough[np.isfinite(rough).any(axis=1)]
     return np.percentile(np.nanmedian(known, axis=1), percents) if len(known) else np.zeros(len(percents))
@@ -96,13 +96,13 @@ def _windows(rough: Array) -> Array:
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return whether joints jitter in each slot (S, 14), given the centres of jittering windows (S, 14).
+    """Return whether joints jitter in each slot (S, 14), given whether windows centred on the slots jitter (S, 14).
 
     Notes
     -----
-    Windows blur the start and end of an interval with jitter. Fourth differences span five frames only. Assuming normal
-    noise that is `OUTSIDE_SHARE` times as large outside the interval, start and end maximize the likelihood of the
-    fourth differences of all jittering joints.
+    Windows of 15 frames blur the start and end of an interval with jitter; fourth differences span only five frames.
+    Start and end maximize the likelihood of the fourth differences of all jittering joints. Noise is assumed to be
+    normal, and `OUTSIDE_SHARE` times as large outside the interval as inside.
     """
     rough = norm(spaced(joints, _FOURTH, 1))
     exact = np.zeros(hot.shape, dtype=np.bool_)
