@@ -1,8 +1,8 @@
 """`batch`: process every file of an archive of views, key points and motion once, on local cores or on Ray.
 
 Views and key points are recovered to results; motion is validated to reports. Each input has one output file, which is
-written completely or not at all, and one line in `MANIFEST` with the checksums of input and output. A stopped run
-therefore continues where it stopped. An input is computed again if it or the settings have changed.
+written completely or not at all, and one line in `MANIFEST` with the checksums of input and output. If a run stops, the
+next run therefore computes only the remaining inputs. An input is computed again if it or the settings have changed.
 """
 
 from __future__ import annotations
@@ -77,7 +77,8 @@ def batch(
     inputs : path or sequence of path
         Files, folders and patterns; a file that is named several times is processed once.
     output : path
-        Folder of results (``.npz``) and reports (``.json``). If it holds a stopped run, the run is continued.
+        Folder of results (``.npz``) and reports (``.json``). If the folder holds the output of a stopped run, the run
+        is continued.
     settings : RecoverSettings or ValidateSettings, optional
         Motion is validated with the fields that `RecoverSettings` and `ValidateSettings` share.
     jobs : int
@@ -114,7 +115,7 @@ def batch(
     found = {path.resolve(): path for path in files_of(inputs)}
     paths = [path for resolved, path in found.items() if inside not in resolved.parents]
     if not paths:
-        raise refusal(folder, "", "no input outside of it", "files", "name another folder for the output")
+        raise refusal(folder, "", "no input outside of it", "input files", "name another output folder")
     folder.mkdir(parents=True, exist_ok=True)
     options = {"camera": camera, "person": person, "layout": layout, "rate": rate}
     about = json.dumps(
@@ -145,7 +146,7 @@ def batch(
 
 
 def _manifest(folder: Path) -> dict[str, Entry]:
-    """Return the last entry of each input; an incomplete line is ignored."""
+    """Return the last manifest entry of each input; an incomplete line of the manifest is ignored."""
     found: dict[str, Entry] = {}
     path = folder / MANIFEST
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
@@ -181,7 +182,7 @@ Task = tuple[Entry, str, str, Settings, dict[str, Any]]
 
 
 def _computed(task: Task) -> Entry:
-    """Compute one input, write its output, and return its entry; errors of the input are stored in the entry."""
+    """Process one input, write its output, and return its manifest entry, which has the error if one occurs."""
     import posekit
 
     entry, path, folder, settings, options = task
@@ -212,7 +213,8 @@ def _in_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Entry]:
     Raises
     ------
     InputError
-        If a process dies, for example from lack of memory. Finished outputs remain, and a new run continues.
+        If a process dies, for example from lack of memory. Finished outputs remain, and a new run computes the
+        remaining inputs.
     """
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
@@ -234,7 +236,7 @@ def _on_ray(tasks: Sequence[Task], address: str) -> Iterator[Entry]:
     try:
         import ray
     except ImportError:
-        expected, remedy = "the extra", "install posekit[ray]"
+        expected, remedy = "Ray", "install posekit[ray]"
         raise refusal("batch", "ray", "no installed ray", expected, remedy) from None
     try:
         cluster = None if address == "local" else address

@@ -58,7 +58,7 @@ def recover(
     follow: int | None = None,
     figure: str | PathLike[str] | Figure | None = None,
 ) -> Recovery:
-    """Recover every posture behind a view that passes the checks.
+    """Recover every posture that fits the image points of a view and passes the checks.
 
     Parameters
     ----------
@@ -73,7 +73,8 @@ def recover(
     stature : float or str, optional
         Height of the person: metres, or text with a unit such as ``"175cm"``.
     person : str
-        Person among the key points: ``largest``, ``surest``, ``first`` or the number of a track.
+        Which of several detected people: ``largest``, ``surest`` (largest sum of confidences), ``first``, or the number
+        of a track.
     layout : str
         Name of the key points' layout, or the path of a TOML layout.
     rate : float, optional
@@ -226,7 +227,7 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
 
 
 def frame_range(frame: Any) -> int | tuple[int, int] | None:
-    """Return a frame, or the first and last frame, given as numbers or as ``"3"`` or ``"0-9"``."""
+    """Convert a frame, or the first and last frame, to numbers; text is ``"3"`` or ``"0-9"``."""
     if frame is None:
         return None
     ends = frame.split("-") if isinstance(frame, str) else list(np.ravel(frame))
@@ -301,13 +302,13 @@ def render(
     Parameters
     ----------
     source : path, Motion, Recovery, View, Detections, Report, Robot or array
-        A robot is drawn at its neutral configuration. For key points, and for a view without truth, the recovered
-        postures are drawn. An array has joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
+        A robot is drawn at its neutral configuration. Key points, and views without true joints, are first recovered,
+        and the recovered postures are drawn. An array has joints (T, 14, 3), or (T, J, 3) in the order of the `layout`.
     target : path
     layout, urdf, rate, unit, up
         As in `posekit.open`.
     view : path or View, optional
-        View of a result, whose image points are drawn as well.
+        View from which a result was recovered; its image points are drawn as well.
     frame : int, (int, int) or str, optional
         Frame, or first and last frame, from 0; also as ``"3"`` or ``"0-9"``.
     which : {"", "answer", "path", "all", "first"} or str

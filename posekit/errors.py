@@ -1,4 +1,4 @@
-"""Errors, and their one-line messages about an input: source, field, value, expected values, remedy."""
+"""Error classes, and one-line error messages: source, field, value, expected values, remedy."""
 
 from __future__ import annotations
 
@@ -65,19 +65,19 @@ class InputError(PosekitError):
 
 
 class TooLargeError(InputError):
-    """An object is too large to be written, because posekit could not read the file again."""
+    """A file or an array is larger than the largest size that posekit reads and writes."""
 
 
 class FigureError(InputError):
-    """Lengths or a URDF describe no body."""
+    """Segment lengths or a URDF do not describe a possible human figure."""
 
 
 class HeadError(InputError):
-    """The head's points do not determine a camera."""
+    """The head points, or their image points, do not determine the pose of the head in the camera frame."""
 
 
 class CameraError(InputError):
-    """The parameters describe no camera."""
+    """A parameter of a camera, such as its focal length, is missing or impossible."""
 
 
 class ViewerError(PosekitError):
@@ -100,7 +100,7 @@ def refusal(
     source : path or str
         The file, or another origin of the value; empty if the origin is unknown.
     field : str
-        Place in the source, such as ``frames[3].image.left_elbow``; empty if the whole source is refused.
+        Path of the value in the source, such as ``frames[3].image.left_elbow``; empty if the whole source is refused.
     got : str
         The value, as `shown` writes it.
     expected : str
@@ -125,7 +125,7 @@ def one_line(text: str) -> str:
 
 
 def bounded(text: str) -> str:
-    """Cut a long line in its middle, so that it keeps the place at its start and the remedy at its end."""
+    """Cut a long message in its middle, so that source and field at its start, and remedy at its end, remain."""
     half = MAX_LINE_CHARACTERS // 2
     return text if len(text) <= MAX_LINE_CHARACTERS else f"{text[:half]} … {text[3 - half :]}"
 
@@ -152,9 +152,9 @@ def cut(text: str) -> str:
 
 
 def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
-    """Suggest the valid names that are closest to a misspelt name, or that a word of another program means.
+    """Suggest valid names for an unknown name: names with similar spelling, or synonyms (`MEANT`).
 
-    If no valid name is close, return `otherwise`, or a list of all valid names if it is empty.
+    If no valid name is similar, return `otherwise`; if `otherwise` is empty, return a list of all valid names.
     """
     valid = list(names)
     given = name[:MAX_SHOWN_CHARACTERS]

@@ -57,15 +57,15 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_table(name: str, folder: str, built_in: Sequence[str], schema: str, option: str) -> dict[str, Any]:
-    """Read a TOML table of a schema.
+    """Read a TOML file, and raise an error if it does not state the given schema.
 
     Parameters
     ----------
     name : str
         A name of `built_in`, or the path of a file.
     folder, schema, option : str
-        Folder of the built-in tables, schema that the table must state, and option that names the table, for error
-        messages.
+        Folder of the built-in tables; schema that the table must state; name of the option that selects the table, for
+        error messages.
 
     Raises
     ------
@@ -137,4 +137,4 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 
 def _too_large(path: str | Path) -> InputError:
     got = f"more than {MAX_BYTES:,} bytes"
-    return refusal(path, "", got, "less", "cut it into clips", error=TooLargeError)
+    return refusal(path, "", got, "a smaller file", "cut it into clips", error=TooLargeError)

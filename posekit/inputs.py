@@ -1,4 +1,4 @@
-"""Input files from paths, folders and patterns; descriptions of their content; names of output files."""
+"""Input files from paths, folders and glob patterns; descriptions of their content; names of output files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def are_paths(given: Any) -> bool:
 
 
 def files_of(given: Any) -> Iterator[Path]:
-    """Yield the files of paths, folders and patterns.
+    """Yield the input files that paths, folders and glob patterns name.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def files_of(given: Any) -> Iterator[Path]:
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    """Yield the files below a folder; a detector's folder, with one file per picture, is one input."""
+    """Yield the input files in a folder and its subfolders; a folder with key points per picture is one input."""
     from posekit.formats.keypoints import looks_like
 
     inside = [one for one in sorted(folder.iterdir()) if not _is_hidden(one, folder)]
@@ -72,7 +72,7 @@ def names_below(files: Iterable[str]) -> dict[str, Path]:
 
 
 def new_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return the path of a new or empty folder; refuse a folder that is not empty."""
+    """Return the path of a folder that does not exist or is empty; raise an error otherwise."""
     path = Path(folder)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise refusal(path, "", "existing content", "a new or empty folder", "name another")

@@ -1,6 +1,6 @@
-"""Files to try posekit with: a walk, a detector's key points of it, one photograph, and robots.
+"""Sample files: a walking person, key points of the walk, one photograph, and robots.
 
-All files are made from the walker's gait and fixed seeds, so they are always the same.
+All files are computed with fixed random seeds, so they are always the same.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def samples(folder: str | Path) -> list[str]:
 
 
 def _lengths_of_a_person() -> dict[str, float]:
-    """Draw random lengths of the walking person, metres, between the points that a detector reports."""
+    """Draw random segment lengths of a walking person, metres, between the points that a detector reports."""
     from posekit.recovery.person import PROPORTIONS, by_segment
 
     people, rng = PROPORTIONS["people"], np.random.default_rng(NOISE_SEED)
@@ -139,7 +139,7 @@ def _lengths_of_a_person() -> dict[str, float]:
 
 
 def _write_key_points(folder: Path, points: Array) -> None:
-    """Write the key points of a walk (T, 19, 3), one file per picture, and the camera that saw them."""
+    """Project a walk (T, 19, 3); write its key points, one file per picture, and the camera's calibration."""
     from posekit.cameras import PinholeCamera
     from posekit.files import write_bytes
     from posekit.formats import save
@@ -169,7 +169,7 @@ def _write_key_points(folder: Path, points: Array) -> None:
 
 
 def _write_robots(folder: Path) -> None:
-    """Write a view of a Panda robot, and a squatting G1 as arrays that simulators exchange."""
+    """Write a view of a Panda robot arm, and a motion of a squatting G1 robot as arrays of configurations."""
     from posekit.files import write_bytes
     from posekit.formats.npz_file import packed
     from posekit.recovery.objects import load_linkage

@@ -1,7 +1,7 @@
-"""Settings of recoveries and validations as frozen records.
+"""Settings of recoveries and validations, as immutable classes.
 
-The command-line options are made from the fields of these records. Lengths and image deviations can be numbers or
-text with a unit.
+Each field of these classes is also an option of the command line. Quantities can be numbers, or text with a unit such
+as ``"175cm"``.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ def number(
     text : str or float
         The quantity. A bare number is in the base unit.
     name : str
-        Name of the argument, for the error.
+        Name of the argument, for the error message.
     expected, remedy : str
-        The expected value and the remedy, for the error.
+        The expected value and the remedy, for the error message.
 
     Raises
     ------
     InputError
-        If it is not a finite number with a known unit.
+        If the text is not a finite number with a known unit or without a unit.
 
     Examples
     --------
@@ -79,20 +79,20 @@ def number(
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """Tolerances of the checks of a posture, for lengths and image points that are not exact.
+    """Tolerances of the checks of a posture; larger tolerances are for measured lengths and image points.
 
     Parameters
     ----------
     rigid : float
-                Tolerance of distances inside torso and hips, metres.
+        Tolerance of distances inside torso and hips, metres.
     tangent : float
-        Largest distance by which a segment may miss the ray of its image point, metres. The joint is then placed at the
-        nearest point of the ray.
+        Largest gap between the end of a segment and the ray of its image point if the segment is too short, metres. The
+        joint is then at the nearest point of the ray.
     angle : float
         Tolerance of segment directions and joint angles, degrees.
     hips : float
-        Tolerance of the distance between the hips as a share of `rigid`, 0 to 1. It is smaller because the pelvis is
-        bone.
+        Tolerance of the distance between the hips as a share of `rigid`, 0 to 1. A share below 1 is for measured
+        people, whose pelvis is more rigid than the torso.
     """
 
     rigid: float
@@ -102,7 +102,7 @@ class Tolerance:
 
     @property
     def exact(self) -> bool:
-        """Whether only rounding is allowed."""
+        """Whether the tolerances allow rounding errors only."""
         return self.rigid <= EXACT.rigid
 
 
@@ -123,17 +123,19 @@ class Settings(Record):
     Parameters
     ----------
     checks : sequence of str or Check, optional
-        Checks by name, as ``module:Name``, or as objects. ``usual`` selects the default checks.
+        Checks: names of built-in checks, ``module:Name`` for own checks, or check objects. ``usual`` selects the
+        default checks.
     ranges : str
         Joint ranges: ``anatomical``, ``urdf``, ``table1`` or the path of a TOML file. ``auto`` selects ``urdf`` for
         robot configurations and ``anatomical`` otherwise.
     rules : sequence of int
-        Numbers (1 to 5) of the walking rules that the check ``walking`` tests.
+        Numbers (1 to 5) of Lee & Chen's walking rules that the check ``walking`` tests.
     walkers : {"paper", "people", "paper-printed"}
-        Thresholds of the walking rules: those of the paper or of real walkers. ``paper-printed`` also derives the
-        walking direction from the head, as printed.
+        Thresholds of the walking rules: Lee & Chen's (``paper``) or those of real walkers (``people``).
+        ``paper-printed`` uses Lee & Chen's thresholds, and derives the walking direction from the head.
     contact_margin : float
-        Minimum distance between collision bodies, metres. A negative distance allows penetration.
+        Minimum distance between the collision geometries of two body parts, metres. A negative distance allows
+        penetration.
     rigid_tolerance : float, optional
         Tolerance of distances inside torso and hips, metres.
     angle_tolerance : float, optional
@@ -172,12 +174,12 @@ class Settings(Record):
 
     @classmethod
     def of(cls, settings: Settings | None, **changes: Any) -> Self:
-        """Return the settings, or the defaults if None, with the changes that are not None.
+        """Return the given settings, or the defaults, with the fields in `changes` replaced; None changes nothing.
 
         Raises
         ------
         InputError
-            If they are settings of another kind, a field is unknown, or its value is impossible.
+            If `settings` is of another class, a field is unknown, or its value is impossible.
         """
         if settings is not None and not isinstance(settings, cls):
             got, expected = shown(type(settings).__name__), f"a {cls.__name__}"
@@ -185,7 +187,7 @@ class Settings(Record):
         return (settings or cls()).changed(**stated(**changes))
 
     def changed(self, **fields_given: Any) -> Self:
-        """Return the settings with some fields changed.
+        """Return a copy of the settings with the given fields replaced.
 
         Raises
         ------
@@ -201,7 +203,7 @@ class Settings(Record):
 
     @classmethod
     def from_toml(cls, path: str | Path, base: Self | None = None) -> Self:
-        """Read fields from a TOML file on top of `base`, or of the defaults.
+        """Return `base`, or the default settings, with the fields in a TOML file replaced.
 
         Raises
         ------
@@ -221,7 +223,7 @@ class Settings(Record):
     def _number(
         self, name: str, lower: float | None, upper: float = math.inf, remedy: str = "correct it"
     ) -> None:
-        """Convert a quantity from text to a number, and refuse a number outside the bounds."""
+        """Convert the quantity in a field from text to a number, and raise an error if it is outside the bounds."""
         given = getattr(self, name)
         if given is None:
             return
@@ -240,16 +242,17 @@ class RecoverSettings(Settings):
     Parameters
     ----------
     tangent_tolerance : float, optional
-        Largest distance by which a segment may miss the ray of its image point, metres.
+        Largest gap between the end of a segment and the ray of its image point if the segment is too short, metres.
     deviation : float, optional
-        Standard deviation of the image points, pixels. Default: the deviation that the view states.
+        Standard deviation of the image points, pixels. Default: the deviation in the view's file.
     length_deviation : float, optional
         Relative standard deviation of the person's size and of each segment length, 0 to 0.3. 0 means exact lengths.
     stature : float, optional
         Height of the person, metres.
     root : {"auto", "given", "head", "torso", "search"}
-        Source of the neck's position: ``given`` uses the view's, ``head`` computes it from six head points, ``torso``
-        estimates it together with the body. ``auto`` selects the first known source; ``search`` means ``auto``.
+        Source of the neck position: ``given`` uses the position in the view, ``head`` computes it from six head points,
+        ``torso`` estimates it together with the posture. ``auto`` selects the first of these sources that the view
+        allows; ``search`` is a synonym of ``auto``.
     proportions : {"auto", "figure", "people", "taylor"}
         Relative segment lengths if none are given: ``figure`` (built-in human model), ``people`` (means of people, the
         default for key points and photographs), or ``taylor`` (Taylor's Table 1, only without a camera).
@@ -257,19 +260,19 @@ class RecoverSettings(Settings):
         Scale of an uncalibrated view: ``min``, ``likely``, a number of pixels per metre, ``stature:PX``, or weighted
         constraints such as ``closure:1,coplanar:0.5``.
     nearer : mapping or sequence of mapping, optional
-        For segments whose direction is known: segment name to the name of the joint nearer to the camera. One mapping
-        for all frames, or one mapping per frame.
+        Known directions of segments: a mapping from the name of a segment to the name of its joint that is nearer to
+        the camera. One mapping for all frames, or one mapping per frame.
     infer : bool
         Infer the positions of joints without image points.
     refine : bool, optional
-        Treat image points as noisy. Default: only if the image points cannot be exact.
+        Recover with the least-squares solver for noisy image points. Default: only if the image points cannot be exact.
     coverage : float
         Minimum total probability of the listed postures, 0 to 1.
     group : float, optional
-        Largest distance of any joint between a group's most probable survivor and its other survivors, metres.
+        Group survivors whose joints are all within this distance of the group's most probable survivor, metres.
         Default: no groups.
     follow : int
-        Number of most probable paths through the frames to compute.
+        Number of paths to compute: the most probable sequences of one survivor per frame.
 
     Examples
     --------
@@ -307,7 +310,7 @@ class RecoverSettings(Settings):
         self._set("follow", int(self.follow))
 
     def tolerance(self, usual: Tolerance) -> Tolerance | None:
-        """Return the given tolerances, completed from `usual`; None if no tolerance is given."""
+        """Return the tolerances set here, with missing ones from `usual`; None if no tolerance is set."""
         given = (self.rigid_tolerance, self.tangent_tolerance, self.angle_tolerance)
         if all(part is None for part in given):
             return None
@@ -334,14 +337,14 @@ class ValidateSettings(Settings):
         Profile of checks over time and their thresholds: ``posekit``, ``phuma``, ``protomotions``, ``holomotion``,
         ``skating`` or the path of a TOML file.
     bodies : {"auto", "meshes", "capsules", "none"}
-        Collision geometries of a robot: ``meshes`` (those of the URDF), ``capsules`` or ``none``. ``auto`` selects
-        capsules if no two geometries of the URDF can touch.
+        Collision geometries of a robot: ``meshes`` (the geometries in the URDF), ``capsules`` (along the limbs) or
+        ``none``. ``auto`` selects capsules if no two geometries of the URDF can touch.
     srdf : str, optional
-        Path of the robot's SRDF. The collision check ignores the pairs of links that it disables.
+        Path of the robot's SRDF. The collision check ignores the pairs of links that the SRDF disables.
     package_dirs : sequence of str
         Folders that hold the packages of the robot's meshes.
     joint_map : str, optional
-        Name or path of the joint map, which maps frames of the robot to the 14 joints.
+        Name or path of the joint map, which assigns frames of the robot to the 14 joints of the figure.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""The names and the topology of the stick figure: joints, segments, rigid parts, degrees of freedom.
+"""Names and topology of posekit's human figure: joints, segments, rigid parts, degrees of freedom.
 
-Lengths are only in `urdf/stick_figure.urdf`. Indices refer to `JOINTS` (in the order of the tree) or to `POINTS`: the
-joints and then the five head points, which are known before the tree is grown.
+Segment lengths are in `urdf/stick_figure.urdf`. Indices of joints refer to `JOINTS`, in which each parent precedes its
+children. Indices of points refer to `POINTS`: the 14 joints, then the five points of `HEAD_POINTS`.
 """
 
 from __future__ import annotations
@@ -113,12 +113,12 @@ N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 
 
 def both(name: str) -> list[int]:
-    """Return the indices of the right and the left joint of a name without side, such as "hip"."""
+    """Return the indices of the right and the left joint for a name without a side, such as "hip"."""
     return [JOINT[f"{side}_{name}"] for side in SIDES]
 
 
 def segment_name(segment: tuple[int, int]) -> str:
-    """Return the name of a segment in files: `a-b`, with a before b in tree order."""
+    """Return the name of a segment in files: `a-b`, where joint a precedes joint b in `JOINTS`."""
     start, end = sorted(segment)
     return f"{JOINTS[start]}-{JOINTS[end]}"
 
@@ -150,6 +150,6 @@ def urdf_joint_name(dof: str) -> str:
 
 
 def other_side(name: str) -> str:
-    """Return the name of the landmark on the other side; for a landmark in the middle, its own name."""
+    """Swap right and left in the name of a body point; a name without a side is unchanged."""
     side, _, part = name.partition("_")
     return {"right": f"left_{part}", "left": f"right_{part}"}.get(side, name)

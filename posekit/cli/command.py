@@ -1,4 +1,4 @@
-"""Shared code of commands: options made from settings, panels in the help, suggestions, and one-line messages."""
+"""Shared code of the commands: options made from settings, groups of options in the help, error messages."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def say(text: str, *, err: bool = False) -> None:
 
 
 class Command(click.Command):
-    """A command whose help shows its options in panels, and whose unknown options get a suggestion."""
+    """A command whose help lists options in groups (panels), and which suggests names for unknown options."""
 
     def __init__(self, *args: Any, examples: Sequence[str] = (), **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.examples = examples
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments; refuse unknown options with a suggestion, and outputs that are also inputs."""
+        """Parse the arguments; raise an error for an unknown option, and for an output that is also an input."""
         try:
             rest = super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -48,7 +48,7 @@ class Command(click.Command):
         return rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options panel by panel."""
+        """Write the options into the help, one group after another."""
         panels: dict[str, list[tuple[str, str]]] = {}
         for parameter in self.params:
             record = parameter.get_help_record(ctx)
@@ -66,7 +66,7 @@ class Command(click.Command):
 
 
 class Option(click.Option):
-    """An option in a panel of the help."""
+    """An option with the title of its group (panel) in the help."""
 
     def __init__(self, *args: Any, panel: str = "Options", **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -79,7 +79,7 @@ def command(name: str, *examples: str) -> Callable[[Callable[..., Any]], click.C
 
 
 def option(*names: str, panel: str = "Options", **kwargs: Any) -> Callable[[Any], Any]:
-    """Declare an option of a panel; the help states its default, unless that is empty or a switch."""
+    """Declare an option in a group (panel) of the help; the help states its default, except for switches."""
     default = kwargs.get("default")
     shown_default = default not in (None, "") and not isinstance(default, bool)
     return click.option(*names, cls=Option, panel=panel, **{"show_default": shown_default, **kwargs})
@@ -95,7 +95,7 @@ def output(
 
 
 def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Combine decorators; the option of the first is listed first in the help."""
+    """Combine decorators that declare options; the help lists the options in the given order."""
 
     def joined(function: Any) -> Any:
         for one in reversed(decorators):
@@ -106,7 +106,7 @@ def apply(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def seeing() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options for views made from key points."""
+    """Declare the options that describe key points: camera, person, layout and rate."""
     calibration = "Calibration of the camera. Default: the camera is unknown."
     return apply(
         option("--camera", default=None, metavar="FILE[:NAME]", help=calibration),
@@ -202,7 +202,7 @@ def descriptions(kind: type[Settings]) -> dict[str, str]:
 
 
 def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
-    """Remove the options of settings from a command's parameters and return the settings.
+    """Build the settings from a command's options, and remove these options from `given`.
 
     Values from ``--set`` override the settings file, and options override both.
     """
@@ -225,12 +225,12 @@ def settings_from(kind: type[Settings], given: dict[str, Any]) -> Any:
 
 
 def _value(text: str) -> Any:
-    """Convert a value of ``--set`` to true, false, none, or text, which the settings convert to the field's type."""
+    """Convert a value of ``--set`` to True, False or None; return other values as text."""
     return {"true": True, "false": False, "none": None}.get(text.lower(), text)
 
 
 def _refuse_overwriting(given: Mapping[str, Any]) -> None:
-    """Refuse an output that is also an input or is in an input folder, and two outputs with the same path."""
+    """Raise an error if an output is an input, is in an input folder, or has the path of another output."""
     written: list[Path] = []
     read: list[Path] = []
     for name, value in given.items():
@@ -255,7 +255,7 @@ def _refuse_overwriting(given: Mapping[str, Any]) -> None:
 
 
 def numbers(flag: str, text: str, count: int | None = None) -> list[float]:
-    """Parse numbers separated by commas."""
+    """Parse the value of an option: `count` numbers, separated by commas."""
     try:
         found = [float(part) for part in text.split(",")]
     except ValueError:

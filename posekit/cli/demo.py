@@ -11,7 +11,7 @@ from posekit.cli.command import command, option, output, say
 @output("DIR", "Folder for the results.")
 @option("--pictures/--no-pictures", default=True, help="Draw the results, too.")
 def demo(output: Path, pictures: bool) -> None:
-    """Validate a motion, recover built-in views, and reproduce the papers' tables; index.html links to the results."""
+    """Validate a motion, recover built-in views, and compute the papers' tables; index.html links to the results."""
     from posekit.cli.demo_pages import write_demo
 
     for line in write_demo(output, pictures=pictures):

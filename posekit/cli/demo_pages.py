@@ -1,4 +1,4 @@
-"""Files of `posekit demo`: samples, a report about a motion, recovered views, the papers' tables, a page of links."""
+"""Files of `posekit demo`: samples, report of a motion, recovered views, tables of the papers, page with links."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ code {{ background: #f3f3f3; padding: 0 .2em }}
 
 
 def write_demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
-    """Write the demo and yield one line for each step.
+    """Write the files of `posekit demo`, and yield one line of text for each step.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from posekit.settings import RecoverSettings
 def evaluate(
     source: Path, output: Path | None, truth: str | None, noise: str, views: int, seed: int, **given: Any
 ) -> None:
-    """Compare a result with the truth; or recover a motion from virtual cameras and compare the result with it."""
+    """Compare a result with the true joints; or project motion capture, recover it, and compare."""
     from posekit.errors import refusal
     from posekit.evaluation import evaluate as compare
     from posekit.evaluation import evaluate_method

@@ -28,7 +28,8 @@ def follow(
 ) -> None:
     """Follow a person live.
 
-    An input line is {"time": seconds, "points": [[x, y], …]}, or has named points: {"left_wrist": [x, y, confidence]}.
+    An input line is {"time": seconds, "points": [[x, y], …]}. Points can also have names and confidences: "points":
+    {"left_wrist": [x, y, confidence]}.
     """
     if not stdin:
         raise InputError("posekit follow: got no input; expected JSON lines; give --stdin")

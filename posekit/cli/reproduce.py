@@ -1,4 +1,4 @@
-"""`posekit reproduce`: compute the tables and figures of the papers."""
+"""`posekit reproduce`: compare tables and figures of Lee & Chen 1985 and Taylor 2000 with posekit's results."""
 
 from __future__ import annotations
 

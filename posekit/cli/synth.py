@@ -21,7 +21,7 @@ def synth() -> None:
 
 
 def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare the options that all kinds of views share."""
+    """Declare the options that all subcommands of `synth` share."""
     return apply(
         output("VIEW", "View file to write, .json."),
         option("--frames", default=frames, type=click.IntRange(1), metavar="N", help="Frames."),
@@ -131,7 +131,7 @@ def mocap(
 @click.argument("robot", metavar="NAME|URDF")
 @shared(1, "PX")
 def object_command(robot: str, output: Path, frames: int, noise: float, seed: int) -> None:
-    """Make a view of random robot configurations within limits, from random directions without perspective."""
+    """Make a view of random robot configurations within joint limits, from random directions, without perspective."""
     import json
 
     import numpy as np

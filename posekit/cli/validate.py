@@ -88,7 +88,7 @@ def validate(
 
 
 def write_page(report: Report, output: Path, facts: dict[str, Any]) -> None:
-    """Write the page of a report: the table of findings, and an animation of the first clips."""
+    """Write a report as an HTML page: the table of findings, and an animation of the first clips."""
     from posekit.formats import open as open_file
     from posekit.motion import Motion
     from posekit.viewer import draw

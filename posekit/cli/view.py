@@ -1,4 +1,4 @@
-"""`posekit view`: show the page of a file in the browser."""
+"""`posekit view`: draw a file as an HTML page and show it in the browser."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from posekit.cli.command import command, option, reading, say
 @option("--open/--no-open", "show", default=True, help="Open the browser.")
 @reading()
 def view(source: Path, view: str | None, show: bool, **given: Any) -> None:
-    """Write the page of a file to a temporary folder and open it."""
+    """Draw a file as an HTML page in a temporary folder, and open the page in the browser."""
     from posekit.doors import render
 
     page = Path(tempfile.mkdtemp(prefix="posekit-")) / f"{source.stem}.html"

@@ -1,4 +1,4 @@
-"""Evaluation of one result against the truth: joint errors, retained truth, calibrated probabilities and regions."""
+"""Comparison of one result with the true postures: joint errors, and calibration of probabilities and regions."""
 
 from __future__ import annotations
 
@@ -43,18 +43,21 @@ KEYS: Final = ("clip", "yaw", "height", "noise")
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Evaluation(Record):
-    """Measurements of F frames in columns; errors in metres.
+    """Errors and other quantities of F frames, one column per quantity; errors are in metres.
 
     Parameters
     ----------
     columns : mapping of str to array (F,)
-        ``frame``, ``time``, ``survivors``; errors ``{role}_{measure}`` for `ROLES` and `MEASURES`; ``branch`` (1 if a
-        survivor has the near-far code of the truth, NaN if unknown); ``probability`` of the first survivor; ``sure``
-        and ``sure_true`` (whether every joint of the answer is within 5 cm of the truth); ``regions`` (share of joints
-        of the best survivor whose 95 % region contains the truth); ``nearer_true`` (share of segments with a correct
-        near-far answer); ``reason``; and some of `KEYS`.
+        ``frame``, ``time`` and ``survivors`` (their number). Errors are in columns ``{role}_{measure}``, for each
+        posture of `ROLES` and each kind of error of `MEASURES`. ``branch`` is 1 if a survivor has the branch of the
+        true posture, NaN if unknown. ``probability`` is that of the most probable survivor. ``sure`` is the stated
+        probability of the answer, and ``sure_true`` whether all its joints are within 5 cm of the truth. ``regions`` is
+        the share of joints of the best survivor whose 95 % region contains the true joint. ``nearer_true`` is the share
+        of segments whose nearer end is stated correctly. ``reason`` states why a frame has no survivor. The columns of
+        `KEYS` are optional.
     nearer_sure, nearer_true : array (F, 13)
-        Stated probability of each segment's near-far answer, and whether the answer is correct; NaN if unknown.
+        Stated probability of which end of each segment is nearer to the camera, and whether the statement is correct;
+        NaN if unknown.
     settings : mapping
         Settings of the recovery and of the evaluation.
 
@@ -78,13 +81,13 @@ class Evaluation(Record):
         return len(self.columns["frame"])
 
     def with_keys(self, **keys: Any) -> Evaluation:
-        """Return the evaluation with constant columns, such as the level of noise."""
+        """Add columns that have the same value in all frames, such as the noise level."""
         columns = {name: np.full(len(self), value) for name, value in keys.items()} | dict(self.columns)
         return replace(self, columns=columns)
 
     @staticmethod
     def joined(parts: Sequence[Evaluation], settings: Mapping[str, Any]) -> Evaluation:
-        """Concatenate evaluations with the same columns."""
+        """Concatenate the frames of evaluations that have the same columns."""
         return Evaluation(
             columns={name: np.concatenate([one.columns[name] for one in parts]) for name in parts[0].columns},
             nearer_sure=np.concatenate([one.nearer_sure for one in parts]),
@@ -93,14 +96,14 @@ class Evaluation(Record):
         )
 
     def conditions(self, keys: Sequence[str]) -> Iterator[tuple[dict[str, Any], Ints]]:
-        """Yield each combination of values of the given key columns, and the rows with these values."""
+        """Yield each combination of values in the columns `keys`, and the frames that have these values."""
         values = list(zip(*(self.columns[key].tolist() for key in keys), strict=True)) or [()] * len(self)
         for one in sorted(set(values)):
             rows = np.flatnonzero([each == one for each in values])
             yield dict(zip(keys, one, strict=True)), rows
 
     def summary(self, rows: Ints | None = None) -> dict[str, Any]:
-        """Return a summary of the given frames, or of all frames: shares from 0 to 1, errors in millimetres.
+        """Summarise the given frames, or all frames: shares from 0 to 1, errors in millimetres.
 
         Shares refer to all frames, including frames without survivors. Errors are means, medians and 95th percentiles
         over frames with at least one survivor.
@@ -153,7 +156,7 @@ class Evaluation(Record):
         return "\n".join([_line(head), _line(["---"] * len(head)), *map(_line, rows), *note])
 
     def document(self) -> dict[str, Any]:
-        """Return the JSON document: settings, the summary of all frames and of each condition, and every frame."""
+        """Return the content of the JSON file: settings, summaries of all frames and of each condition, every frame."""
         keys = [key for key in KEYS if key in self.columns]
         conditions = [{**name, **self.summary(rows)} for one in keys for name, rows in self.conditions([one])]
         rows = zip(*(values.tolist() for values in self.columns.values()), strict=True)
@@ -162,7 +165,7 @@ class Evaluation(Record):
         return {**head, "conditions": conditions, "frames": frames}
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write ``.json`` (all data), ``.csv`` (one row per frame, errors in metres) or ``.md`` (the table).
+        """Write a file: ``.json`` (all data), ``.csv`` (one row per frame, errors in metres) or ``.md`` (`table`).
 
         Raises
         ------
@@ -185,14 +188,14 @@ class Evaluation(Record):
         write_bytes(target, f"{text}\n".encode())
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the columns as a data frame."""
+        """Return the columns as a pandas data frame."""
         import pandas
 
         return pandas.DataFrame(dict(self.columns))
 
 
 def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -> Evaluation:
-    """Compare every frame of a result with the truth.
+    """Compare every frame of a result with the true posture.
 
     Parameters
     ----------
@@ -200,7 +203,7 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
         A result of F frames.
     truth : array (F, 14, 3), View or Motion
         True joints in the camera frame, metres, NaN if unknown; or a view with truth; or motion capture at the same
-        times (`truth_of`). Joints that the image does not show are excluded.
+        times (`truth_of`). Errors of survivors exclude joints without image points.
     seed : int
         Seed for the choice of the random survivor.
 
@@ -248,7 +251,7 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
 
 
 def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
-    """Return `posture_errors`; for a scaled orthographic camera, whose depth is unknown, joints are centred first."""
+    """Return `posture_errors`; if the camera is scaled orthographic, mean positions are aligned for the mean error."""
     errors = posture_errors(joints, truth)
     if result.camera.get("model") == "scaled-orthographic":
         errors[:, MEASURES.index("mpjpe")] = errors[:, MEASURES.index("centred")]
@@ -257,10 +260,10 @@ def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
 
 
 def true_branch(truth: Array) -> list[str]:
-    """Return the near-far code of true postures (N, 14, 3) in the frame of a perspective camera.
+    """Return the branch of each true posture (N, 14, 3), given in the frame of a perspective camera.
 
-    The code of a joint is ``1`` (far) if the joint lies, on its ray, beyond the foot of the perpendicular from its
-    parent. The code of a posture is empty if a joint is unknown.
+    The digit of a joint is ``1`` (far) if the joint is farther along its ray than the point of the ray closest to the
+    parent joint. The branch is empty if a joint is unknown.
     """
     rays = unit(truth)
     far = dot(truth[:, 1:] - truth[:, PARENTS[1:]], rays[:, 1:]) > 0
@@ -269,7 +272,7 @@ def true_branch(truth: Array) -> list[str]:
 
 
 def _branch_retained(result: Recovery, truth: Array) -> Array:
-    """Return whether a survivor has the near-far code of the truth (F,); NaN if image points are not exact."""
+    """Return whether a survivor has the branch of the true posture (F,); NaN if image points are not exact."""
     codes = np.asarray(result.survivors.branch)
     exact = np.array([bool(levels) for levels in result.frames.levels], dtype=bool)
     if not exact.any() or result.camera.get("model") == "scaled-orthographic":
@@ -282,7 +285,7 @@ def _branch_retained(result: Recovery, truth: Array) -> Array:
 
 
 def _sure_true(result: Recovery, truth: Array) -> Array:
-    """Return whether every joint of the answer is within the distance that `sure` refers to (F,); NaN if unknown."""
+    """Return whether every joint of the answer is within 5 cm of the truth (F,); NaN if the truth is unknown."""
     away = result.answer.joints - truth
     relative = np.array(["relative" in of for of in result.answer.sure_of], dtype=bool)
     away[relative] -= away[relative, :1]
@@ -293,7 +296,7 @@ def _sure_true(result: Recovery, truth: Array) -> Array:
 
 
 def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
-    """Return the share of joints of the nearest survivor whose 95 % region contains the truth (F,); NaN without one."""
+    """Return the share of joints of each frame's best survivor whose 95 % region contains the true joint (F,)."""
     found = np.full(len(result), np.nan)
     chosen = np.flatnonzero(nearest >= 0)
     joints = result.survivors.joints[nearest[chosen]]
@@ -308,7 +311,7 @@ def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
 
 
 def _nearer(result: Recovery, truth: Array) -> tuple[Array, Array]:
-    """Return the stated probability (F, 13) of each segment's near-far answer, and whether the answer is correct."""
+    """Return how sure each segment's nearer end is (F, 13), and whether the nearer end is correct (F, 13)."""
     start, end = np.array(TREE_SEGMENTS).T
     deeper = truth[:, end, 2] - truth[:, start, 2]
     true = np.where(deeper > SURE_METRES, -1, np.where(deeper < -SURE_METRES, 1, 0))
@@ -330,7 +333,7 @@ def _spread(values: Array) -> dict[str, float]:
 
 
 def _cells(found: Mapping[str, Any]) -> list[str]:
-    """Return the cells of a line of the table."""
+    """Return the cells of one row of the Markdown table."""
     errors = found["error_mm"]
     pa = [errors.get(role, {}).get("pa", {}).get("median") for role in ("best", "first", "answer")]
     sure = found["calibration"]["sure"]

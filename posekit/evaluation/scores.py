@@ -23,7 +23,7 @@ POSTURES_AT_ONCE: Final = 50_000
 
 
 def posture_errors(joints: Array, truth: Array) -> Array:
-    """Return the five `MEASURES` of N postures.
+    """Return five joint errors of each of N postures, in the order of `MEASURES`.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def posture_errors(joints: Array, truth: Array) -> Array:
     Returns
     -------
     array (N, 5)
-        Errors, metres; NaN if no joint is known in both.
+        Errors, metres; NaN if no joint is known in both postures.
     """
     parts = range(0, len(joints), POSTURES_AT_ONCE)
     found = [_errors(joints[k : k + POSTURES_AT_ONCE], truth[k : k + POSTURES_AT_ONCE]) for k in parts]
@@ -66,7 +66,7 @@ def correct_poses_score(worst: Array) -> float:
 
 
 def reliability(probability: Array, event: Array) -> dict[str, Any] | None:
-    """Compare stated probabilities with events, in ten bins of equal width.
+    """Compare stated probabilities with frequencies of the events, in ten bins of equal width.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def reliability(probability: Array, event: Array) -> dict[str, Any] | None:
         ``ece``: expected calibration error, the mean absolute difference between a bin's mean probability and its share
         of events, weighted by entries (Guo et al. 2017, ICML, eq. 3). ``brier``: mean squared difference between
         probability and event (Brier 1950). ``bins``: number of entries, mean probability and share of events of each
-        bin that is not empty. The result is None without entries.
+        bin that is not empty. The result is None if there are no entries.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Evaluation of a method: recover views of known postures at several noise levels, and measure the errors."""
+"""Evaluation of recovery with given settings: views of known postures at several levels of image noise."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ def evaluate_method(
     views: int = 24,
     seed: int = 0,
 ) -> Evaluation:
-    """Recover views of known postures at several noise levels, and measure the errors of every frame.
+    """Recover views of known postures at several levels of image noise, and measure the errors of every frame.
 
-    The noise of a frame is drawn once and multiplied by each level, so that levels differ only in scale. If the
-    recovery of a view fails, its frames count as frames without survivors.
+    Standard normal noise is drawn once for each frame, and multiplied by each noise level. If the recovery of a view
+    fails, its frames count as frames without survivors.
 
     Parameters
     ----------
     source : View, Motion, or iterable of (dict, View)
         A view with truth; or motion capture, from which frames are chosen evenly and each is projected by its own
-        random camera; or views with the values of their key columns (`posekit.evaluation.evaluate.KEYS`).
+        random camera; or pairs of a view and the values of its columns `posekit.evaluation.evaluate.KEYS`.
     settings : RecoverSettings, optional
         Settings of every recovery.
     noise : sequence of float
@@ -79,7 +79,7 @@ def evaluate_method(
 
 
 def noisy(view: View, level: float, draw: Array) -> View:
-    """Add noise to image points: `level` pixels times standard normal numbers (F, 19, 2); a stated neck is unchanged.
+    """Add the noise `level` (pixels) times `draw` (F, 19, 2) to image points; necks of known position are unchanged.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def noisy(view: View, level: float, draw: Array) -> View:
 
 
 def _empty(view: View, reason: str) -> Recovery:
-    """Return a result without survivors."""
+    """Return a result without survivors, for a view whose recovery failed."""
     count = len(view)
     nothing = np.full((count, len(JOINTS), 3), np.nan)
     return Recovery(

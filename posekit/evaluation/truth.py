@@ -1,4 +1,4 @@
-"""Truth from motion capture: frames are matched to pictures, and axes to the axes of the camera's world."""
+"""True joints from motion capture, matched to the pictures in time, and to the axes of the camera's world."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ AXIS_TURNS: Final = np.array(
 
 
 def with_truth(view: View, motion: Motion) -> tuple[View, str]:
-    """Add truth to a view from motion capture at the same times.
+    """Add true joints to a view, from motion capture of the same person at the same times.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def with_truth(view: View, motion: Motion) -> tuple[View, str]:
 
 
 def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str]:
-    """Return the truth (F, 14, 3) of a result's frames in the camera's frame, metres, and a note about the matching.
+    """Return true joints (F, 14, 3) of a result's frames, camera frame, metres, and a sentence about the matching.
 
     Parameters
     ----------
@@ -86,12 +86,12 @@ def truth_of(result: Recovery, given: Array | View | Motion) -> tuple[Array, str
     truth = np.asarray(given, dtype=np.float64)
     if truth.shape != (len(result), len(JOINTS), 3) or not np.isfinite(truth).any():
         expected = f"known joints of shape ({len(result)}, {len(JOINTS)}, 3)"
-        raise refusal(result.source, "truth", f"shape {truth.shape}", expected, "give these frames' truth")
+        raise refusal(result.source, "truth", f"shape {truth.shape}", expected, "give all frames' joints")
     return truth, ""
 
 
 def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Array, str]:
-    """Match motion to pictures by frame or time, and choose the permutation of its axes with the least image error."""
+    """Match motion frames to pictures; choose the matching and the axis permutation with the least image error."""
     source = motion.source or "truth"
     if not isinstance(camera, PinholeCamera) or camera.R is None or camera.t is None:
         raise refusal(source, "truth", "a camera without a pose", "R and t", "give a calibration")
@@ -116,7 +116,7 @@ def _placed(camera: Any, image: Array, time: Array, motion: Motion) -> tuple[Arr
 
 
 def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
-    """Return the joints (F, 14, 3) at the pictures, matched by frame number, by time, and by time since the start."""
+    """Return the joints (F, 14, 3) of each picture by three matchings: frame number, time, time since the start."""
     joints, count = motion.figure_joints, len(time)
     by_number = np.full((count, *joints.shape[1:]), np.nan)
     by_number[: min(count, len(joints))] = joints[:count]
@@ -136,7 +136,7 @@ def _matched(motion: Motion, time: Array) -> list[tuple[str, Array]]:
 
 
 def _axes(turn: Array) -> str:
-    """Return the axes of the truth that are x, y, z of the camera's world, as a text such as ``(z, x, y)``."""
+    """Write an axis permutation as text: the motion's axes that are x, y, z of the camera's world, as ``(z, x, y)``."""
     largest = np.abs(turn).argmax(axis=1)
     signs = ["-" if row[k] < 0 else "" for row, k in zip(turn, largest, strict=True)]
     return f"({', '.join(sign + 'xyz'[k] for sign, k in zip(signs, largest, strict=True))})"

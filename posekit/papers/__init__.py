@@ -1,4 +1,4 @@
-"""Comparison of the statements of both papers with posekit's calculations, one row per statement."""
+"""Comparison of Lee & Chen 1985 and Taylor 2000 with posekit's calculations, one row for each printed statement."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EFFORTS = ("quick", "fine")
 def reproduce(
     paper: str = "all", folder: str | Path | None = None, *, effort: str = "quick", pictures: bool = False
 ) -> Rows:
-    """Reproduce the papers' statements, tables and figures.
+    """Compare printed statements and tables of the papers with posekit's calculations, and draw the figures.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def reproduce(
     folder : path, optional
         Folder for ``papers.md``, ``papers.html`` and ``papers.json``; it is created if it does not exist.
     effort : {"quick", "fine"}
-        Number of settings of the walker for Tables 3 and 4: 500 or 8,100.
+        Number of walkers (velocity, lean, gait phase) that Tables 3 and 4 are compared with: 500 or 8,100.
     pictures : bool
         Also draw the papers' figures again, into the folder; this needs matplotlib.
 
     Returns
     -------
     Rows
-        Place in the paper, printed statement, posekit's result and verdict of each statement.
+        For each statement: its section or table in the paper, the printed text, posekit's result, and the verdict.
 
     Raises
     ------

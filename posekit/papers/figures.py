@@ -1,4 +1,4 @@
-"""Drawings of the papers' figures: images and survivors of SEQ1 and SEQ2, and the residual over the scale."""
+"""Plots of the papers' figures: images and survivors of Lee & Chen's sequences; residual over the scale (Taylor)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from posekit.synthesis.views import SEQUENCES
 
 
 def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
-    """Draw Fig. A.1 (images) and Figs. 6 and 8 (one survivor of each group in frame 1, from front and side).
+    """Draw Lee & Chen's Fig. A.1 (images), Figs. 6 and 8 (one survivor per group in frame 1, from front and side).
 
     Parameters
     ----------
     folder : Path
         Existing folder.
     effort : str
-        See `posekit.papers.reproduce`. Of all settings of the walker, the setting closest to the printed counts is
-        drawn.
+        See `posekit.papers.reproduce`. The walker has the setting whose counts of survivors are closest to the printed
+        counts.
     """
     paths = []
     setting = count_walks("seq1", effort).settings[closest(effort)]
@@ -45,7 +45,7 @@ def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
 
 
 def draw_taylor(folder: Path) -> list[Path]:
-    """Draw Figs. 7b and 8b: the residual of the constraint as a function of the scale, with stated flips."""
+    """Draw Taylor's Figs. 7b and 8b: residual of the constraint over the scale, with the true signs of depths."""
     paths = []
     for one in constrained_objects():
         s = scale_of(one.points)
@@ -61,7 +61,7 @@ def draw_taylor(folder: Path) -> list[Path]:
 
 
 def _sticks(axis: Any, postures: Array, title: str) -> None:
-    """Draw postures (N, 14, 2), y down, side by side."""
+    """Draw stick figures (N, 14, 2), y down, side by side."""
     width = 1.2 * np.ptp(postures[..., 0], axis=1).max()
     for k, posture in enumerate(postures):
         segments = posture[np.array(TREE_SEGMENTS)] - posture[0] + [k * width, 0.0]
@@ -72,7 +72,7 @@ def _sticks(axis: Any, postures: Array, title: str) -> None:
 
 
 def _figure(width: float, height: float) -> Any:
-    """Return an empty matplotlib figure; sizes are in inches."""
+    """Return an empty matplotlib figure; width and height are in inches."""
     try:
         from matplotlib.figure import Figure
     except ImportError:

@@ -1,4 +1,4 @@
-"""Rows of Lee & Chen 1985 on the figure, the camera from the head (§2.1, Table 2), and the body of Table A.1."""
+"""Rows about Lee & Chen 1985: stick figure, camera computed from head points (§2.1, Table 2), lengths (Table A.1)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ N_BODIES: Final = 20
 
 
 def camera_rows() -> Iterator[Row]:
-    """Yield the rows about the figure, the camera and the body."""
+    """Yield the rows about the stick figure, the camera and the lengths of Table A.1."""
     yield from _figure_rows()
     yield from _null_space_rows()
     six, eight = (_noisy_error(head) for head in (TABLE_A2, TABLE_A2.with_points(CHIN_AND_CROWN)))
@@ -64,14 +64,14 @@ def camera_rows() -> Iterator[Row]:
 
 
 def exact_image(head: HeadPoints = TABLE_A2) -> Array:
-    """Return the exact projections (H, 2) of head points by the camera of SEQ1, metres, y down."""
+    """Return exact projections (H, 2) of head points by the camera of SEQ1: metres on the image plane, y down."""
     points = head.points @ R_CAM_HEAD.T + [0.0, 0.0, CAMERA[0] + F]
     return np.asarray(LeeChenCamera(f=F).project(points[None])[0])
 
 
 @cache
 def table_2() -> dict[str, Array]:
-    """Return Table 2(a) to (d) from exact projections, in the paper's frames, centimetres."""
+    """Compute the four parts of Table 2 from exact projections, in Lee & Chen's coordinate frames, centimetres."""
     pose = solve_pose(TABLE_A2, exact_image(), LeeChenCamera(f=None))
     R, t, f = pose.R_cam_head[0], pose.t_cam_head[0], float(pose.f[0])
     return {
@@ -113,7 +113,7 @@ def _null_space_rows() -> Iterator[Row]:
 
 
 def _null_space(points: Array, image: Array) -> tuple[Array, Array]:
-    """Solve eqs. (2)-(5); return the singular values, and the matrix (4, 3) of the smallest singular value."""
+    """Solve Lee & Chen's eqs. (2)-(5) by SVD; return all singular values, and the null vector as a matrix (4, 3)."""
     rows = []
     for (x, y, z), (u, v) in zip(points, image, strict=True):
         rows.append([x, 0, -u * x, y, 0, -u * y, z, 0, -u * z, 1, 0, -u])
@@ -123,7 +123,7 @@ def _null_space(points: Array, image: Array) -> tuple[Array, Array]:
 
 
 def _noisy_error(head: HeadPoints) -> float:
-    """Return the median error of the camera position from noisy head points, centimetres."""
+    """Return the median error, centimetres, of camera positions computed from noisy image points of the head."""
     noise = IMAGE_NOISE * np.random.default_rng(0).normal(size=(N_PICTURES, 8, 2))[:, : len(head.points)]
     pose = solve_pose(head, exact_image(head) + noise, LeeChenCamera(f=None))
     position = camera_position(pose.R_cam_head, pose.t_cam_head, pose.f)
@@ -148,7 +148,7 @@ def _table_2_rows() -> Iterator[Row]:
 
 
 def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
-    """Return the error of the refined camera position, centimetres, and the head point that does not fit the others."""
+    """Return the camera position's error (cm) after least squares, and the head point that is an outlier."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the misfit is returned
         pose = solve_pose(head, image, LeeChenCamera(f=None))
@@ -157,7 +157,7 @@ def _refined(head: HeadPoints, image: Array) -> tuple[float, str]:
 
 
 def _linear(head: HeadPoints, image: Array) -> float:
-    """Return the error of the linear solution's camera position, centimetres, with normalised data (Hartley 1997)."""
+    """Return the error (cm) of the camera position by the linear solution, with normalised data (Hartley 1997)."""
     centre, middle = head.points.mean(axis=0), image.mean(axis=0)
     sizes = [np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean()) for at in (head.points, image)]
     P = _null_space((head.points - centre) / sizes[0], (image - middle) / sizes[1])[1].T
@@ -189,7 +189,7 @@ def _body_rows() -> Iterator[Row]:
 
 @cache
 def _tables() -> dict[str, Array]:
-    """Return the printed arrays of Table 2 and Table A.2, centimetres."""
+    """Return the arrays that Lee & Chen print in Tables 2 and A.2, centimetres."""
     given = printed()["lee_chen"]
     names = ("image", "T", "R", "position", "head", "misprinted_eye_x")
     return {name: np.array(given[name]) for name in names}

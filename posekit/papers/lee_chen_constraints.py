@@ -1,4 +1,4 @@
-"""Rows of Lee & Chen 1985 on Table 1, angles of §3.2.A, collisions and rules of §3.3, with postures from Pinocchio."""
+"""Rows about Lee & Chen 1985: joint ranges (Table 1), joint angles (§3.2.A), collisions and walking rules (§3.3)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ FORMULAS: Final = (
 
 
 def constraint_rows() -> Iterator[Row]:
-    """Yield the rows about the physical constraints and the rules."""
+    """Yield the rows about the physical constraints and the walking rules."""
     yield from _formula_rows()
     yield from _table_1_rows()
     yield from _knee_and_collision_rows()
@@ -67,7 +67,8 @@ def constraint_rows() -> Iterator[Row]:
 def posed(angles: Mapping[str, float]) -> Array:
     """Return the points (1, 19, 3) of a standing posture in which the given URDF angles (degrees) are changed.
 
-    If only the pelvis is bent, the legs hang down, because Table 1 measures leg angles relative to the torso.
+    If `angles` has only angles of the pelvis, the legs stay vertical, because Table 1 measures leg angles from the
+    torso.
     """
     figure = load_figure()
     q = pin.neutral(figure.model)[None].copy()
@@ -83,7 +84,7 @@ def posed(angles: Mapping[str, float]) -> Array:
 
 
 def body_of(points: Array, tolerance: Tolerance = EXACT, **settings: Any) -> Body:
-    """Return postures (N, 19, 3) of the built-in figure as the input of checks, with fields of `ValidateSettings`."""
+    """Return postures (N, 19, 3) of the built-in figure as a `Body`, which is the input of checks."""
     return Body(
         joints=points[:, : len(JOINTS)],
         head=points[:, len(JOINTS) :],
@@ -95,7 +96,7 @@ def body_of(points: Array, tolerance: Tolerance = EXACT, **settings: Any) -> Bod
 
 
 def legal(check: Check, points: Array, **settings: Any) -> list[bool]:
-    """Return which postures (N, 19, 3) pass a check."""
+    """Return whether each posture (N, 19, 3) passes a check."""
     violated = check.judge(body_of(points, **settings)).violated
     return [not any(row) for row in violated.tolist()]
 
@@ -177,7 +178,7 @@ def _named(angles: Mapping[str, float]) -> str:
 
 
 def _formula_rows() -> Iterator[Row]:
-    """Compare the angles of §3.2.A, computed as printed, with `table1-printed` for random postures."""
+    """Compare joint angles by the printed formulas of §3.2.A with those of the ranges `table1-printed`."""
     figure = load_figure()
     points = figure.forward_kinematics(random_postures(figure, N_FORMULAS, np.random.default_rng(32)))
     judgement = JointRange().judge(body_of(points, ranges="table1-printed"))
@@ -198,7 +199,7 @@ def _formula_rows() -> Iterator[Row]:
 
 
 def _written_out(points: Array) -> dict[str, Array]:
-    """Return the angles (N,) of §3.2.A, computed with arc cosines as printed, degrees."""
+    """Return the joint angles (N,), degrees, by the printed arc-cosine formulas of §3.2.A."""
     place = {name: points[:, k] for name, k in JOINT.items()}
     y = unit(place["pelvis"] - place["neck"])
     z = unit(place["left_shoulder"] - place["right_shoulder"])
@@ -234,5 +235,5 @@ def _written_out(points: Array) -> dict[str, Array]:
 
 
 def _between(along: Array, across: Array) -> Array:
-    """Return the angle (N,) from an axis to a projection with the given two components, degrees, 0 to 180."""
+    """Return the angle between an axis and a vector with components `along` and `across` it: (N,), degrees."""
     return np.asarray(np.degrees(np.arccos(np.clip(along / np.hypot(along, across), -1.0, 1.0))))

@@ -1,8 +1,9 @@
-r"""Rows of Lee & Chen 1985 on the tree (§3.1) and Tables 3 and 4 (§4), over the unprinted settings of the walker.
+r"""Rows about Lee & Chen 1985: the binary tree (§3.1), and the counts of survivors in Tables 3 and 4 (§4).
 
-The paper prints neither the walker's speed, nor its lean, nor the phase of frame 1. The survivors are counted over a
-grid of settings; a printed count is compared with the count at the setting closest to all cells, and with the counts at
-all settings.
+Lee & Chen do not print the walker's speed, its lean, and the gait phase of frame 1. A setting is one choice of these
+three values, and survivors are counted at each setting of a grid. Each printed count is compared with the counts at all
+settings, and with the count at the closest setting. At the closest setting, all counts together are most similar to the
+printed counts.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ PERCENTILES: Final = (5.0, 95.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walks:
-    """Counts of survivors of one sequence at S settings of the walker, by the paper's definitions.
+    """Counts of survivors of one sequence of Lee & Chen at S settings of the walker.
 
     Parameters
     ----------
@@ -73,11 +74,12 @@ class Walks:
     settings : array (S, 3)
         Velocity (leg lengths/s), lean (degrees), phase of frame 1 (cycles).
     levels : int array (S, 2, 3, 14)
-        Number of survivors after the physical checks, and after Rules 1 and 2 as well; by frame 1, 3, 5 and level.
+        Number of nodes at each of the 14 levels of the tree, in frames 1, 3 and 5: after the physical checks, and after
+        walking rules 1 and 2 as well.
     final : int array (S, 2)
-        Number of groups in frame 1 after Rules 1-2, and after Rules 1-5.
+        Number of groups of similar survivors in frame 1, after Rules 1 and 2, and after Rules 1 to 5.
     truth : bool array (S,)
-        Whether the input survives Rules 1-5.
+        Whether the true posture of frame 1 survives Rules 1 to 5.
     """
 
     name: str
@@ -88,7 +90,7 @@ class Walks:
 
     @property
     def cells(self) -> NDArray[np.int64]:
-        """All counts of the sequence that the paper prints, at each setting (S, 86)."""
+        """Computed counts at each setting (S, 86), in the order of the printed counts."""
         return np.concatenate([self.levels.reshape(len(self.levels), -1), self.final], axis=1)
 
     @property
@@ -100,13 +102,13 @@ class Walks:
 
     @property
     def distance(self) -> Array:
-        """Distance (S,) of each setting from the printed counts: sum of |log2(count / printed)| over all cells."""
+        """Distance (S,) of each setting from the printed counts: sum of ``|log2(count / printed)|`` over all counts."""
         # A count of zero is replaced by half a survivor, so that its logarithm is finite.
         return np.asarray(np.abs(np.log2(np.maximum(self.cells, 0.5) / self.theirs)).sum(axis=1))
 
 
 def walk_rows(effort: str = "quick") -> Iterator[Row]:
-    """Yield the rows about the tree and about §4; the effort ``fine`` uses about 16 times as many settings."""
+    """Yield the rows about the binary tree and about §4; the effort ``fine`` uses about 16 times as many settings."""
     walks = [count_walks(name, effort) for name in SEQUENCES]
     chosen = closest(effort)
     setting = walks[0].settings[chosen]
@@ -120,18 +122,18 @@ def walk_rows(effort: str = "quick") -> Iterator[Row]:
 
 
 def closest(effort: str = "quick") -> int:
-    """Return the index of the setting whose counts are closest to the printed counts of both sequences together."""
+    """Return the index of the setting with the smallest sum of distances (`Walks.distance`) over both sequences."""
     return int(np.argmin(np.sum([count_walks(name, effort).distance for name in SEQUENCES], axis=0)))
 
 
 @cache
 def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRES) -> Walks:
-    """Count the survivors of a sequence at all settings of a grid.
+    """Count the survivors of a sequence at all settings of the grid of an effort.
 
     Parameters
     ----------
     name : {"seq1", "seq2"}
-        The sequence, by its camera.
+        The sequence of Lee & Chen 1985, §4; each has its own camera position.
     effort : {"quick", "fine"}
         Key of `GRIDS`.
     tangent : float
@@ -146,7 +148,7 @@ def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRE
 def _counted(
     name: str, velocity: float, lean: float, phases: int, tangent: float
 ) -> tuple[NDArray[Any], ...]:
-    """Return settings, levels, final counts and whether the truth survives, for all phases of one walker."""
+    """Return the four arrays of `Walks` for all phases of a walker with one velocity and lean."""
     walker = Walker(velocity=velocity, lean=float(np.radians(lean)))
     cycle = walker.cycle_duration
     levels = np.zeros((phases, 2, 3, len(JOINTS)), dtype=np.int64)
@@ -171,10 +173,10 @@ def _counted(
 
 
 def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -> tuple[Trees, Array]:
-    """Grow the trees of a walker's view by the paper's method; return the trees, and the head points (F, 5, 3).
+    """Compute each frame's tree of postures by Lee & Chen's method; return the trees and head points (F, 5, 3).
 
-    Torsos are judged only by their distances, which do not distinguish a torso from its mirror image. Joint ranges are
-    ``table1-printed``.
+    The torso is checked only by distances between its joints, so that its mirror image passes, too. Joint angles are
+    checked with the ranges ``table1-printed``.
     """
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
     pose = solve_pose(TABLE_A2, image, LeeChenCamera(f=None))
@@ -193,7 +195,7 @@ def grown(view: View, tangent: float = TANGENT_METRES, *, pruned: bool = True) -
 
 @cache
 def physical_checks() -> Sequence[Check]:
-    """Return the checks of §3.2, split into parts that the tree can apply early."""
+    """Return the checks of Lee & Chen's §3.2, one for each part of the body, so that they prune the tree early."""
     distances = [RigidParts(segments=(segment,), torso=False) for segment in RIGID_SEGMENTS]
     return [*distances, *JointRange().parts, *Collision().parts]
 
@@ -204,13 +206,13 @@ def _judged(check: Check, points: Array) -> Judgement:
 
 
 def allowed(trees: Trees, head: Array, rules: Sequence[int]) -> NDArray[np.bool_]:
-    """Return whether the rules of §3.3 allow each survivor (N,), with the thresholds of ``paper-printed``."""
+    """Return whether each survivor (N,) passes Lee & Chen's walking rules (§3.3), with thresholds ``paper-printed``."""
     points = np.concatenate([trees.joints, head[trees.frame]], axis=1)
     return np.asarray(~_judged(WalkingRules(rules=tuple(rules)), points).violated.any(axis=1))
 
 
 def representatives(joints: Array) -> list[int]:
-    """Return indices of representatives of postures (N, 14, 3): each posture is near one in every joint (§3.4)."""
+    """Return indices of representatives: each posture (N, 14, 3) is within `GROUP_METRES` of one of them (§3.4)."""
     left, found = np.arange(len(joints)), []
     while len(left):
         found.append(int(left[0]))
@@ -219,7 +221,7 @@ def representatives(joints: Array) -> list[int]:
 
 
 def sequence(name: str, setting: Array) -> View:
-    """Return the five frames of a sequence at one setting of the walker."""
+    """Return the view with the five frames of a sequence at one setting (velocity, lean, phase)."""
     velocity, lean, phase = setting.tolist()
     walker = Walker(velocity=velocity, lean=float(np.radians(lean)))
     return walker_view(walker, camera=SEQUENCES[name][0], phase0=phase)
@@ -257,7 +259,7 @@ def _tree_rows(setting: Array) -> Iterator[Row]:
 
 
 def _shoulders_row(view: View) -> Row:
-    """Measure the distances of all pairs of shoulder candidates in frame 1 of SEQ2."""
+    """Count the pairs of near or far shoulders in frame 1 of SEQ2 whose distance is the known shoulder width."""
     truth, lengths = view.truth[0], printed()["lee_chen"]["lengths"]
     places = []
     for joint in (1, 2):
@@ -273,7 +275,7 @@ def _shoulders_row(view: View) -> Row:
 
 
 def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
-    """Yield a row for each level of a printed table, and for each pruning step of §4.2."""
+    """Yield a row for each tree level in Table 3 or 4, and for each pruning step of §4.2."""
     name, columns = walks.name.upper(), np.arange(2 * 3 * len(JOINTS)).reshape(6, -1)
     table = f"Table {'3' if walks.name == 'seq1' else '4'} ({name})"
     for level, joint in enumerate(JOINTS):
@@ -289,7 +291,7 @@ def _table_rows(walks: Walks, chosen: int) -> Iterator[Row]:
 
 
 def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], place: dict[str, Any]) -> Row:
-    """Compare counts at the closest setting with printed counts; a printed count that few settings reach differs."""
+    """Compare printed counts with the closest setting; the verdict is "differs" if a count is outside `PERCENTILES`."""
     theirs, cells = walks.theirs[columns], walks.cells[:, columns]
     ours = cells[chosen]
     low, high = np.percentile(cells, PERCENTILES, axis=0, method="inverted_cdf")
@@ -306,13 +308,13 @@ def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], p
 
 
 def _in_columns(values: Sequence[Any]) -> str:
-    """Return counts as text: frames 1, 3, 5 after the physical constraints, then after Rules 1 and 2."""
+    """Write counts as text: frames 1, 3, 5 after the physical checks, then frames 1, 3, 5 after Rules 1 and 2."""
     half = len(values) // 2
     return "; ".join(" / ".join(map(str, part)) for part in (values[:half], values[half:]) if len(part))
 
 
 def _remark_rows(walks: Sequence[Walks], chosen: int, effort: str) -> Iterator[Row]:
-    """Compare the remarks of §4.1.B and §4.2 with all settings."""
+    """Compare Lee & Chen's remarks in §4.1.B and §4.2 with the counts at all settings."""
     pelvis, left, wrist = JOINT["pelvis"], JOINT["left_shoulder"], JOINT["right_wrist"]
     given = printed()["lee_chen"]
     for one in walks:
@@ -351,10 +353,10 @@ def _remark_rows(walks: Sequence[Walks], chosen: int, effort: str) -> Iterator[R
 
 
 def _beyond(setting: Array) -> Array:
-    r"""Return how much (2,), metres, the elbows' rays are out of reach of the wrong shoulders in SEQ1's frame 1.
+    r"""Return how far each elbow's ray is out of reach of the wrong shoulder in SEQ1, frame 1: (2,), metres.
 
-    The elbow lies on its ray d, an upper arm l from the shoulder S; such a point does not exist if
-    :math:`|S - (S \cdot d) d| > l`.
+    The elbow is on a ray with unit direction d, at the length l of the upper arm from the shoulder S. It does not exist
+    if the distance of S from the ray, :math:`|S - (S \cdot d) d|`, exceeds l.
     """
     points, beyond = sequence("seq1", setting).truth[0], []
     for side in SIDES:
@@ -367,7 +369,7 @@ def _beyond(setting: Array) -> Array:
 
 
 def _deciding_row(name: str, setting: Array) -> Row:
-    """Apply Rules 3 to 5, one by one, to the survivors of Rules 1 and 2 in frame 1 at the closest setting."""
+    """Count the survivors of Rules 1 and 2 in frame 1 that Rule 3, Rule 4 and Rule 5 reject, at the given setting."""
     trees, head = grown(sequence(name, setting).take([0]))
     kept = allowed(trees, head, (1, 2))
     rejected = [int((kept & ~allowed(trees, head, (rule,))).sum()) for rule in (3, 4, 5)]

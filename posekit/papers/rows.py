@@ -1,4 +1,4 @@
-"""Rows that compare statements of the papers with calculations, and the page that lists them."""
+"""Rows that compare statements of the papers with posekit's calculations, and the page of all rows."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Row:
     paper : str
         Key of `PAPERS`.
     place, printed : str
-        Place in the paper, and the printed statement.
+        Section or table of the paper, and its printed statement.
     here : str
         posekit's result.
     verdict : {"agrees", "differs", "open"}
@@ -52,7 +52,7 @@ class Row:
     check : str
         Description of posekit's calculation.
     why : str
-        Reason why the result differs or the comparison is open; empty if they agree.
+        Reason why the result differs or the comparison is open; empty if the result agrees.
     """
 
     paper: str
@@ -78,7 +78,7 @@ class Rows(list[Row]):
         return f"{len(self)} rows: {agree} agree, {differ} differ, {open_} are open."
 
     def lines(self) -> list[str]:
-        """Return the lines of the page in Markdown."""
+        """Return the lines of ``papers.md``."""
         lines = ["# The two papers, row by row", "", self.counts(), ""]
         lines += [f"- *{verdict}*: {meaning}." for verdict, meaning in VERDICTS.items()]
         for paper in dict.fromkeys(one.paper for one in self):
@@ -89,7 +89,7 @@ class Rows(list[Row]):
 
 @cache
 def printed() -> dict[str, Any]:
-    """Return the printed tables of both papers, ``printed.toml``."""
+    """Return the tables printed in both papers, from ``printed.toml``."""
     return tomllib.loads(Path(__file__).with_name("printed.toml").read_text(encoding="utf-8"))
 
 
@@ -99,18 +99,18 @@ def _texts() -> dict[str, dict[str, str]]:
 
 
 def row(key: str, here: str, fits: bool | None, **names: Any) -> Row:
-    """Build a row from its texts in ``rows.toml``.
+    """Build a row from its texts in ``rows.toml`` and posekit's result.
 
     Parameters
     ----------
     key : str
-        Table of ``rows.toml``.
+        Name of the row's table in ``rows.toml``.
     here : str
         posekit's result.
     fits : bool or None
-        Whether the result agrees; None if the paper does not print a number that decides it.
+        Whether the result agrees with the statement; None if the paper prints too little to decide.
     **names
-        Values of the placeholders in braces.
+        Values of the placeholders ``{…}`` in the texts.
     """
     texts = {name: text.format(**names) for name, text in _texts()[key].items()}
     if fits:
@@ -122,7 +122,7 @@ def row(key: str, here: str, fits: bool | None, **names: Any) -> Row:
 
 
 def write_rows(folder: Path, rows: Rows, pictures: Sequence[Path] = ()) -> list[Path]:
-    """Write ``papers.md``, ``papers.html`` (with pictures of the folder) and ``papers.json``; return their paths."""
+    """Write ``papers.md``, ``papers.html`` (with `pictures`) and ``papers.json``; return their paths."""
     page = [
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>The two papers</title><style>{STYLE}</style>',
         f"<h1>The two papers, row by row</h1><p>{rows.counts()}</p><dl>",

@@ -1,4 +1,4 @@
-"""Rows of Taylor 2000 on the family of postures behind one picture, the proportions of Table 1, and §3.2's accuracy."""
+"""Rows about Taylor 2000: all postures behind one picture, the proportions of Table 1, and the accuracy (§3.2)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ SIGNS: Final = np.array(list(product((-1, 1), repeat=11)))
 
 
 def taylor_rows() -> Iterator[Row]:
-    """Yield the rows about the method, about Table 1 and about §3.2."""
+    """Yield the rows about Taylor's method, Table 1 and §3.2."""
     yield from _method_rows()
     yield from _family_rows()
     yield from _proportion_rows()
@@ -64,7 +64,7 @@ def taylor_rows() -> Iterator[Row]:
 
 
 def human(figure: Figure) -> Linkage:
-    """Return Taylor's human linkage (12 points, 11 segments, a straight spine) with the lengths of a figure, metres."""
+    """Return Taylor's human model (12 points, 11 segments, straight spine) with the lengths of a figure, metres."""
     shape, points = load_linkage("taylor_human"), figure.neutral_points
     lengths = _measured(shape, points[[JOINT[name] for name in shape.points]])
     middles = [
@@ -78,9 +78,9 @@ def human(figure: Figure) -> Linkage:
 def taylor_figure(stature: float) -> Figure:
     """Return the figure of a person with the proportions of Table 1.
 
-    Limbs and the widths of both girdles are from the table. The table does not determine the inner shape of the torso.
-    The built-in figure's shape is used, scaled sideways by the girdles, and vertically so that the path from the middle
-    of the shoulders via the pelvis to the middle of the hips has the length of the table's spine.
+    Limb lengths, shoulder width and hip width are from Table 1. Table 1 does not determine the positions of neck and
+    pelvis, so the torso is that of the built-in figure, scaled. Its width follows the shoulder and hip widths. Its
+    height is such that the path from mid-shoulder via pelvis to mid-hip has the length of Table 1's spine.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def taylor_figure(stature: float) -> Figure:
 
 
 def placed(family: LinkageFamily, s: float, signs: NDArray[Any]) -> Array:
-    """Return postures (..., P, 3) at a scale; segments that are too short for their image are parallel to the image."""
+    """Return postures (..., P, 3) at scale `s` with given signs of segment depths; a too short segment has depth 0."""
     lengths = family.linkage.lengths
     depth = np.sqrt(np.maximum(lengths**2 - (family.extent / s) ** 2, 0.0))
     nodes = (signs * depth) @ family.incidence.depth.T
@@ -122,12 +122,12 @@ def placed(family: LinkageFamily, s: float, signs: NDArray[Any]) -> Array:
 
 
 def _with_lengths(shape: Linkage, lengths: Array) -> Linkage:
-    """Return a linkage with the given lengths, metres."""
+    """Return a linkage with the points of `shape` and the given segment lengths, metres."""
     return replace(shape, lengths=lengths, unit=1.0, height=None)
 
 
 def _measured(shape: Linkage, points: Array) -> Array:
-    """Return the segment lengths (..., S) of postures (..., P, 3)."""
+    """Return the lengths (..., S) of the segments of `shape` in postures (..., P, 3)."""
     nodes, ends = shape.place_nodes(points), np.array(shape.segments)
     return np.asarray(np.linalg.norm(nodes[..., ends[:, 1], :] - nodes[..., ends[:, 0], :], axis=-1))
 
@@ -188,7 +188,7 @@ def _different(postures: Array) -> int:
 
 
 def _proportion_rows() -> Iterator[Row]:
-    """Compare Table 1 with the proportions of the figure that is made from it."""
+    """Compare Table 1 with the segment lengths of `taylor_figure`, which is made from it."""
     points = taylor_figure(STATURE).neutral_points
     for segment, given in printed()["taylor"]["lengths"].items():
         ends = [points[[JOINT[joint] for joint in joints]].mean(axis=0) for joints in given["chain"]]
@@ -200,7 +200,7 @@ def _proportion_rows() -> Iterator[Row]:
 
 
 def _accuracy_rows() -> Iterator[Row]:
-    """Measure the error of six joints as in §3.2, with the true flips and after alignment by a similarity."""
+    """Measure the errors of six joints as in §3.2, with true signs of depths and after similarity alignment."""
     figure = load_figure().scaled(stature=STATURE)
     camera = default_camera()
     rng = np.random.default_rng(0)
@@ -233,7 +233,7 @@ def _accuracy_rows() -> Iterator[Row]:
 
 
 def _by_hand(linkage: Linkage, camera: PinholeCamera, truth: Array, image: Array, scale: str) -> Array:
-    """Return the postures (F, 12, 3) of noisy pictures with the true flips."""
+    """Return postures (F, 12, 3) recovered from noisy image points, with the true signs of all segments' depths."""
     rng = np.random.default_rng(0)
     noisy = image + NOISE_PIXELS * rng.standard_normal(image.shape)
     # The image of the stature is at the mean depth of the points, with noise at both ends.

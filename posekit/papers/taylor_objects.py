@@ -1,10 +1,11 @@
-r"""Rows of Taylor 2000, Figs. 7 and 8: a closed chain and a flat chain, whose shape determines the scale (§2.1, §3.3).
+r"""Rows about Taylor 2000, Figs. 7, 8: the scale of a closed chain and of a flat chain of segments (§2.1, §3.3).
 
-The paper prints neither lengths nor postures of its objects; the lengths here are from `urdf/linkages`. Views from
-random directions are compared with the angles' sensitivity to noise. The unknowns are the points :math:`X` (units of
-length, the first at depth 0) and the scale :math:`s`; the image shows :math:`u = s\,(X_x, X_y)`. The lengths and planes
-are equations :math:`c(X) = 0`, so that only motions along :math:`N = \ker \partial c` are free. The noise of the points
-gives them the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2`, :math:`H = \partial u / \partial (X, s)`.
+Taylor prints neither segment lengths nor postures of the two chains; the lengths are those of `urdf/linkages`. The
+chains are recovered from views from random directions. The errors of their joint angles are compared with the errors
+that image noise explains (`sensitivity`). The unknowns are the point positions :math:`X`, with the first point at depth
+0, and the scale :math:`s`. The image points are :math:`u = s\,(X_x, X_y)`. Known lengths and planes are constraints
+:math:`c(X) = 0`, so that errors of :math:`(X, s)` are in :math:`N = \ker \partial c`. Image noise :math:`\sigma` gives
+:math:`(X, s)` the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2` with :math:`H = \partial u / \partial (X, s)`.
 """
 
 from __future__ import annotations
@@ -48,18 +49,18 @@ ANGLE_STEP: Final = 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Constrained:
-    """An object whose shape determines the scale, in one posture.
+    """A chain of segments in one posture, with a constraint that determines the scale of its image.
 
     Parameters
     ----------
     figure : str
-        The paper's figure.
+        Figure of Taylor 2000 that shows the object.
     constraint : {"closure", "coplanar"}
-        The constraint that fixes the scale.
+        The constraint that determines the scale: the chain is closed, or its points are in one plane.
     linkage : Linkage
         Points and lengths.
     points : array (P, 3)
-        The posture in the camera frame.
+        Positions of the points in the camera frame, in the unit of the lengths.
     """
 
     figure: str
@@ -69,18 +70,18 @@ class Constrained:
 
     @property
     def bound(self) -> float:
-        """Largest difference of an angle that the paper reports, degrees."""
+        """Largest error of a joint angle that Taylor reports for the object, degrees."""
         return float(printed()["taylor"]["angles"][self.constraint])
 
     @property
     def triples(self) -> list[tuple[int, int, int]]:
-        """Points before, at and after each joint whose angle is measured."""
+        """Indices (a, b, c) of the points before, at and after each joint whose angle is measured."""
         n = len(self.points)
         joints = range(n) if self.constraint == "closure" else range(1, n - 1)
         return [((k - 1) % n, k, (k + 1) % n) for k in joints]
 
     def random_posture(self, rng: np.random.Generator) -> Array:
-        """Return the object in a plane, folded along a random possible diagonal, or with random angles."""
+        """Draw a flat posture (P, 3): random diagonal of the closed chain, or random angles of the flat chain."""
         lengths = self.linkage.lengths
         if self.constraint == "coplanar":
             return _laid(lengths, rng.uniform(-MAX_TURN, MAX_TURN, len(lengths) - 1))
@@ -90,7 +91,7 @@ class Constrained:
         return _folded(lengths, shortest + rng.uniform(0.05, 0.95) * (longest - shortest))
 
     def recovered(self, truth: Array, s: float, image: Array) -> Array | None:
-        """Return the posture with the smallest residual for stated flips; None if no scale is a minimum."""
+        """Return the posture at the best scale, with the true signs of segment depths; None if no scale is found."""
         flips = LinkageFamily(linkage=self.linkage, image=truth[:, :2] * s).flips_of(truth)
         family = LinkageFamily(linkage=self.linkage, image=image)
         found = search(family, {self.constraint: 1.0}, flips)
@@ -111,7 +112,7 @@ def constrained_objects() -> list[Constrained]:
 
 
 def object_rows() -> Iterator[Row]:
-    """Yield the rows of Figs. 7 and 8."""
+    """Yield the rows about Figs. 7 and 8."""
     objects = constrained_objects()
     for one in objects:
         yield from _picture_rows(one)
@@ -123,7 +124,7 @@ def object_rows() -> Iterator[Row]:
 def joint_angles(points: Array, triples: Sequence[tuple[int, int, int]]) -> Array:
     """Return the angle (..., T) at b between the segments to a and c, for each triple (a, b, c), degrees.
 
-    The arc tangent of cross and dot product is accurate for parallel segments.
+    The angle is the arc tangent of cross and dot product, which is accurate for parallel segments, too.
     """
     a, b, c = np.array(triples).T
     u, v = points[..., a, :] - points[..., b, :], points[..., c, :] - points[..., b, :]
@@ -131,7 +132,7 @@ def joint_angles(points: Array, triples: Sequence[tuple[int, int, int]]) -> Arra
 
 
 def _picture_rows(one: Constrained) -> Iterator[Row]:
-    """Find all scales that satisfy the constraint, and recover pictures with noise."""
+    """Compare scales that satisfy the constraint, and joint angles from noisy images, with their true values."""
     s, rng = scale_of(one.points), np.random.default_rng(SEED)
     exact = LinkageFamily(linkage=one.linkage, image=one.points[:, :2] * s)
     found = search(exact, {one.constraint: 1.0}, exact.flips_of(one.points))
@@ -154,7 +155,7 @@ def _picture_rows(one: Constrained) -> Iterator[Row]:
 
 
 def _views_row(one: Constrained, *, posed: bool) -> Row:
-    """View an object from random directions, uniform over the sphere, in its posture or in random postures."""
+    """Recover an object from random directions, in its own posture or (`posed`) in random postures."""
     rng = np.random.default_rng(SEED)
     chances, worst = np.empty(N_VIEWS), np.full(N_VIEWS, np.inf)
     for k, quaternion in enumerate(rng.normal(size=(N_VIEWS, 4))):
@@ -178,7 +179,7 @@ def _views_row(one: Constrained, *, posed: bool) -> Row:
 
 
 def sensitivity(one: Constrained, points: Array, s: float) -> Array:
-    """Return the errors (A, M) of A angles, degrees, that M independent image errors of one pixel cause.
+    """Return the errors (A, M) of A joint angles, degrees, that M independent image errors of one pixel cause.
 
     Parameters
     ----------
@@ -231,7 +232,7 @@ def scale_of(points: Array) -> float:
 
 
 def _folded(lengths: Array, diagonal: float) -> Array:
-    """Return the four bars in a plane (4, 3), folded along their diagonal."""
+    """Return the points (4, 3) of a planar chain of four bars, whose first and third points are `diagonal` apart."""
     ab, bc, cd, da = lengths
     b = (ab**2 - bc**2 + diagonal**2) / (2 * diagonal)
     d = (da**2 - cd**2 + diagonal**2) / (2 * diagonal)
@@ -240,14 +241,14 @@ def _folded(lengths: Array, diagonal: float) -> Array:
 
 
 def _laid(lengths: Array, turns: Sequence[float] | Array) -> Array:
-    """Return the points (6, 3) of the flat chain, bent at each joint."""
+    """Return the points (6, 3) of the flat chain; `turns` are the angles between successive segments, degrees."""
     heading = np.radians(np.concatenate([[0.0], np.cumsum(turns)]))
     steps = lengths[:, None] * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1)
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
 def _turned(points: Array, *, tilt: float, spin: float) -> Array:
-    """Rotate an object in its plane and tilt the plane relative to the image, by angles in degrees."""
+    """Rotate a flat object by `spin` in its plane, and tilt the plane relative to the image by `tilt`, degrees."""
     x, z = np.radians([tilt, spin])
     tilted = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
     spun = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])

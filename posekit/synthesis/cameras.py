@@ -34,7 +34,7 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
         Optical centre and a point on the optical axis, world frame.
     up : array (3,)
         World direction that points up in the image, i.e. along -y of OpenCV's camera frame. If the camera looks along
-        `up`, the world axis farthest from the line of sight is used instead.
+        `up`, the world axis with the largest angle to the optical axis replaces `up`.
 
     Returns
     -------
@@ -85,10 +85,10 @@ def place_cameras(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> tuple[Array, Array]:
-    """Draw a camera for each of N bodies until its points are in front of it and inside the picture.
+    """Draw a random camera for each of N bodies, such that the whole body is in front of it and inside the picture.
 
-    Directions are uniform on the sphere (Muller 1959: normalised Gaussians), and distances are uniform in their range.
-    The upright camera looks at the middle of the body's bounding box.
+    Directions from body to camera are uniform on the sphere (Muller 1959), and distances are uniform in `distance`.
+    Each camera is upright and looks at the middle of the body's bounding box.
 
     Parameters
     ----------
@@ -112,12 +112,12 @@ def place_cameras(
     Raises
     ------
     InputError
-        If the distances are impossible, or a body is inside none of `MAX_DRAWS` drawn pictures.
+        If the distances are impossible, or if after `MAX_DRAWS` draws a body is still outside its picture.
     """
     camera = camera or default_camera()
     near, far = distance
     if not 0 < near <= far < np.inf:
-        raise refusal("", "distance", f"{near:g} to {far:g} m", "positive, the nearer first")
+        raise refusal("", "distance", f"{near:g} to {far:g} m", "two positive distances, the smaller first")
     middle = middle_of(points)
     R, position = np.empty((len(points), 3, 3)), np.empty((len(points), 3))
     rows: Ints = np.arange(len(points))

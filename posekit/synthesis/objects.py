@@ -1,4 +1,4 @@
-"""Views of articulated objects: random configurations of a robot in a scaled orthographic camera."""
+"""Synthetic views of robots: random configurations, projected by a scaled orthographic camera."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Arr
     Parameters
     ----------
     robot : Robot
-        The robot. Angles are drawn from at most one full turn, also for joints without limits.
+        The robot. Angles are uniform within the joint limits; ranges without limits, or of more than one full turn, are
+        one full turn.
     n : int
         Number of configurations.
     rng : Generator
@@ -103,7 +104,7 @@ def object_view(
 def object_document(
     points: Sequence[str], image: Array, truth: Array, *, scale: float | None = None
 ) -> dict[str, Any]:
-    """Return the document of an object's view, schema ``posekit.view/1``: metres and pixels.
+    """Return the JSON content of a view of an articulated object (schema ``posekit.view/1``), in metres and pixels.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def object_document(
     image, truth : array (F, P, 2) and (F, P, 3)
         Image points, pixels, and true positions, camera frame, metres.
     scale : float, optional
-        Pixels per metre; not stated if None.
+        Pixels per metre; None if the view does not state the scale.
     """
     frames = [
         {

@@ -1,4 +1,4 @@
-"""Views with true joints: of a walker, of random valid postures, of motion capture, and the built-in views.
+"""Synthetic views with true joints: of a walker, of random valid postures, of motion capture; built-in views.
 
 Each function returns a `posekit.cameras.View` whose `truth` has the true joints in the camera frame.
 """
@@ -80,8 +80,9 @@ def view_of(
 ) -> View:
     """Project a figure's points without noise, and return the view with the true joints.
 
-    The view states lengths and head points that differ from the built-in figure's. The root is the neck in frames in
-    which a head point is unknown. For a Lee-Chen camera, the view has an unknown f and the file unit cm.
+    The view has the segment lengths and head points that differ from those of the built-in figure. It has the neck
+    position in frames in which a head point is unknown. A view by a Lee-Chen camera does not have f, and its file is in
+    cm.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def view_of(
 
 
 def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
-    """Add Gaussian noise to every image point; the view states the standard deviation if it is in pixels.
+    """Add Gaussian noise to every image point; if `sigma` is in pixels, it is also the `deviation` of the new view.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ def with_noise(view: View, sigma: float, rng: np.random.Generator) -> View:
 
 
 def forget_camera(view: View) -> View:
-    """Return the same image points with an unknown camera, which is scaled orthographic and has no scale."""
+    """Replace the camera of a view by a scaled orthographic camera of unknown scale."""
     names = ("time", "image", "truth", "lengths", "shoulders", "stature", "unit", "deviation")
     known = {name: getattr(view, name) for name in names}
     return View(camera=ScaledOrthographicCamera(scale=None), **known)
@@ -180,15 +181,15 @@ def walker_view(
     phase0: float = 0.0,
     carried: bool = True,
 ) -> View:
-    """Project a walker into the camera of Lee & Chen 1985.
+    """Project a walking figure by the camera model of Lee & Chen 1985.
 
     Parameters
     ----------
     walker : Walker
         The person and the gait.
     camera : array (3,)
-        Camera position by the paper's definition: origin of the image plane, head-centred frame (x forward, y up, z
-        right), metres. The optical centre is f behind it.
+        Camera position by Lee & Chen's definition: origin of the image plane, head-centred frame (x forward, y up, z
+        right), metres. The optical centre is at the distance f behind this origin.
     target : array (3,)
         Point on the optical axis, head-centred frame, metres.
     f : float
@@ -200,8 +201,8 @@ def walker_view(
     phase0 : float
         Phase of the first frame, cycles; at 0 the right foot strikes.
     carried : bool
-        Whether the camera moves with the walker's head, as in the paper and as on a treadmill. Otherwise the camera is
-        static, and the walker starts with the head at the position of Table A.2.
+        Whether the camera moves with the walker's head, as in Lee & Chen 1985. If False, the camera is static, and the
+        walker's head is at the position of Lee & Chen's Table A.2 in the first frame.
 
     Raises
     ------
@@ -239,7 +240,8 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator, ranges: st
     rng : Generator
         The same seed gives the same postures.
     ranges : str
-        Joint ranges of the check, besides the figure's limits; ``urdf`` adds none.
+        Joint ranges of the joint range check, in addition to the figure's limits; ``urdf`` selects the figure's limits
+        only.
 
     Raises
     ------
@@ -286,7 +288,7 @@ def random_views(
     distance: tuple[float, float] = DISTANCE_RANGE,
     ranges: str = "anatomical",
 ) -> View:
-    """Draw random valid postures, each seen by another random camera; the frames are independent.
+    """Draw random valid postures, each projected by its own random camera; successive frames are unrelated.
 
     Parameters
     ----------
@@ -323,7 +325,7 @@ def mocap_view(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> View:
-    """Project one clip into one static camera; the view has the person's median segment lengths in the chosen frames.
+    """Project one clip by one static camera; the view has the person's median segment lengths in these frames.
 
     Parameters
     ----------
@@ -335,7 +337,7 @@ def mocap_view(
         Name of the clip; by default the first clip.
     frames : int, optional
         Number of frames, chosen among frames with a known neck: every `dt` from the first frame, or evenly over the
-        clip without `dt`. By default, and for shorter clips, all frames.
+        clip without `dt`. By default, and if the clip has fewer frames, all frames are used.
     dt : float, optional
         Seconds between frames, rounded to a whole number of the clip's frames.
     position : array (3,), optional
@@ -348,7 +350,7 @@ def mocap_view(
     InputError
         If the clip does not exist or has no frame, the up axis is unknown, or the person does not fit into the picture.
     FigureError
-        If no possible torso or hips have lengths near the medians.
+        If no rigid torso or hips have distances near the person's medians.
     """
     camera, up = camera or default_camera(), motion.up_vector
     if up is None:
@@ -381,18 +383,19 @@ def mocap_views(
     camera: PinholeCamera | None = None,
     distance: tuple[float, float] = DISTANCE_RANGE,
 ) -> tuple[View, ...]:
-    """Choose n frames evenly over all clips, each seen by another random camera; return one named view per clip.
+    """Choose n frames evenly over all clips, project each by its own random camera; return one view per clip.
 
     Parameters
     ----------
     motion : Motion
         Motion capture of one or several clips, with a known up axis.
     n : int
-        Number of frames with all 14 joints. Clips have equal numbers of frames; a shorter clip has all of its frames.
+        Number of frames with all 14 joints. Equally many frames are chosen in each clip; of a shorter clip, all frames
+        are used.
     rng : Generator
         Draws the cameras.
     camera, distance
-        See `place_cameras`. The person has the median lengths of each clip.
+        See `place_cameras`. The view of a clip has the person's median segment lengths in this clip.
 
     Raises
     ------
@@ -427,19 +430,19 @@ def _clip_index(motion: Motion, name: str) -> int:
 
 
 def _frames_of(motion: Motion, clip: int, names: Sequence[str]) -> Ints:
-    """Return the rows of a clip in which the named joints are known."""
+    """Return the frames of a clip (row indices of `motion`) in which the named joints are known."""
     known = np.isfinite(motion.points(names)).all(axis=(1, 2)) & (motion.clip == clip)
     return np.flatnonzero(known)
 
 
 def _seconds(motion: Motion, rows: Ints) -> Array:
-    """Return the times (F,) of rows, seconds; frame numbers if the motion has no times."""
+    """Return the times (F,) of frames, seconds; frame numbers if the motion has no times."""
     time, frame = np.asarray(motion.time)[rows], np.asarray(motion.frame)[rows]
     return np.asarray(time if np.isfinite(time).all() else frame, dtype=np.float64)
 
 
 def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -> Ints:
-    """Choose rows of a clip: every dt from the first row, or evenly from the first to the last row."""
+    """Choose frames of a clip: every `dt` seconds from the first frame, or evenly from the first to the last frame."""
     if len(known) == 0:
         raise refusal(motion.source or "motion", "clip", "no frame with a neck", "one", "choose another clip")
     if (frames is not None and frames < 1) or (dt is not None and not 0 < dt < np.inf):
@@ -455,7 +458,7 @@ def _spread(motion: Motion, known: Ints, frames: int | None, dt: float | None) -
 
 
 def _shares(n: int, available: Sequence[int]) -> list[int]:
-    """Distribute n frames evenly over clips, at most as many as each clip has."""
+    """Distribute n frames evenly over clips; each clip gets at most the number of its `available` frames."""
     shares, left = [0] * len(available), n
     while left > 0:
         open_clips = [k for k, have in enumerate(available) if shares[k] < have]

@@ -1,15 +1,16 @@
-r"""A walking figure: the gait of Boulic, Thalmann & Thalmann 1990 (*The Visual Computer* 6:344-358) on the figure.
+r"""A walking figure, with the gait model of Boulic, Thalmann & Thalmann 1990 (*The Visual Computer* 6:344-358).
 
-The posture is a function of the relative velocity v (leg lengths per second) and the phase t of the cycle. At t = 0 the
-right foot strikes; the left side is half a cycle later.
+The posture is a function of the velocity v (leg lengths per second) and the phase t of the gait cycle. At t = 0 the
+right foot touches the ground; the left foot follows at t = 0.5.
 
 Coordinates are in the head-centred frame of Lee & Chen 1985: x is the direction of walking, y is up, z is to the
-walker's right, and the head is at the coordinates of their Table A.2. The frame moves with the walker, as on a
-treadmill. The head stays upright and faces forward, so its points do not move.
+walker's right, and the head is at the coordinates of their Table A.2. This coordinate frame moves with the walker, as
+on a treadmill. The head stays upright and faces forward, so the head points do not move in this frame.
 
-The gait model does not determine all angles; the others are chosen here. The hips stay level, and the back leans
-relative to them. The torso rotates by the opposite of the hips' angle, and the neck compensates both rotations. Arms
-swing in a plane of the torso and legs in a plane of the hips, without abduction and axial rotation.
+The gait model does not determine all joint angles; posekit chooses the others as follows. The line between the hips
+stays level, and the back leans relative to the hips. About the vertical axis, the torso rotates opposite to the hips.
+The neck compensates the rotation and the lean of the torso. Arms swing in the sagittal plane of the torso, and legs in
+that of the hips, without abduction and axial rotation.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ class Walker:
 
     @property
     def cycle_duration(self) -> float:
-        """Duration of one cycle of two steps, seconds; a cycle is 1.346 sqrt(v) leg lengths long."""
+        """Duration of one gait cycle (two steps), seconds; in one cycle, the walker moves 1.346 sqrt(v) leg lengths."""
         return 1.346 * math.sqrt(self.velocity) / self.velocity
 
     @property
@@ -93,7 +94,7 @@ class Walker:
         return sum(lengths[f"{s}_hip-{s}_knee"] + lengths[f"{s}_knee-{s}_ankle"] for s in SIDES) / 2
 
     def phase(self, time: ArrayLike, phase0: float = 0.0) -> Array:
-        """Return the phases, cycles, at times in seconds; `phase0` is the phase at time 0."""
+        """Return the gait phases at given times in seconds; `phase0` is the phase at time 0; a cycle is 1."""
         return phase0 + np.asarray(time, dtype=np.float64) / self.cycle_duration
 
     def flexion(self, phase: ArrayLike) -> dict[str, Array]:
@@ -120,7 +121,7 @@ class Walker:
         """
         phases = np.asarray(phase, dtype=np.float64)
         if phases.ndim != 1 or not np.isfinite(phases).all():
-            raise refusal("", "phase", f"shape {phases.shape}", "finite phases (N,)", "give one a frame")
+            raise refusal("", "phase", f"shape {phases.shape}", "finite phases (N,)", "give one per frame")
         torsion = self._torsion(phases)
         # The torso rotates opposite to the hips, so that shoulders and hips swing in opposition.
         R_torso = R_HEAD_REP103 @ self._torso(phases)
@@ -141,14 +142,15 @@ class Walker:
     def travel(self, time: ArrayLike, phase0: float = 0.0) -> Array:
         """Return the displacement of the neck over the ground since time 0.
 
-        The pelvis follows the gait model's root; the lean of the torso moves the neck relative to the pelvis.
+        The pelvis moves like the root of the gait model, and the lean of the torso moves the neck relative to the
+        pelvis.
 
         Parameters
         ----------
         time : array (N,)
             Times, seconds.
         phase0 : float
-            Phase at time 0, cycles.
+            Gait phase at time 0, cycles.
 
         Returns
         -------
@@ -167,14 +169,14 @@ class Walker:
         return np.asarray(place[1:] - place[0])
 
     def _torsion(self, phase: Array) -> Array:
-        """Return the rotation of the hips to the left, radians; a positive rotation moves the right hip forward.
+        """Return the rotation of the hips about the vertical axis, radians; positive if the right hip moves forward.
 
-        The angle in the paper has the opposite sign; here the hip of the leading leg moves forward.
+        The sign is opposite to the sign in Boulic et al., so that the hip of the leading leg moves forward.
         """
         return np.asarray(np.radians(4 * self.velocity * np.cos(2 * np.pi * phase)))
 
     def _torso(self, phase: Array) -> Array:
-        """Return rotations of the torso (N, 3, 3) in the URDF's axes; the back flexes opposite to the pelvis tilt."""
+        """Return rotation matrices of the torso (N, 3, 3), in axes x forward, y left, z up."""
         tilt = np.radians(2 - 2 * _wave(2 * phase - 0.1))
         return coordinate_rotation(2, -self._torsion(phase)) @ coordinate_rotation(1, tilt + self.lean)
 
