@@ -66,7 +66,7 @@ def overlaid(
     Raises
     ------
     InputError
-        If the view or its pictures are missing, or if their numbers differ.
+        If the view or its pictures are missing, or if the numbers of frames and pictures differ.
     """
     view = source if isinstance(source, View) else view
     if isinstance(source, Report):
@@ -202,7 +202,7 @@ def _matched(path: Path, view: View) -> tuple[list[int], Any]:
         if count != len(view) and rate:
             numbers = np.rint((view.time - min(float(view.time[0]), 0.0)) * rate).astype(int).tolist()
         if max(numbers) >= count or len(set(numbers)) < len(numbers):
-            expected = f"{len(view)}, one a frame"
+            expected = f"{len(view)}, one per frame"
             raise refusal(path, "", f"{count} pictures", expected, "state the film of the view")
         return numbers, lambda wanted: _film(path, wanted)
     given = path.iterdir() if path.is_dir() else [path]
@@ -214,7 +214,7 @@ def _matched(path: Path, view: View) -> tuple[list[int], Any]:
     if len(files) == 1:
         numbers = [0] * len(view)
     elif max(numbers) >= len(files):
-        expected = f"{len(view)}, one a frame"
+        expected = f"{len(view)}, one per frame"
         raise refusal(path, "", f"{len(files)} pictures", expected, "state the pictures of the view")
     return numbers, lambda wanted: (_photograph(files[number]) for number in wanted)
 

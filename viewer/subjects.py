@@ -257,7 +257,7 @@ def frame_with_postures(recovery: Recovery, frame: int | tuple[int, int] | None)
     Raises
     ------
     InputError
-        If no frame, or not the requested frame, has a posture.
+        If no frame has a posture, or if the requested frame has none.
     """
     counts, source = (
         np.bincount(recovery.survivors.frame, minlength=len(recovery)),
@@ -278,7 +278,7 @@ def chosen_rows(recovery: Recovery, number: int, which: str) -> NDArray[np.intp]
     Raises
     ------
     InputError
-        If there are no such postures.
+        If `which` names a survivor that the frame does not have.
     """
     rows = np.arange(recovery.rows(number).start, recovery.rows(number).stop)
     if which == "":
@@ -327,7 +327,7 @@ def beside(robot: Robot, q: Array, R: Array, labels: Sequence[str]) -> list[Subj
 
 
 def as_motion(source: Any) -> Any:
-    """Return the true joints of a view, or a robot's neutral configuration, as a motion; other objects unchanged."""
+    """Return a view's true joints, or a robot's neutral configuration, as a motion; return other objects unchanged."""
     if isinstance(source, Robot):
         return Motion(q=source.neutral[None], q_names=source.configuration_names, robot=source.source)
     if isinstance(source, View):

@@ -75,7 +75,7 @@ def page_data(
     Returns
     -------
     dict
-        Lists, numbers and text. ``packed`` holds arrays as base64; points are integer multiples of ``step`` metres,
+        Data as lists, numbers, text. ``packed`` has arrays as base64; points are integer multiples of ``step`` metres,
         relative to the ``origin`` of their frame.
     """
     if isinstance(source, Recovery):
@@ -87,7 +87,7 @@ def page_data(
         count = sum(len(one) for one in motions)
         if motions and count != len(source):
             raise refusal(
-                "render", "view", f"{count} frames", f"{len(source)} as in the report", "state its motions"
+                "render", "view", f"{count} frames", f"{len(source)} as in the report", "give its motions"
             )
         return _of_motions(motions, source, title, urdf)
     motion = source.take(drawn.frame_rows(len(source), frame, source.source))
