@@ -1,4 +1,4 @@
-"""Contradictions between a calibration and its pictures: another size, or people who are not upright."""
+"""Contradictions between a calibration and its pictures: a different picture size, or people who are not upright."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] |
 def contradictions(camera: CameraModel, points: Array) -> list[str]:
     """List contradictions: a person who is not upright according to the calibration, or is upside down in the picture.
 
-    The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. The two
-    directions differ if the calibration maps camera to world, has y up in the camera, or states another up axis.
+    The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. Usual
+    causes of a difference are a rotation from camera to world instead of world to camera, a camera axis y that points
+    up, and a wrong up axis.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ class Detections(Record):
         if other := set(self.names) - {*POINTS, *FEET_POINTS}:
             raise refusal(self.source, "names", shown(min(other)), "names of joints, head or feet points")
         if (np.diff(self.frame, prepend=0) < 0).any():
-            raise refusal(self.source, "frame", "unsorted numbers", "ascending ones from 0", "sort the rows")
+            raise refusal(self.source, "frame", "unsorted numbers", "ascending numbers from 0", "sort the rows")
         if self.pictures and count and self.frame[-1] >= len(self.pictures):
             got = f"{len(self.pictures)} names and picture {self.frame[-1]}"
             raise refusal(self.source, "pictures", got, "a name for every picture")
@@ -131,9 +131,9 @@ class Detections(Record):
         return len(self.frame)
 
     def people(self) -> Ints:
-        """Return the number of the person in each row (N,): the file's, or that of `posekit.following.tracking`.
+        """Return the number of the person in each row (N,): from the file, or found by `posekit.following.tracking`.
 
-        In unrelated photographs each row counts as a different person.
+        If the pictures are not a film, each row counts as a different person.
         """
         person = np.array(self.person)
         unknown = np.flatnonzero(person < 0)
@@ -152,8 +152,8 @@ class Detections(Record):
         which : int or str
             Number of a person (see `people`), or a rule: ``largest``, the default, is the person with the largest size
             in the pictures, summed over pictures; ``surest`` is the person with the largest sum of confidences;
-            ``first`` is the first person in the first picture. In unrelated photographs, the rule is applied to each
-            picture.
+            ``first`` is the first person in the first picture. If the pictures are not a film, the rule is applied to
+            each picture separately.
         camera : str
             Name of the camera; the number in it selects the camera in a file of several cameras.
 
@@ -205,8 +205,8 @@ class Detections(Record):
     ) -> View:
         """Make the view of one person.
 
-        A contradiction between the person and the calibration causes a warning. Points outside the picture with little
-        confidence count as not seen.
+        A contradiction between the person and the calibration causes a warning. A point outside the picture counts as
+        unseen if its confidence is below 0.3.
 
         Parameters
         ----------
@@ -228,9 +228,8 @@ class Detections(Record):
         Returns
         -------
         View
-            For a film it has a frame for every picture, also for pictures without the person, so that numbers and times
-            are the film's. For unrelated photographs it has a frame for each photograph that shows any joint of the
-            person.
+            The view of a film has a frame for every picture, including pictures without the person. The view of
+            unrelated photographs has a frame for each photograph that shows a joint of the person.
 
         Raises
         ------
@@ -289,7 +288,7 @@ class Detections(Record):
         )
 
     def _in_order(self, values: Array) -> Array:
-        """Reorder values (N, P, ...) to joints and head points (N, 19, ...); NaN for points that the layout lacks."""
+        """Reorder values (N, P, ...) to joints and head points (N, 19, ...); NaN for points without a value."""
         found = np.full((len(values), len(POINTS), *values.shape[2:]), np.nan)
         place = {name: k for k, name in enumerate(self.names)}
         have = [k for k, name in enumerate(POINTS) if name in place]

@@ -1,8 +1,9 @@
 """Kalman filter of joints with random acceleration (Kalman 1960), and the smoother of the filter.
 
-A joint's state is its position and velocity. Its acceleration is white noise of spectral density q, and its position is
-measured with a covariance (R. E. Kalman 1960, J. Basic Eng. 82:35-45, eqs. 21 to 25). The smoother passes backward over
-the filtered frames (Rauch, Tung & Striebel 1965, AIAA J. 3:1445). Skipped frames are interpolated.
+The state of a joint is its position and velocity, and the acceleration is white noise of spectral density q. The filter
+applies eqs. 21 to 25 of Kalman (1960, Journal of Basic Engineering 82:35-45) to each measured position and its
+covariance. The smoother passes backward over the filtered frames (Rauch, Tung & Striebel 1965, AIAA Journal 3:1445) and
+interpolates skipped frames.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ UNKNOWN: Final = 1e4
 
 
 class Moving(NamedTuple):
-    """The joints of S bodies in motion.
+    """States of a Kalman filter for the joints of S bodies.
 
     Attributes
     ----------
@@ -88,7 +89,7 @@ class Moving(NamedTuple):
 
 
 def steps(seconds: float) -> tuple[Array, Array]:
-    """Return the transition matrix over a time in seconds, and the covariance that noise of unit density adds."""
+    """Return the transition matrix over a time in seconds, and the process noise for a spectral density of one."""
     one, t = np.eye(3), seconds
     noise = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
     return np.kron(np.array([[1.0, t], [0.0, 1.0]]), one), np.kron(noise, one)

@@ -49,7 +49,7 @@ def answers(stream: IO[bytes], tracker: Tracker, *, keep_going: bool = False) ->
 
 
 def _picture(where: str, line: bytes, names: tuple[str, ...]) -> tuple[float, Array, Any]:
-    """Read the time, points (K, 3) and root of a line."""
+    """Read the time, the points (K, 3) and the neck position of a line."""
     try:
         document = json.loads(line)
         time, given = float(document["time"]), document["points"]

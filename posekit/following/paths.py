@@ -1,11 +1,12 @@
-"""Most probable paths of one person through the frames of a sequence. A path contains one survivor of each frame.
+"""Most probable paths of one person through the frames of a sequence. A path has at most one survivor per frame.
 
-Each path has a state: position and velocity of the body in the last frame. A path is extended by every survivor of the
-next frame, and once by skipping that frame. While there are few paths, all are kept, and the cheapest path is the exact
-minimum. If several paths end in the same survivor, only the cheapest is continued: Viterbi's algorithm (Forney 1973,
-Proc. IEEE 61:268-278) with a filter for each survivor (Raheli, Polydoros & Tzou 1995, IEEE Trans. Commun. 43:354-364).
-Sums over all paths give the probability of each survivor given all frames (Rabiner 1989, Proc. IEEE 77:257-286, eqs. 18
-to 27).
+A Kalman filter predicts position and velocity of the joints on each path. The cost of a path is minus its
+log-likelihood, plus penalties for skipped frames and unknown joints. A path is extended by every survivor of the next
+frame, and once by skipping that frame. If at most 64 paths have a cost near the lowest cost, all of them are kept.
+Otherwise, only the cheapest paths to each survivor are kept, as in Viterbi's algorithm (Forney 1973, Proceedings of the
+IEEE 61:268-278). Each kept path has its own filter (Raheli, Polydoros & Tzou 1995, IEEE Transactions on Communications
+43:354-364). The forward-backward algorithm gives the probability of each survivor given all frames (Rabiner 1989,
+Proceedings of the IEEE 77:257-286, eqs. 18 to 27).
 """
 
 from __future__ import annotations
@@ -96,14 +97,14 @@ class Candidates(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """The S ends of paths after a frame; the paths come from P ends after the frame before.
+    """The S ends of all paths in one frame, and the steps to them from the P ends in the previous frame.
 
     Attributes
     ----------
     survivor : int array (S,)
         Survivor at each end; -1 if the frame is skipped.
     cost : array (P, S)
-        Cost of every step, including the survivor's own; infinite if the step is impossible.
+        Cost of each step plus the cost of the survivor that it leads to; infinite if the step is impossible.
     forward : array (S,)
         Logarithm of the summed likelihoods of all paths to each end, up to a constant.
     """
@@ -114,7 +115,7 @@ class Stage(NamedTuple):
 
 
 class Trellis:
-    """All paths through the frames so far.
+    """All paths through the frames that `push` has added.
 
     Attributes
     ----------
@@ -164,7 +165,7 @@ class Trellis:
         at : int
             A frame.
         among : bool array (S,), optional
-            Ends of that frame through which paths may pass; all by default.
+            Whether paths may pass through each end of this frame; by default all ends are allowed.
         """
         forward = [stage.forward for stage in self.stages]
         if among is not None:
@@ -183,16 +184,17 @@ class Trellis:
 
 
 def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> Array:
-    r"""Return the costs (S, N) of steps from S ends to N survivors; infinite beyond `MAX_SPEED`.
+    r"""Return the costs (S, N) of steps from S path ends to N survivors; infinite if faster than `MAX_SPEED`.
 
-    A step costs minus the log-likelihood of the joints' distances x from their predicted positions, under a Student
-    distribution (Lange, Little & Taylor 1989, J. Am. Stat. Assoc. 84:881-896),
+    The cost of a step is minus the log-likelihood of the joints' offsets x from their predicted positions, under a
+    Student t distribution (Lange, Little & Taylor 1989, JASA 84:881-896):
 
     .. math:: \sum_j \tfrac{\nu + 3}{2} \log\left(1 + \tfrac{1}{\nu} x_j^T S_j^{-1} x_j\right)
               + \tfrac12 \log\frac{|S_j|}{\sigma_j^6}, \qquad S_j = P_j + R_j,
 
-    with the filter's covariance P, the survivor's covariance R, and :math:`\sigma_j^2` the variance that random
-    acceleration adds to P. A joint at its predicted position costs nothing if its previous position was exact.
+    Here :math:`\nu` is `NU`, P is the filter's covariance of the predicted position, and R is the covariance of the
+    survivor's joint. Random acceleration adds the variance :math:`\sigma_j^2` to P. A joint at its predicted position
+    costs nothing if its previous position was exact.
 
     Parameters
     ----------
@@ -224,9 +226,10 @@ def step_costs(ends: Moving, led: Moving, joints: Array, covariance: Array) -> A
 def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
     """Follow the person through the frames of a recovery.
 
-    The first path is the expected posture of each frame given all frames, smoothed and moved to the nearest posture
-    with the person's lengths. Each further path is the most probable path that passes, in one frame, through a survivor
-    with a joint at least 25 cm from all earlier paths. In an uncalibrated view, positions are relative to the neck.
+    The first path consists of the expected posture of each frame, given all frames. The path is smoothed, and each
+    posture is moved to the nearest posture with the person's segment lengths. Each further path passes through the most
+    probable survivor that has a joint more than 25 cm from all earlier paths. In an uncalibrated view, positions are
+    relative to the neck.
 
     Parameters
     ----------
@@ -279,7 +282,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
 
 
 def candidates(recovery: Recovery, k: int) -> Candidates:
-    """Return the survivors of a frame as candidates of paths: a joint's noise is mostly along its ray."""
+    """Return the survivors of frame k as candidates of paths, with covariances that are largest along the rays."""
     rows = recovery.rows(k)
     table = recovery.survivors
     joints, radius = table.joints[rows], np.asarray(table.radius)[rows]
@@ -296,12 +299,12 @@ def candidates(recovery: Recovery, k: int) -> Candidates:
 
 
 def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> tuple[int, Array, Array]:
-    """Return the survivor nearest to the expected posture, that posture, and its covariance.
+    """Return the survivor nearest to the expected posture, the expected posture, and its covariance.
 
     The expected posture is the mean of all survivors, weighted by their probabilities given all frames; it has the
-    least expected squared error. Its covariance is the mean covariance of the survivors plus their scatter. For exact
-    survivors, the survivor nearest to the mean is returned as the posture. If the path more probably skips the frame,
-    the survivor is -1 and the posture NaN.
+    least expected squared error. Its covariance is the mean covariance of the survivors plus the covariance of their
+    positions about the mean. If the survivors are exact, the nearest survivor is returned instead of the mean. If the
+    frame is skipped with a probability of at least one half, the survivor is -1 and the posture NaN.
     """
     rows = np.flatnonzero(at >= 0)
     weight, at = share[rows], at[rows]
@@ -324,7 +327,7 @@ def expected_posture(frame: Candidates, at: NDArray[np.intp], share: Array) -> t
 
 
 def _likeliest(own: Array) -> NDArray[np.intp]:
-    """Choose the cheapest survivors with a total probability of `COVERAGE`, including ties; at most `MAX_SURVIVORS`."""
+    """Choose the most probable survivors, up to a total probability of `COVERAGE`; at most `MAX_SURVIVORS`."""
     order = np.argsort(own, kind="stable")
     order = order[np.isfinite(own[order])]
     if not len(order):
@@ -336,7 +339,7 @@ def _likeliest(own: Array) -> NDArray[np.intp]:
 
 
 def _kept(total: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Choose the steps (S, N + 1) to keep: return the start and target of each, and the number of its new end."""
+    """Choose the steps to keep by the total costs (S, N + 1) of the paths that they extend."""
     near = total <= total.min() + SLACK
     most = max(1, WIDTH // total.shape[1]) if near.sum() > WIDTH else len(total)
     masked = np.where(near, total, np.inf)
@@ -381,7 +384,7 @@ def _elsewhere(
     marginals: Sequence[Array],
     found: Sequence[Array],
 ) -> tuple[int, NDArray[np.bool_], float] | None:
-    """Find the frame, and the ends in it, that are most probable among all ends far from the paths found so far."""
+    """Find the most probable survivors of one frame that are far from all paths in `found`."""
     best, at = LEAST_SHARE, -1
     places: list[Array] = []
     away: list[NDArray[np.bool_]] = []

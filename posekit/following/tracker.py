@@ -1,4 +1,4 @@
-"""`Tracker`: takes the key points picture by picture, and returns its posture and an earlier posture of the path."""
+"""`Tracker`: recovers the posture in each picture as its key points arrive, and the path of the person with a delay."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class TrackedPosture(Record):
     reason : str
         Reason why the picture has no posture; empty if it has one.
     path : PathPosture, optional
-        The picture `lag` before this one; None for the first `lag` pictures.
+        Posture on the path, `lag` pictures before this picture; None for the first `lag` pictures.
     recovery : Recovery, optional
         Every survivor of the picture.
     """
@@ -90,7 +90,7 @@ class TrackedPosture(Record):
 class Tracker:
     """Recovers the posture in one picture per call, and follows the person from picture to picture.
 
-    `posekit.recover` finds the postures of each picture alone; only the path uses earlier pictures.
+    The survivors of a picture depend on this picture alone; the path also depends on the pictures before and after it.
 
     Parameters
     ----------
@@ -107,8 +107,8 @@ class Tracker:
     deviation : float or str, optional
         Standard deviation of each coordinate of the points, pixels; 5 by default.
     layout : str or Layout, optional
-        Meaning of the points: name or file of a layout, as ``coco_17``. By default the 14 joints in tree order,
-        or these and the head's five points.
+        Meaning of the points: name or file of a layout, as ``coco_17``. By default the 14 joints in tree order, alone
+        or followed by nose, eyes and ears.
     lag : int
         Number of pictures that the path looks ahead.
 
@@ -213,7 +213,7 @@ class Tracker:
         return [self._oldest() for _ in range(len(self._waiting))]
 
     def _oldest(self) -> PathPosture:
-        """Remove the oldest picture from the window, and return it with its posture on the path."""
+        """Remove the oldest stored picture, and return it with its posture on the path."""
         number, frame = self._waiting.popleft()
         share = self._trellis.marginals()[0]
         _, joints, _ = expected_posture(frame, self._trellis.stages[0].survivor, share)

@@ -1,14 +1,14 @@
 r"""Tracking: find the detections in successive pictures that show the same person.
 
-Detections are compared by COCO's object keypoint similarity with a larger deviation for motion:
+The similarity of two detections a and b is COCO's object keypoint similarity with an additional variance for motion:
 
 .. math:: s(a, b) = \frac1n \sum_i \exp\left(-\frac{d_i^2}{2 A (k_i^2 + m^2 g^2)}\right)
 
-over the n points that both have, with d_i their distance in the picture, A the person's area, k_i twice COCO's standard
-deviation of the point (cocodataset.org, "Keypoint Evaluation", 1.2; numbers as in pycocotools,
-``cocoeval.Params.setKpParams``), and m the allowed motion per picture for detections g pictures apart. Xiao, Wu & Wei
-2018 (Simple baselines for human pose estimation and tracking, §3) match the poses of successive pictures by this
-similarity.
+The sum covers the n points that both detections have; d_i is the distance of point i between a and b in the picture. A
+is the person's area, and k_i is twice COCO's standard deviation of the point (``cocoeval.Params.setKpParams`` of
+pycocotools). The detections are g pictures apart, and m is the allowed motion per picture (`MOTION_SIGMA` if the
+velocity is known). Xiao, Wu & Wei 2018 (Simple baselines for human pose estimation and tracking, §3) match the poses of
+successive pictures by object keypoint similarity.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ VIDEO_RATE: Final = 30.0
 def track(points: Array, frame: Ints, source: str = "", times: Array | None = None) -> Ints:
     """Give each person in the pictures of a film one number for all pictures.
 
-    Each detection is compared with the predicted positions of the people of earlier pictures (the last position, moved
-    by the last velocity). The assignment with the largest sum of similarities is used. If every picture has one
-    detection and it moves farther than people do in a video, all detections are one person.
+    Each detection is compared with the predicted points of each person: the last known points, moved by the last
+    velocity. Detections are assigned to people so that the sum of similarities is largest. If every picture has one
+    detection, but it moves too far between pictures for a video, all detections count as one person.
 
     Parameters
     ----------

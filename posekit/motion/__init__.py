@@ -1,3 +1,3 @@
-"""Motion of one body: the type that everything reads, judges, repairs, draws and writes."""
+"""The type `Motion` for the motion of one body, its validation, and its repair."""
 
 from posekit.motion.motion import Motion as Motion

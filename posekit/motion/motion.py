@@ -59,7 +59,8 @@ class Motion(Record):
     warnings : sequence of str
         Contradictions in the file, for the user to check, one sentence each.
     document : object, optional
-        The parsed file. A writer of the same container uses it to keep the user's hierarchy, names and channels.
+        The parsed file. If the motion is saved in the same file format, the writer keeps the user's hierarchy, names
+        and channels.
 
     Raises
     ------
@@ -140,7 +141,7 @@ class Motion(Record):
         self._set(name, values.astype(dtype))
 
     def _counted(self) -> NDArray[np.intp]:
-        """Count the rows of each recording from 0."""
+        """Return the number of each row within its recording, from 0."""
         clip = np.asarray(self.clip)
         frame = np.zeros(len(clip), dtype=np.intp)
         for index in np.unique(clip):

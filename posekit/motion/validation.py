@@ -52,12 +52,12 @@ def validate(
     profile: str | None = None,
     ground: str | float | None = None,
 ) -> Report:
-    """Judge postures and motion: files, folders, patterns, arrays, `Motion` objects or results.
+    """Judge postures and motion from files, folders, arrays, `Motion` objects or results of `posekit.recover`.
 
     Parameters
     ----------
     given : path, sequence of path, array, Motion or Recovery
-        Files, folders, and patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
+        Files, folders, and file patterns such as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with head points,
         metres, NaN if unknown; configurations (T, nq) of `urdf`; or a motion or result from `posekit.open`. Checks of
         motion are applied only to frames that are successive in time; for an array this requires `rate`.
     settings : ValidateSettings, optional
@@ -71,7 +71,7 @@ def validate(
     keep : path, optional
         New folder for the clips that pass: see `keep_clips`.
     keep_spans : float or str, optional
-        Minimum duration, seconds, of the longest valid span of a clip that does not pass; longer spans are kept, too.
+        Also keep the longest run of valid frames of a clip that does not pass, if it lasts at least this long, seconds.
     checks, ranges, profile, ground : optional
         Fields of `ValidateSettings`; they replace those of `settings`.
 
@@ -127,7 +127,7 @@ class Judge:
         return "" if name in ("figure", "stick_figure") else name
 
     def validator(self, robot: str) -> Validator:
-        """Return the validator of the given body; without one, of the robot that a file names."""
+        """Return the validator of the given robot or figure, or else of the robot that the file names."""
         body = self.urdf or robot or "figure"
         if str(body) not in self._made:
             self._made[str(body)] = Validator(body, self.settings, **self.changes)
@@ -204,7 +204,7 @@ def in_order(motion: Motion, validator: Validator) -> Motion:
         got = f"configurations of {motion.robot or 'a robot'}"
         remedy = "name the robot with --urdf"
         remedy += ", or give the .trc of the markers" if motion.layout == "opensim" else ""
-        raise refusal(motion.source, "q", got, "those of the figure", remedy)
+        raise refusal(motion.source, "q", got, "configurations of the figure", remedy)
     q, notes = validator.robot.q_from_columns(motion.q_names, motion.q)  # type: ignore[arg-type]
     return replace(motion, q=q, q_names=names, notes=(*motion.notes, *notes))
 
@@ -245,7 +245,7 @@ def _files(paths: Sequence[Path], judge: Judge, facts: Mapping[str, Any]) -> Rep
 
 
 def _of_file(report: Report) -> tuple[str, ...]:
-    """Return the notes of a report; except for notes about the ground, each starts with the name of the file."""
+    """Return the notes of a report, with the file's name before each note that is not about the ground."""
     name = Path(report.files[0]).name if report.files else ""
     return tuple(note if note.startswith(GROUND_NOTE) else f"{name}: {note}" for note in report.notes)
 
@@ -256,7 +256,7 @@ def _is_view(path: Path) -> bool:
 
 
 def refuse_without_joints(held: Any, path: Path) -> None:
-    """Refuse a motion without joints of a body among its points."""
+    """Refuse a motion whose points include no joint of a body."""
     if isinstance(held, Motion) and held.q is None and not np.isfinite(held.figure_joints).any():
         got = "no joint of a body among its points"
         remedy = "say which point is which joint with --layout FILE.toml"
@@ -276,7 +276,7 @@ def keep_clips(report: Report, folder: str | Path, *, spans: float | None = None
     folder : path
         Folder that does not exist or is empty.
     spans : float, optional
-        Minimum duration, seconds, of the longest valid span of a clip that does not pass; longer spans are kept.
+        Also keep the longest run of valid frames of a clip that does not pass, if it lasts at least this long, seconds.
 
     Returns
     -------

@@ -108,7 +108,7 @@ class Clip:
         return len(self.state)
 
     def following(self, first: Clip) -> Self:
-        """Return this clip with the history of `first`, from whose result this clip was made."""
+        """Return this clip, which was made from the result of `first`, as a clip of the recording of `first`."""
         return replace(
             self,
             motion=first.motion,
@@ -140,13 +140,13 @@ class Clip:
         )
 
     def checks(self, *, over_time: bool) -> list[Check]:
-        """Return the selected checks of motion, or the selected checks of postures."""
+        """Return the selected checks of motion if `over_time`, otherwise the selected checks of postures."""
         of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
 
     def report(self, *, over_time: bool) -> Report:
-        """Return the report of the checks of motion, or of the checks of postures; at least one must be selected."""
+        """Return the report of `checks`, of which at least one must be selected."""
         validator = copy(self.validator)
         validator.settings = self.validator.settings.changed(checks=self.checks(over_time=over_time))
         return validator.check(self.as_motion())
@@ -156,7 +156,7 @@ class Clip:
         return self.state
 
     def taken(self, order: Ints, time: Array) -> Self:
-        """Return the clip with the frames `order`, at the times `time` (T,), seconds."""
+        """Return the clip with its frames in the given order, at the times `time` (T,), seconds."""
         return replace(
             self, state=self.state[order], rows=self.rows[order], filled=self.filled[order], time=time
         )
@@ -185,11 +185,11 @@ class Clip:
         return np.asarray(np.isfinite(self.state[:, TRUNK]).all(axis=(1, 2)))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Interpolate segment directions from `start` to `end` (n, P, 3) by shares (n,); lengths are from `start`."""
+        """Interpolate segment directions from `start` to `end` (n, P, 3) by fractions (n,) with lengths of `start`."""
         return carried(start, end, share)
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Interpolate states from `start` to `end` (n, …) by shares (n,), with interpolated segment lengths."""
+        """Interpolate states from `start` to `end` (n, …) by fractions (n,), including the segment lengths."""
         there = self.carried(start, end, share)
         back = self.carried(end, start, 1 - share)
         return there + share[:, None, None] * (back - there)
@@ -199,7 +199,7 @@ class Clip:
         return replace(self, state=self.state + by[:, None])
 
     def smoothed(self, loose: Flags, strength: float) -> Self:
-        """Smooth each point in the frames that `loose` (T, P) marks; head and feet follow neck and ankles."""
+        """Smooth each point in the frames of the mask `loose` (T, P), and move head and feet with neck and ankles."""
         loose = loose.copy()
         loose[:, len(JOINTS) :] = loose[:, PIECE_PARENTS[len(JOINTS) :]]
         loose &= np.isfinite(self.state).all(axis=(0, 2))
@@ -227,8 +227,9 @@ class Clip:
     def pushed(self, rows: Ints, report: Report) -> Array:
         """Move the postures of some frames (n,) inside the bounds of the checks.
 
-        First, elbows and knees that bend backward are straightened. Then joints are moved until rigid lengths are
-        inside their bounds. Then limbs are rotated, and finally all parts of the body, until all other checks pass.
+        First, elbows and knees that bend backward are straightened. Then joints are moved until the lengths of rigid
+        segments are inside their bounds. Then limbs are rotated, and finally all parts of the body, until all other
+        checks pass.
         """
         vectors, found = vectors_of(self.state), report.findings
         for row, place, value in zip(found["row"], found["place"], found["value"], strict=True):
@@ -244,7 +245,7 @@ class Clip:
         return state
 
     def margins(self, body: Body, points: Array, *, rigid: bool) -> Array:
-        """Return margins (n, K) of postures (n, P, 3), metres: of lengths if `rigid`, or of all other checks.
+        """Return margins (n, K) of postures (n, P, 3), metres: of rigid lengths if `rigid`, else of all other checks.
 
         A margin is infinite if its check is undecided.
         """
@@ -296,7 +297,7 @@ class Clip:
         return self.report(over_time=False).invalid[rows]
 
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
-        """Return two valid states for some frames (n,): interpolated between valid frames, and the nearest one.
+        """Return two valid states for each of some frames (n,): between valid frames, and from the nearest valid frame.
 
         If fewer than two frames are valid, both states are the neutral posture.
         """
@@ -336,7 +337,7 @@ def rejected(report: Report, *checks: str, places: Sequence[str] = ()) -> Flags:
 
 
 def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
-    """Return the n bad frames, the good frames before and after each, and its position (n,) between them, 0 to 1.
+    """Return the n bad frames, the good frames around each, and the position (n,) of each between them, 0 to 1.
 
     At the start or end of the clip the two nearest good frames are used, with positions below 0 or above 1. With fewer
     than two good frames the result is empty.
@@ -350,7 +351,7 @@ def between(bad: Flags) -> tuple[Ints, Ints, Ints, Array]:
 
 
 def near_good(bad: Flags) -> Flags:
-    """Return the bad frames (T,) that can be interpolated; at the start or end of the clip at most three frames."""
+    """Return which bad frames (T,) can be interpolated; at the start and the end of the clip, at most three frames."""
     good = np.flatnonzero(~bad)
     found = bad.copy()
     if len(good) and good[0] > MOST_CONTINUED:
@@ -389,7 +390,7 @@ class RobotClip(Clip):
         return np.asarray(np.isfinite(self.state).all(axis=1))
 
     def carried(self, start: Array, end: Array, share: Array) -> Array:
-        """Interpolate configurations from `start` to `end` (n, nq) along geodesics by shares (n,)."""
+        """Interpolate configurations from `start` to `end` (n, nq) along geodesics by fractions (n,)."""
         model = self.validator.robot.model
         steps = [pin.difference(model, a, b) for a, b in zip(start, end, strict=True)]
         steps = share[:, None] * np.array(steps).reshape(len(start), model.nv)
@@ -397,7 +398,7 @@ class RobotClip(Clip):
         return np.asarray(self.validator.robot.with_mimics(np.array(out).reshape(start.shape)))
 
     def halfway(self, start: Array, end: Array, share: Array) -> Array:
-        """Interpolate configurations from `start` to `end` (n, nq) by shares (n,)."""
+        """Interpolate configurations from `start` to `end` (n, nq) by fractions (n,)."""
         return self.carried(start, end, share)
 
     def restored(self, rows: Ints, given: Array) -> Self:

@@ -30,11 +30,11 @@ SIDE_WORDS: Final = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"
 
 
 def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
-    """Return a BVH file with rotations such that its points equal the points of the clip.
+    """Return the BVH file with new rotations, so that its points coincide with the points of the clip.
 
-    Each rigid part of the body is rotated so that its points in the file coincide with its points in the clip. Only the
-    channels of the first node of each part change. Frames with unchanged points keep all channels.
-    Interpolated frames of the clip are first interpolated channel by channel.
+    Each rigid part of the body is rotated so that its points in the file coincide with its points in the clip. In each
+    rigid part, only the channels of its first node change. Frames with unchanged points keep all channels. In frames
+    that the repair interpolated, each channel is first interpolated between the neighbouring frames.
     """
     document = _renamed(document) if clip.mirrored else document
     values = _filled(document, document.values[clip.rows], clip.filled)
@@ -50,7 +50,7 @@ def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
 
 
 def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
-    """Return the index of the file's node that each point of the motion comes from.
+    """Return the index of the node in the file for each point of the motion.
 
     If several nodes lie at one point, the node nearest to the next joint of the limb is chosen.
     """

@@ -47,7 +47,7 @@ def in_own_file(
 
     Columns are recognised by their numbers: a column, or the mean of the columns of two markers, equals an entry of the
     motion times a factor. The change of the entry is added to this column. All other columns and all names are
-    unchanged. Gaps of a column are filled, but gaps of the two markers of one joint are not.
+    unchanged. Gaps in a column are filled, except gaps of a joint that is the mean of two markers.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def in_own_file(
 
 
 def _groups(before: Motion, after: Motion) -> list[tuple[Array, Array, Any]]:
-    """Return groups of entries with one unit: values before (T, K) and after (T', K), and possible factors."""
+    """Return groups of entries that share a unit: values before (T, K) and after (T', K), and possible unit factors."""
     counted = (_counted(before), _counted(after), COUNTS)
     if before.q is None:
         old, new = (np.asarray(one.joints).reshape(-1, 3 * len(one.joint_names)) for one in (before, after))
@@ -128,7 +128,7 @@ def _counted(motion: Motion) -> Array:
 def _columns_of(
     columns: Array, entries: Array, factors: tuple[float, ...], most: float
 ) -> tuple[list[tuple[int, int]], float]:
-    """Return pairs (column, entry) of equal numbers, and the factor with which most entries have a column."""
+    """Return pairs (column, entry) with equal numbers, and the unit factor that yields the most pairs."""
     some = slice(None, None, max(1, len(columns) // SAMPLE))
     best: tuple[list[tuple[int, int]], float] = [], 1.0
     for factor in factors:

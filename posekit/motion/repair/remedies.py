@@ -1,4 +1,4 @@
-"""Remedies for findings of checks; a remedy is kept only if it reduces the findings of checks of motion."""
+"""Remedies for defects of motion; a remedy's result is kept only if it reduces the findings of checks of motion."""
 
 from __future__ import annotations
 
@@ -49,10 +49,9 @@ Remedy = Callable[[Clip, Report], Iterator[Clip]]
 def mended(clip: Clip, *, filled: bool = False) -> Clip:
     """Return a clip with fewer findings.
 
-    There are four steps. Remedies for frame order, exchanged labels and jumps are tried. Rejected postures are
-    replaced. All remedies are tried, because wrong postures also cause trembling and sliding. Rejected postures are
-    replaced again. If `filled`, all rejected frames, and unknown points of the other frames, are interpolated at the
-    start.
+    First, remedies for frame order, exchanged labels and jumps are tried, and rejected postures are replaced. Wrong
+    postures also cause trembling and sliding, so all remedies are tried only then. Finally, rejected postures are
+    replaced again. If `filled`, rejected frames and unknown points are interpolated before these steps.
     """
     if not clip.motion.in_time or not clip.checks(over_time=True):
         return clip.legal()
@@ -87,7 +86,7 @@ def _count(report: Report) -> int:
 
 
 def _numbers(report: Report, check: str, place: str, column: str = "value") -> Array:
-    """Return one column of a check's findings at one place, by frame (T,); 0 in frames without a finding."""
+    """Return a column of the findings of one check at one place, by frame (T,); 0 in frames without a finding."""
     found, out = report.findings, np.zeros(len(report))
     if check in report.checks and place in report.places:
         mine = (found["check"] == report.checks.index(check)) & (found["place"] == report.places.index(place))
@@ -96,7 +95,7 @@ def _numbers(report: Report, check: str, place: str, column: str = "value") -> A
 
 
 def _reorder(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Sort frames by their times; if the times are in order, reorder frames as the motion suggests, or fill gaps."""
+    """Sort frames by their times; if they are sorted, try other orders, or fill missing frames."""
     if not rejected(report, "timing").any():
         return
     if (np.diff(clip.time) < 0).any():
@@ -111,7 +110,7 @@ def _reorder(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _exchange(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Exchange right and left: for the rejected pairs in the rejected frames, or for all points in all frames."""
+    """Exchange the labels right and left of pairs of joints in rejected frames, or of all points in all frames."""
     pairs = rejected(report, "swap", places=SIDE_PAIRS)
     if not pairs.any():
         return
@@ -130,7 +129,7 @@ def _exchanged_order(parts: Sequence[str]) -> Ints:
 
 
 def _lengthen(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Give drifting segments the median length of the other frames; joints farther out on the limb move along."""
+    """Give segments of drifting length their median length in the other frames, and move the joints beyond them."""
     bad = rejected(report, "drift", places=[segment_name(one) for one in LIMB_SEGMENTS])
     if not bad.any() or isinstance(clip, RobotClip):
         return
@@ -168,7 +167,7 @@ def _step_back(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _most_stay(aside: Array) -> Array:
-    """Return the shift (T, 3) that undoes displacements `aside` (T, 3), with as many zero rows as possible."""
+    """Return the shift (T, 3) that undoes displacements `aside` (T, 3) and is zero in as many frames as possible."""
     _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
     return np.asarray(aside[where[np.argmax(count)]] - aside)
 
@@ -200,7 +199,7 @@ def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Lift a body that is below the ground, and lower a floating body: by one shift per span, or frame by frame."""
+    """Lift a body from below the ground, or lower a floating body, by one shift per span or by a shift per frame."""
     up = clip.motion.up_vector
     low, high = (_numbers(report, check, "lowest") for check in ("penetration", "floating"))
     beyond = [_numbers(report, check, "lowest", "margin") for check in ("penetration", "floating")]
@@ -222,9 +221,9 @@ def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _hold(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Move the body along the ground against the slide of a standing foot, evenly or frame by frame.
+    """Move the body along the ground so that a standing foot does not slide.
 
-    All frames after the slide are shifted by its total, or all frames before it, whichever are fewer.
+    The frames after the slide are shifted by its length; if there are fewer frames before the slide, these are shifted.
     """
     up = clip.motion.up_vector
     bad = rejected(report, "sliding", "skating", places=[f"{side}_foot" for side in SIDES])

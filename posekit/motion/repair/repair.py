@@ -1,4 +1,4 @@
-"""`repair`: find a nearby motion that passes all checks, write it into the user's file, and list invented frames."""
+"""`repair`: find a nearby motion that passes all checks, write it to a file, and list interpolated frames."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Repaired(Record):
         return list(self.notes)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the repaired motion. If the format is that of the source file, its names and columns are kept.
+        """Write the repaired motion. A file in the format of the source file keeps the names and columns of the source.
 
         Raises
         ------
@@ -120,10 +120,11 @@ def repair(
 
     Defects of the recording are removed first: frames are sorted, exchanged sides corrected, lengths of limbs restored,
     jumps and frozen frames interpolated, jitter smoothed, the body shifted to the ground, and standing feet fixed. Then
-    each rejected posture is moved inside its bounds by the shortest steps. If that fails, it is interpolated toward the
-    nearest valid frames until it passes. A first frame with another posture, such as a T-pose, is extrapolated.
+    each rejected posture is moved inside its bounds by the shortest steps. If the moved posture fails, it is
+    interpolated toward the nearest valid frames until it passes. A first frame that does not belong to the motion, such
+    as a T-pose, is extrapolated from the next frames.
 
-    Frames without defects are unchanged, byte for byte in BVH files and in tables. A written file is read again and
+    Frames without defects are unchanged, byte for byte in BVH files and in tables. The written file is read again and
     judged.
 
     Parameters
@@ -228,7 +229,7 @@ def _folder(
 
 
 def _repaired(motion: Motion, judge: Judge, facts: dict[str, Any]) -> Repaired:
-    """Repair every recording of a motion in rounds, until the motion passes as it is read from its file."""
+    """Repair every recording of a motion in rounds, until the motion read from the written file passes."""
     before = judge.report(motion)
     if before.ok.all():
         return Repaired(motion=motion, before=before, report=before, notes=(_changed(0, len(motion)),))
