@@ -110,7 +110,7 @@ class Detections(Record):
         if other := set(self.names) - {*POINTS, *FEET_POINTS}:
             raise refusal(self.source, "names", shown(min(other)), "names of joints, head or feet points")
         if (np.diff(self.frame, prepend=0) < 0).any():
-            raise refusal(self.source, "frame", "unsorted numbers", "ascending numbers from 0", "sort the rows")
+            raise refusal(self.source, "frame", "unsorted numbers", "ascending from 0", "sort the rows")
         if self.pictures and count and self.frame[-1] >= len(self.pictures):
             got = f"{len(self.pictures)} names and picture {self.frame[-1]}"
             raise refusal(self.source, "pictures", got, "a name for every picture")
