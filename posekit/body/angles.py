@@ -253,9 +253,9 @@ def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     r"""Compute a limb's angles: three of the ball joint (shoulder or hip) and one of the hinge (elbow or knee).
 
-    There are four solutions: two Euler branches times two signs of the hinge. A straight limb does not determine its
-    axial rotation. An upper segment along the abduction axis does not determine the first angle. If no solution is
-    inside the limits, such an undetermined angle is changed to bring a solution inside.
+    There are four solutions: two Euler branches times two signs of the hinge angle. A straight limb does not determine
+    its axial rotation. An upper segment along the abduction axis does not determine the first angle. If no solution is
+    inside the limits, an undetermined angle is changed to bring a solution inside.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def read_capsules(
         tilt = np.linalg.norm(cross(placement.rotation[:, 2], axis)) * shape.halfLength
         if max(beside, tilt) > OFF_AXIS_METRES:
             got = f"a capsule {max(beside, tilt):.3g} m beside the line between its joints"
-            raise refusal(source, field, got, "a capsule on that line", error=FigureError)
+            raise refusal(source, field, got, "a capsule on the line between its joints", error=FigureError)
         size = {"half_length": float(shape.halfLength), "radius": float(shape.radius)}
         first, last = CAPSULE_AXES[link]
         capsules.append(Capsule(link=link, start=first, end=last, center=center, **size))

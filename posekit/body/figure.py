@@ -251,8 +251,8 @@ class Figure(Robot):
             Head points in the frame of `Figure.head_points`, metres; if ``neck`` is given, it is subtracted from the
             others.
         stature : float, optional
-            Height of the person, metres. Lengths that are not given are estimated from it (`lengths_from_stature`), and
-            the head scales with it.
+            Height of the person, metres. Lengths that are not given are estimated from the stature
+            (`lengths_from_stature`), and the head scales with the stature.
         behind : bool, optional
             Whether the shoulders lie behind the line from neck to pelvis. `shoulders_are_behind` computes it from joint
             positions.
@@ -370,10 +370,11 @@ class Figure(Robot):
     ) -> Configurations:
         """Convert postures to configurations in closed form.
 
-        Several sets of angles have the same segment directions: the set inside the joint limits is returned, or else
-        the set with the smallest violation. If the posture has the figure's lengths, forward kinematics reproduces its
-        joints. Otherwise torso and hips have the figure's shape, every limb segment keeps its direction, and `distance`
-        is the largest error of a joint. Every posture with 14 finite joints has a finite configuration.
+        Several sets of angles give the same segment directions. Of these sets, the set with the smallest violation of
+        the joint limits is returned. If the posture has the figure's lengths, forward kinematics of the configuration
+        reproduces the posture's joints. Otherwise torso and hips have the figure's shape, every limb segment keeps its
+        direction, and `distance` is the largest position error of a joint. Every posture with 14 finite joints has a
+        finite configuration.
 
         Parameters
         ----------

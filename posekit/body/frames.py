@@ -1,7 +1,7 @@
 """Coordinate frames of the torso and the hips, computed from a posture's points.
 
-Each frame is a rotation matrix R_cam_torso or R_cam_hips. Its columns are the axes in camera coordinates: x forward, y
-left, z up. Lee and Chen (1985) name the torso's axes differently: x forward, y down, z left.
+Each frame is a rotation matrix R_cam_torso or R_cam_hips. Its columns are the axes of torso or hips in camera
+coordinates: x forward, y left, z up. Lee and Chen (1985) name the torso's axes differently: x forward, y down, z left.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
     """Return the hips' frame: left is from right to left hip; down is from pelvis to hips, made perpendicular to left.
 
     If the pelvis lies between the hips, the three points define no plane. Down is then from the neck to the pelvis,
-    made perpendicular to left. The frame then varies continuously unless this direction is parallel to the line between
-    the hips. It does not determine the flexion of the pelvis.
+    made perpendicular to left. The frame then varies continuously, unless the line from neck to pelvis is parallel to
+    the line between the hips. It does not determine the flexion of the pelvis.
 
     Parameters
     ----------

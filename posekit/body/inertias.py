@@ -1,12 +1,12 @@
 """Mass, centre of mass and moments of inertia of each link of the body.
 
 Masses, centres of mass and radii of gyration are from de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment
-inertia parameters", J Biomech 29:1223, Table 4. They are means of women and men, as fractions of body mass and segment
-length. In this table, the trunk extends from the seventh cervical vertebra to the middle of the hips, and the shank
-ends at the centre of the ankle. Body parts that are not segments of the figure use another length. Head and trunk use
-the distance from the neck to the middle of the hips. The hand uses the forearm's length. The foot, placed at the ankle,
-uses the shank's length. The trunk below the navel belongs to the hips link. The torso link has the moments of the whole
-trunk minus the moments of the lower trunk (Steiner's theorem).
+inertia parameters", J Biomech 29:1223, Table 4. The values are means of women and men, as fractions of body mass and
+segment length. In this table, the trunk extends from the seventh cervical vertebra to the middle of the hips, and the
+shank ends at the centre of the ankle. Body parts that are not segments of the figure use another length. Head and trunk
+use the distance from the neck to the middle of the hips. The hand uses the forearm's length. The foot, placed at the
+ankle, uses the shank's length. The trunk below the navel belongs to the hips link. The torso link has the moments of
+the whole trunk minus the moments of the lower trunk (Steiner's theorem).
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ set, where the torso's points are in one plane or the hips' points on one line:
 
 Here p are positions of the points in that plane or on that line, and :math:`d_i(p)` their distances. The given lengths
 :math:`l_i` have the relative standard deviations :math:`\sigma_i`. A common error of all lengths has no effect, because
-closing does not depend on scale.
+lengths that close still close after scaling.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class Person(Record):
     noise : float
         Standard deviation of measured coordinates, metres; NaN if fewer than ten frames are known.
     limb_noise : mapping
-        The same standard deviation, estimated from each limb segment alone.
+        Standard deviation of measured coordinates, estimated from each limb segment alone, metres, by segment name.
     hips_forward : float
         Median angle at the pelvis by which the middle of the hips lies in front of the extended line from neck to
         pelvis, degrees; NaN if fewer than ten frames are known.

@@ -72,8 +72,8 @@ def placed(vectors: Array) -> Array:
 def turns_between(start: Array, end: Array) -> Array:
     """Return the rotations (N, 11, 3, 3) of the pieces that best map postures `start` (N, P, 3) to postures `end`.
 
-    A piece with one known vector gets the shortest rotation between its two directions. A piece with no known vector
-    gets the identity matrix.
+    A piece with one known vector gets the shortest rotation from the vector's direction in `start` to its direction in
+    `end`. A piece with no known vector gets the identity matrix.
     """
     R = np.tile(np.eye(3), (len(start), N_PIECES, 1, 1))
     before, after = vectors_of(start), vectors_of(end)

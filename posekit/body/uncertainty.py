@@ -59,7 +59,9 @@ class LengthUncertainty(Record):
     def __post_init__(self) -> None:
         for name, value in {"common": self.common, **self.own}.items():
             if name not in ("common", *SEGMENT_NAMES):
-                raise refusal("length_deviation", "", shown(name), f"some of {', '.join(SEGMENT_NAMES)}")
+                raise refusal(
+                    "length_deviation", "", shown(name), f"a segment's name: {', '.join(SEGMENT_NAMES)}"
+                )
             if not 0 <= value <= MAX_LENGTH_DEVIATION:
                 expected = f"a fraction of the length, 0 to {MAX_LENGTH_DEVIATION:g}"
                 raise refusal("length_deviation", name, f"{value:g}", expected)

@@ -32,7 +32,7 @@ def rewrite(
 ) -> str:
     """Return the figure's URDF text with other capsules, lengths and head points.
 
-    Masses and moments of inertia are computed for a person of these lengths.
+    Masses and moments of inertia are computed for a person with the new lengths.
 
     Parameters
     ----------

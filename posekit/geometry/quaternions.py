@@ -45,7 +45,7 @@ def quaternion_from_rotation(R: Array, *, shorter: bool = True) -> Array:
     R : array (..., 3, 3)
         Rotations.
     shorter : bool
-        Choose the sign with w >= 0; otherwise the sign with a positive largest entry.
+        Whether the sign is chosen so that w >= 0; otherwise the entry of largest absolute value is positive.
 
     Returns
     -------

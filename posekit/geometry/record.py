@@ -21,7 +21,7 @@ MAX_LISTED: Final = 4
 
 
 class Record:
-    """Base of dataclasses whose repr is one line: it shows arrays by their shapes and omits None and empty fields.
+    """Base class of dataclasses whose repr is one line; it shows shapes of arrays and omits None and empty fields.
 
     A subclass is decorated with ``@dataclass(frozen=True, kw_only=True, eq=False, repr=False)``.
     """

@@ -23,8 +23,8 @@ def numbers(
     Raises
     ------
     InputError
-        If they are not real numbers, or rows differ in length. The other parameters, parts of its message, are those of
-        `refusal`.
+        If they are not real numbers, or rows differ in length. The other parameters are parts of the error message, as
+        in `refusal`.
     """
     try:
         found = np.asarray(values)

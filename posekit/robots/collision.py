@@ -84,7 +84,7 @@ class Contacts(NamedTuple):
     Attributes
     ----------
     hit : bool array (N,)
-        Whether any pair touches, as `pinocchio.computeCollisions` returns it.
+        Whether any pair touches; equal to the result of `pinocchio.computeCollisions`.
     frame, pair : int arrays (K,)
         Index of the configuration and index of the pair, for each pair nearer than the margin; sorted by configuration.
     distance : array (K,)
@@ -100,7 +100,7 @@ class Contacts(NamedTuple):
 
 
 class SelfCollision:
-    """Collision queries of one model.
+    """Self-collision queries for configurations of one robot model.
 
     NumPy excludes pairs whose bounding balls or bounding boxes do not overlap (Gottschalk, Lin and Manocha 1996, §5),
     and measures capsules and spheres exactly. coal tests the convex hulls of the remaining pairs, and their meshes only

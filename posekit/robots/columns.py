@@ -46,7 +46,7 @@ def mimics_of(robot: Element) -> tuple[Mimic, ...]:
 
 
 def from_columns(robot: Robot, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
-    """Order the columns of a table as q: see `Robot.q_from_columns`."""
+    """Convert a table with named columns to configurations q: see `Robot.q_from_columns`."""
     table, check = np.asarray(values, dtype=np.float64), partial(need, "")
     ok = table.ndim == 2 and table.shape[1] == len(names)
     check(ok, "values", f"shape {table.shape}", f"(N, {len(names)})", "give each column a name")

@@ -104,7 +104,7 @@ class Kinematics:
         return out
 
     def jacobians(self, q: Array) -> tuple[Array, Array]:
-        r"""Return the points (N, P, 3) and their derivatives (N, P, 3, nv) by the step of `pinocchio.integrate`.
+        r"""Return the points (N, P, 3) and their derivatives (N, P, 3, nv) with respect to v in `pinocchio.integrate`.
 
         A joint at origin o with rotation R moves a point p by :math:`R s_v + (R s_\omega) \times (p - o)` for each
         column s of its motion subspace (Featherstone 2008, §3.5).

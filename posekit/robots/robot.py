@@ -193,12 +193,13 @@ class Robot(Record):
     def joint_map(self) -> JointMap:
         """The point of the robot that represents each joint of the human model; empty if the robot is not a humanoid.
 
-        It is the given map, a built-in map, or a map derived from the names of the robot's joints.
+        The map is read from `joint_map_file`. By default it is a built-in map, or is derived from the names of the
+        robot's joints.
 
         Raises
         ------
         InputError
-            If the given map does not fit.
+            If the map of `joint_map_file` does not fit the robot.
         """
         if self.joint_map_file:
             return load_joint_map(self.joint_map_file, self.model)
@@ -269,7 +270,7 @@ class Robot(Record):
         return np.reshape(steps, (-1, self.model.nv))[:, at]
 
     def q_from_columns(self, names: Sequence[str], values: ArrayLike) -> tuple[Array, tuple[str, ...]]:
-        """Order the columns of a table as q.
+        """Convert a table with named columns to configurations q.
 
         Parameters
         ----------
@@ -300,7 +301,7 @@ class Robot(Record):
         Raises
         ------
         InputError
-            If the given joint map does not fit the robot, or `checked` refuses q.
+            If the map of `joint_map_file` does not fit the robot, or q is not valid input for `checked`.
         """
         out = np.full((len(q := self.checked(q)), len(POINTS), 3), np.nan)
         out[:, [POINTS.index(name) for name in self.joint_map]] = self.kinematics.positions(q)

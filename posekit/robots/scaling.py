@@ -114,7 +114,7 @@ def _wanted(own: Array, joints: Array, source: str) -> Array:
     """Return the robot's joint positions (14, 3), metres, at neutral with the segment lengths of postures.
 
     Torso and hips have the median shape of the postures in which all their joints are known, aligned with the robot's
-    joints. Limb segments keep the directions that they have on the robot.
+    joints. Limb segments keep the directions of the robot's segments.
     """
     lengths, kept = segment_lengths(joints), segment_lengths(own[None])
     ratio = lengths / kept

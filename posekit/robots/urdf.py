@@ -1,7 +1,8 @@
 """URDF and SRDF texts: parsed once, checked, and reduced to the elements that a model is made of.
 
 Pinocchio's reader drops bodies that it does not understand, accepts reversed limits and axes of zero length, and
-overflows its stack on long chains. Such a fault raises an `InputError` whose one-line message names the faulty element.
+overflows its stack on long chains. Here each of these faults raises an `InputError` whose one-line message names the
+faulty element.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ Need = Callable[[object, str, str, str, str], None]
 
 
 def need(source: str | Path, ok: object, place: str, got: str, expected: str, remedy: str) -> None:
-    """Raise an `InputError` with these parts of its message unless `ok` is true."""
+    """Raise an `InputError` unless `ok` is true; the other parameters are parts of its message."""
     if not ok:
         raise refusal(source, place, got, expected, remedy)
 
@@ -218,7 +219,7 @@ def _check_numbers(part: Element, place: str, check: Need) -> None:
 
 
 def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
-    """Refuse joints with a wrong type, limit, axis or mimic, and limits in degrees."""
+    """Refuse joints with a wrong type, limit, axis or ``<mimic>``, and limits in degrees."""
     large: dict[str, float] = {}
     for name, joint in joints.items():
         place, kind, limit = f"joint {name!r}", joint.get("type", ""), joint.find("limit")
@@ -256,7 +257,7 @@ def _check_joints(joints: Mapping[str, Element], check: Need) -> None:
 
 
 def _check_link(link: Element, check: Need) -> None:
-    """Refuse bodies of a link that are not one shape of positive size."""
+    """Refuse a link's collision bodies that do not have exactly one shape of positive size."""
     for body in link.findall("collision"):
         place, found = f"link {link.get('name')!r}: <collision>", body.findall("geometry/*")
         got = f"{', '.join(cut(one.tag) for one in found[:4]) or 'no shape'}"
