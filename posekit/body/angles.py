@@ -299,10 +299,10 @@ def _upper_angles(upper: Array, limits: Limits) -> Array:
 def arm_angles(flexion: Array, abduction: Array) -> tuple[Array, Array, Array]:
     r"""Return elevation, plane of elevation, and axial turn (N,), radians, of an arm whose third joint angle is zero.
 
-    The axial turn is a difference of two twists. The first is the twist of the swing-twist decomposition,
-    :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2, \cos\frac\alpha2\cos\frac\beta2)`. The second is the
-    twist of an arm that moves around the vertical, :math:`(1 - \cos e)(90^\circ - p)`, with elevation e and plane of
-    elevation p.
+    The axial turn is the difference of two twists, which are rotation angles about the arm's axis. The first is the
+    twist of the swing-twist decomposition, :math:`-2\operatorname{atan2}(\sin\frac\alpha2\sin\frac\beta2,
+    \cos\frac\alpha2\cos\frac\beta2)`. The second is the twist of an arm that moves around the vertical, :math:`(1 -
+    \cos e)(90^\circ - p)`, with elevation e and plane of elevation p.
     """
     forward, outward = np.sin(flexion) * np.cos(abduction), np.sin(abduction)
     down = np.cos(flexion) * np.cos(abduction)

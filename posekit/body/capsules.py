@@ -134,8 +134,8 @@ def read_capsules(
 def grown(capsules: Sequence[Capsule], old: Array, new: Array) -> tuple[Capsule, ...]:
     """Scale capsules from a figure with the neutral points `old` (19, 3) to a figure with the neutral points `new`.
 
-    The position, length and radius of a capsule scale with the length of its link. Only the torso's radius scales with
-    the width of the shoulders.
+    The position, length and radius of a capsule scale with the length of its link. The exception is the torso's radius,
+    which scales with the width of the shoulders.
     """
     shoulders = float(np.linalg.norm(new[1] - new[2]) / np.linalg.norm(old[1] - old[2]))
     found = []

@@ -323,7 +323,7 @@ class Figure(Robot):
         Path(path).write_text(self.urdf, encoding="utf-8")
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
-        """Compute the 19 points of configurations.
+        """Compute the 19 points (14 joints and five head points) of configurations.
 
         Parameters
         ----------

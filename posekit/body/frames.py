@@ -1,7 +1,8 @@
 """Coordinate frames of the torso and the hips, computed from a posture's points.
 
-Each frame is a rotation matrix R_cam_torso or R_cam_hips. Its columns are the axes of torso or hips in camera
-coordinates: x forward, y left, z up. Lee and Chen (1985) name the torso's axes differently: x forward, y down, z left.
+A frame is the rotation matrix from torso or hips to the camera, R_cam_torso or R_cam_hips. Its columns are the axes of
+torso or hips in camera coordinates: x forward, y left, z up. Lee and Chen (1985) name the torso's axes differently: x
+forward, y down, z left.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis
     Returns
     -------
     array (..., 3, 3)
-        R_cam_torso; NaN if a point is NaN or the points are on one line.
+        Rotation matrix R_cam_torso; NaN if a point is NaN or the points are on one line.
     """
     down = unit(pelvis - neck)
     left = unit(perpendicular(left_shoulder - right_shoulder, down))
@@ -59,7 +60,7 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
     Returns
     -------
     array (..., 3, 3)
-        R_cam_hips; NaN if a point is NaN or the points are on one line.
+        Rotation matrix R_cam_hips; NaN if a point is NaN or the points are on one line.
     """
     left = unit(left_hip - right_hip)
     down = unit(perpendicular(right_hip - pelvis if neck is None else pelvis - neck, left))
@@ -69,7 +70,7 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | N
 def trunk_frames(points: Array, middle_pelvis: bool = False) -> tuple[Array, Array]:
     """Return the frames R_cam_torso and R_cam_hips (N, 3, 3) of postures (N, 14 or more, 3).
 
-    `middle_pelvis` is whether the pelvis is between the hips; see `hips_frame`.
+    `middle_pelvis` states whether the pelvis is between the hips; see `hips_frame`.
     """
     hips = (*HIPS, "neck") if middle_pelvis else HIPS
     torso_points, hips_points = ([points[:, JOINT[joint]] for joint in part] for part in (TORSO, hips))

@@ -203,7 +203,7 @@ def closed_lengths(
     Returns
     -------
     lengths, moved : dict
-        Metres, by segment name; `moved` has the differences of changed lengths.
+        Metres, by segment name; `moved` has the new minus the given length of each changed segment.
 
     Raises
     ------
@@ -381,7 +381,7 @@ def _nearest(names: tuple[str, ...], lengths: Lengths, known: LengthUncertainty)
 
 
 def _torso_start(lengths: Lengths) -> Array:
-    """Return initial values (5,) for `_nearest`: right and left shoulder (2 each), and the height of the pelvis."""
+    """Return initial coordinates (5,) for `_nearest`: two of each shoulder, and the height of the pelvis."""
     down, width = lengths["neck-pelvis"], lengths["right_shoulder-left_shoulder"]
     start = []
     for side, sign in (("right", -1.0), ("left", 1.0)):

@@ -2,7 +2,7 @@ r"""A person measured in a recording: segment lengths, side of the shoulders, an
 
 Bones keep their length, so the variation of a limb segment's length over time is measurement noise. If the coordinates
 of both ends have independent errors of standard deviation :math:`\sigma`, the length has standard deviation
-:math:`\sqrt 2\,\sigma`, so
+:math:`\sqrt 2\,\sigma`. The estimate of :math:`\sigma` is
 
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 

@@ -35,12 +35,12 @@ UP_WORDS: Final = {
 
 
 def to_metres(values: ArrayLike, unit: str) -> Array:
-    """Convert values in a unit to metres; None becomes NaN."""
+    """Convert lengths in a given unit to metres; None becomes NaN."""
     return np.asarray(np.asarray(values, dtype=np.float64) / PER_METRE[unit])
 
 
 def from_metres(values: ArrayLike, unit: str) -> Array:
-    """Convert values in metres to a unit."""
+    """Convert lengths in metres to a given unit."""
     return np.asarray(np.asarray(values, dtype=np.float64) * PER_METRE[unit])
 
 

@@ -31,8 +31,8 @@ def capsule_bodies(robot: Robot, figure: Robot) -> pin.GeometryModel:
     Parameters
     ----------
     robot : Robot
-        Its boxes, spheres, cylinders and capsules are kept. A humanoid without collision bodies gets a capsule on every
-        body part. A robot that is not a humanoid gets no capsule, because its shape is not known.
+        The robot's boxes, spheres, cylinders and capsules are kept. A humanoid without collision bodies gets a capsule
+        on every body part. A robot that is not a humanoid gets no capsule, because its shape is not known.
     figure : Robot
         The stick figure, which determines the proportions of the capsules.
     """

@@ -60,7 +60,7 @@ def find(name_or_path: str | Path) -> tuple[str, Path, Path | None, tuple[Path, 
 
 
 def robot_names() -> tuple[str, ...]:
-    """List the names of robots that `load_robot` finds in this environment."""
+    """List the names of robots that `load_robot` finds in this Python environment."""
     return tuple(sorted(_published()))
 
 

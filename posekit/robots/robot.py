@@ -64,7 +64,7 @@ class Robot(Record):
     Raises
     ------
     InputError
-        If a text or a mesh is damaged or violates the URDF format. The message of one line names the faulty element.
+        If a text or a mesh is damaged or violates the URDF format. The one-line message names the faulty element.
 
     Examples
     --------
@@ -401,7 +401,7 @@ def load_robot(
     Raises
     ------
     InputError
-        If a name, a file, a mesh or a number is wrong. The message names the fault and the remedy in one line.
+        If a name, a file, a mesh or a number is wrong. The one-line message names the fault and the remedy.
 
     Examples
     --------
