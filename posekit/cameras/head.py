@@ -134,7 +134,7 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | LeeCh
     Returns
     -------
     HeadPose
-        The pose of each frame; an image (P, 2) is one frame.
+        The pose of each frame; an image of shape (P, 2) counts as one frame.
 
     Raises
     ------

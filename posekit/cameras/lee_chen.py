@@ -75,7 +75,7 @@ def points_to_paper(points: Array, f: float | Array) -> Array:
 
 
 def rotation_to_paper(R: Array) -> Array:
-    """Convert R_cam_head (..., 3, 3) from OpenCV's convention to the matrix [R] of Lee & Chen (Table 2b).
+    """Convert R_cam_head (..., 3, 3), from head to camera, to the matrix [R] of Lee & Chen (Table 2b).
 
     The columns of [R] are the camera's right, up and backward directions in the head's frame.
     """

@@ -213,7 +213,7 @@ def own_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def is_head_name(name: str) -> bool:
-    """Return whether a head point may have this name: short, printable, and not a joint (except the neck)."""
+    """Return whether a head point may have this name: short, printable, and not the name of a joint but the neck."""
     short_enough = 0 < len(name.strip()) <= len(name) <= MAX_NAME_CHARACTERS
     return name in HEAD_NAMES or (short_enough and name.isprintable() and name not in JOINTS)
 

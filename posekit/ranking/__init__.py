@@ -1,4 +1,4 @@
-"""Probabilities of survivors, from the image, a prior of postures, gravity and the ground."""
+"""Probabilities of survivors, computed from the image, a prior of postures, gravity, balance and ground contact."""
 
 from posekit.ranking.prior import Prior as Prior
 from posekit.ranking.prior import load_prior as load_prior

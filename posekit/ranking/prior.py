@@ -143,11 +143,11 @@ class Prior(Record):
         Each block has the names of some directions and their joint distribution. If the bool is true, only the
         conditional density of `up` given the other directions is used.
     temperature : float
-        Metres. For exact postures, the log-density of directions is divided by 1 + deviation / temperature, where
-        deviation is the standard deviation of the joints. Errors of a centimetre change directions by more than the
-        width of the prior's peaks.
+        Metres. For postures from exact image points, the log-density of directions is divided by 1 + deviation /
+        temperature, where deviation is the standard deviation of the joints. Errors of a centimetre change directions
+        by more than the width of the prior's peaks.
     weights, noisy : mapping of str to float
-        Weights of the terms by name: for exact postures, and for modes of noisy image points.
+        Weights of the terms by name: for postures from exact image points, and for modes of noisy image points.
     balance, contact : (float, float)
         Scale s (metres) and constant u of the log-density :math:`u - \log(1 + (d / s)^2)`. The distance d is a result
         of `posekit.ranking.standing.standing`.

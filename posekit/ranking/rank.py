@@ -63,7 +63,7 @@ class Up(Record):
 
 
 def deviation_of_tolerance(rigid: float) -> float:
-    """Convert the tree's tolerance of rigid distances (m) to a standard deviation (m) of the survivors' joints."""
+    """Convert the tolerance of rigid distances in torso and hips to a standard deviation of survivors' joints (m)."""
     return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
 
 
@@ -85,14 +85,14 @@ def log_terms(
     joints : array (N, 14, 3)
         Camera frame, metres; NaN where a joint is not known.
     deviation : float
-        Standard deviation of the joints of exact postures, metres.
+        Standard deviation of the joint positions, metres, for postures from exact image points.
     chi2 : array (N,), optional
         Chi-square of modes of noisy image points. Without it, the term ``image`` uses the errors of the four rigid
         distances in torso and hips.
     log_volume : array (N,), optional
         Half the log determinant of the covariance of each mode.
     lengths : array (17,), optional
-        Segment lengths in the order of `posekit.skeleton.SEGMENTS`, metres, for exact postures.
+        Segment lengths in the order of `posekit.skeleton.SEGMENTS`, metres, for postures from exact image points.
     length_residual : array (N,), optional
         Largest distance by which a segment of each posture is too short to reach its ray, metres.
     up : Up, optional
@@ -135,7 +135,10 @@ def log_terms(
 
 
 def _misfit(joints: Array, lengths: Array, residual: Array | None, deviation: float) -> Array:
-    """Return the log-density (N,) of the errors of rigid distances and of `residual`, minus its expected value."""
+    """Return the log-density (N,) of distance errors, minus its expected value.
+
+    The errors are those of the rigid distances in torso and hips, and `residual`, the lengths that segments lack.
+    """
     start, end = np.array(RIGID_SEGMENTS).T
     apart = joints[:, end] - joints[:, start]
     off = np.sqrt(dot(apart, apart)) - lengths[-len(RIGID_SEGMENTS) :]

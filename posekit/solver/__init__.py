@@ -1,7 +1,7 @@
 """Every posture that fits a noisy view: the modes of the posterior of 14 joint positions.
 
-`solve` is the method. `Problem` holds the image points and the prior knowledge of a body, `Modes` the result, and
-`Limits` the joint ranges.
+`solve` is the method. `Problem` holds the image points and the prior knowledge of a body. `Modes` holds the result.
+`Limits` holds the joint ranges.
 """
 
 from posekit.solver.engine import backend as backend

@@ -79,7 +79,7 @@ class Limits:
     Parameters
     ----------
     numbers : record of `LIMITS`
-        Radians.
+        Joint ranges, radians.
     """
 
     numbers: NDArray[np.void]
@@ -97,7 +97,7 @@ class Limits:
         Parameters
         ----------
         ranges : mapping or None
-            A parsed table ``posekit.ranges/1`` of kind ``anatomical``; None for the figure's own limits.
+            A parsed table ``posekit.ranges/1`` of kind ``anatomical``; None to use the figure's own limits.
         figure_limits : array (22, 2)
             Limits of the figure's degrees of freedom in the order of `posekit.skeleton.DOFS`, degrees.
         above_hips : float
@@ -206,7 +206,7 @@ class Limits:
     def _bounds(
         self, limb: int, angles: Array, readings: list[Array], tolerance: float
     ) -> tuple[Array, Array, dict[int, Array], list[Array]]:
-        """Return the bounds of a limb's angles, with couplings and joint sinus applied.
+        """Return the bounds of a limb's angles, evaluated where they depend on other angles.
 
         Returns
         -------

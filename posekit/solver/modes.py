@@ -121,7 +121,7 @@ def distinct(
     within: float | Array,
     sure: bool = False,
 ) -> Flags:
-    """Return a mask (N,) of distinct bodies: each differs from every kept body of lower chi2 in its group.
+    """Return a mask (N,) of the distinct bodies of each group; of bodies that are the same, keep the lowest chi2.
 
     The bodies `x` (N, 43) are sorted by group, then by chi2. Two bodies are the same if no joint of the body parts
     `parts`, relative to the neck, differs by more than `within` metres. With `sure`, they are also the same if their

@@ -350,7 +350,7 @@ def information(problem: Problem, which: Ints, x: Array, known: Array, parts: in
     """Return the information matrices (N, C, C): the normal matrices plus weak priors of positions and rotations.
 
     `known` (3,) has three numbers: the prior information on the position of a seen joint and of a hidden joint, both in
-    1/m^2, and `posekit.solver.modes.TURN_INFORMATION`.
+    1/m^2, and the factor of the information on rotations (`posekit.solver.modes.TURN_INFORMATION`).
     """
     p, joints, free = problem.records[which], x[:, :SIZE].reshape(-1, 14, 3), free_joints(parts)
     H = evaluate(problem, which, x, parts).matrix + FLOOR * np.eye(3 * len(free) + 1)
@@ -390,7 +390,7 @@ def distinct(
     level: float,
     known: Array,
 ) -> Flags:
-    """Return a mask (N,) of distinct bodies: each differs from every kept body of lower chi2 in its group.
+    """Return a mask (N,) of the distinct bodies of each group; of bodies that are the same, keep the lowest chi2.
 
     The bodies `x` (N, 43) are sorted by group, then by chi2. Two bodies are the same if no joint of the body parts
     `parts`, relative to the neck, differs by more than `within` (N,) metres. They are also the same if no joint differs

@@ -1,4 +1,4 @@
-"""The method: minimise chi2 over positions of the trunk, then of each limb on each trunk, then of whole bodies."""
+"""The method: minimise chi2 over the trunk's six joints, then over each limb on each trunk, then over whole bodies."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The binary interpretation tree (Lee & Chen 1985, section 3.1), grown level by level over many frames at once.
 
 A node is identified by its frame and its code (see `posekit.tree.candidates`). A check reads only a few joints, so its
-judgement depends on few near-far choices. It judges each distinct combination of these choices once, for all nodes that
-share the combination. The four limbs, for example, are judged independently of each other.
+judgement depends on the near-far choices of few joints. A check judges each distinct combination of these choices once,
+for all nodes that share the combination. The four limbs, for example, are judged independently of each other.
 """
 
 from __future__ import annotations
@@ -164,8 +164,8 @@ def grow(
         the same level judge in the order of this sequence.
     judge : callable, optional
         ``judge(check, points (N, 19, 3))`` returns the check's judgement of N postures; points that the check does not
-        read are NaN. By default ``check.judge(points)``. The callable may have a method ``steps(check)`` that returns
-        the check as steps of the compiled tree (`posekit.tree.steps`), or None.
+        read are NaN. By default ``check.judge(points)``. If the callable has a method ``steps(check)``, this method
+        returns the check as steps of the compiled tree (`posekit.tree.steps`), or None.
     head : array (F, 5, 3), optional
         Head points, metres. A check that reads head points does not judge a frame without head points.
     tolerance : float
