@@ -245,7 +245,7 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
         Index of the point. A point of a limb has too few rigidly fixed points: the result is False in every frame.
     unsure : bool array (T, P)
         Whether a point may be missing in a frame. Distances from such points are ignored; the usual distances are
-        those in frames in which point k is not unsure.
+        those in frames in which point k is certainly known.
     """
     others = np.arange(points.shape[1]) != k
     apart = np.where(unsure, np.nan, np.linalg.norm(points - points[:, k, None], axis=-1))[:, others]
@@ -262,7 +262,7 @@ def _hangs_together(points: Array, k: int, unsure: Flags) -> Flags:
 
 
 def _tree(names: Sequence[str], points: Array, without: Sequence[str] = ()) -> Array:
-    """Return the 14 joints (T, 14, 3) in tree order; NaN for names that are absent or excluded."""
+    """Return the 14 joints (T, 14, 3) in the order of `JOINTS`; NaN for names that are absent or excluded."""
     body = np.full((len(points), len(JOINTS), 3), np.nan)
     for k, name in enumerate(names):
         if name in JOINT and name not in without:
@@ -282,7 +282,7 @@ def _check_depth(body: Array, source: str) -> None:
 
 
 def stature(body: Array) -> float:
-    """Estimate the stature of a body with joints (T, 14, 3), in their unit, from the median lengths of limbs.
+    """Estimate the stature of a body with joints (T, 14, 3), in the joints' unit, from median lengths of limbs.
 
     The stature is NaN without limbs.
     """
@@ -395,7 +395,7 @@ def _rise(body: Array, clip: Ints | None, up: str) -> float:
 
 
 def _is_rooted(body: Array) -> bool:
-    """Return whether the midpoint of the hips, or the pelvis, is at the origin in every frame; False for one frame."""
+    """Return whether the hips' midpoint, or the pelvis, is at the origin in all frames; False for a single frame."""
     middle = (body[:, JOINT["right_hip"]] + body[:, JOINT["left_hip"]]) / 2
     known = (root[np.isfinite(root).all(axis=-1)] for root in (middle, body[:, JOINT["pelvis"]]))
     return any(len(root) > 1 and np.abs(root).max() < ROUNDING_METRES for root in known)

@@ -311,7 +311,7 @@ def positions_are_absolute(document: Bvh) -> bool:
     According to the format's description, a joint's position channels are added to its offset. MotionBuilder, Blender
     and data sets made with them (LAFAN1, Bandai-Namco) write the whole position into the channels and also state the
     offset. Channels replace offsets if the channels of most joints below the root are near the joints' offsets. A root
-    may be anywhere; roots decide only if no other joint has position channels.
+    may be anywhere; roots decide only if no other joint can.
     """
     small = SMALL_OFFSET_SHARE * float(np.abs(document.offsets).max(initial=0.0))
     votes: dict[bool, list[bool]] = {True: [], False: []}

@@ -178,7 +178,7 @@ def _unit(entries: list[Mapping[str, Any]], path: str | Path) -> str:
 
 
 def _pose(fields: Fields, path: str | Path, place: str, suffix: str) -> tuple[Array | None, Array | None]:
-    """Return R and t; None for both if t is missing, because a sole R is the rectification of ROS."""
+    """Return rotation R and translation t; None for both if t is missing, because ROS's sole R is a rectification."""
     t = _value(fields, "translation", suffix)
     given = [_value(fields, name, suffix) for name in ("matrix of rotation", "rotation")]
     arrays = [_numbers(one, path, f"{place}R") for one in given if one is not None]

@@ -89,7 +89,7 @@ class Rows:
         self.people.append((self.picture(label), points, int(person) if whole else -1))
 
     def seen(self) -> tuple[list[str], Array, Ints]:
-        """Return picture label, points (N, K, 3) and number (N,) of each person with a known point; NaN if missing.
+        """Return picture label, points (N, K, 3; NaN if missing) and number (N,) of each person with a known point.
 
         Raises
         ------
@@ -171,7 +171,7 @@ def detections_of(rows: Rows, options: Options) -> Detections:
 
 
 def _layout(rows: Rows, points: Array, options: Options) -> Layout:
-    """Find the layout: the user's, that of the names in the file, or by the number of points and the head's size."""
+    """Find the layout: stated by the user, by the points' names, or by the number of points and the head's size."""
     if options.layout:
         return load_layout(options.layout)
     if rows.names:

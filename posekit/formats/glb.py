@@ -129,7 +129,7 @@ def _shapes(glb: _Glb, figure: Figure) -> dict[str, dict[str, Any]]:
 
 
 def _body(glb: _Glb, figure: Figure, root: Array, turns: Array) -> None:
-    """Add the nodes of the body after the world's node, parents first."""
+    """Append the nodes of the body after the root node, parents first."""
     nodes, shapes, steps = glb.document["nodes"], _shapes(glb, figure), offsets(figure)
     colours = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
     for k, node in enumerate(NODES):

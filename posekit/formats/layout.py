@@ -38,7 +38,7 @@ class Layout:
     name : str
         Name, such as ``coco_17``, or the path of a user's file.
     kind : str
-        ``points``, ``names`` (naming conventions of animation programs) or ``robot``.
+        ``points``, ``names`` (naming conventions of animation programs), ``robot`` (order of joints) or ``robot-file``.
     points : tuple of str
         Names of the format's points in order; empty if files state the names.
     landmarks : dict
@@ -241,7 +241,7 @@ def by_names(names: Sequence[str], source: str) -> Layout:
 
     A layout fits if it defines all joints of every limb. If several layouts fit, the first criterion that differs
     decides: exactly the file's points; more identically spelt names (``RHip`` differs from ``r_hip``); more landmarks;
-    no fixed order of points; more used names. If no layout fits, the naming conventions of animation programs are
+    points by name, not by order; more used names. If no layout fits, the naming conventions of animation programs are
     tried, then layouts that define shoulders, hips and half of the other limb joints.
 
     Raises

@@ -74,7 +74,7 @@ def _times(root: Node, count: int, options: Options) -> Array | None:
 
 
 def _postures(root: Node) -> tuple[Array, tuple[str, ...]]:
-    """Return the points of a JSON document, metres."""
+    """Return the points of a JSON document, metres, and their names."""
     root.object(FIELDS)
     names, unit = root.at("joint_names").texts(), root.at("unit").text(PER_METRE)
     rows = list(root.at("postures").list())
@@ -89,7 +89,7 @@ def _postures(root: Node) -> tuple[Array, tuple[str, ...]]:
 
 
 def _arrays(root: Node) -> tuple[Array, tuple[str, ...]]:
-    """Return the points of NPZ arrays, metres."""
+    """Return the points of NPZ arrays, metres, and their names."""
     names = root.at("joint_names", JOINTS).texts()
     points = root.at("joints").array(None, len(names), 3, unknown=True)
     if root.has("head"):

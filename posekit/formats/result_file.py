@@ -45,7 +45,7 @@ class Column(NamedTuple):
 
 
 def _declared(key: str) -> dict[str, Any]:
-    """Return the metadata of all fields of tables whose metadata contain `key`, by the fields' names in files."""
+    """Return the metadata of the table fields that declare `key` (shape or entry), by the fields' names in files."""
     return {
         f"{table}.{one.name}".lstrip("."): one.metadata
         for table, kind in TABLES.items()
@@ -228,7 +228,7 @@ def _frame_fields(recovery: Recovery, tables: Mapping[str, dict[str, list[Any]]]
 
 
 def _scaled(fields: Mapping[str, Any] | None, lengths: tuple[str, ...], per: float) -> dict[str, Any] | None:
-    """Multiply the fields in `lengths` by `per`, and divide a scale by it; scale the residual only if f is given."""
+    """Multiply the fields in `lengths`, and with a focal length f the residual, by `per`; divide the scale by it."""
     if fields is None:
         return None
     found = dict(fields)
@@ -360,7 +360,7 @@ def _of_columns(columns: Mapping[str, Any], about: Any, path: str | Path) -> Rec
 
 
 def _values(arrays: Node, name: str, rows: int | None, frames: int | None) -> NDArray[Any]:
-    """Return the array of a column; the column's entry for unknown values replaces NaN."""
+    """Return the array of a column, with NaN replaced by the column's entry for unknown values."""
     node, (shape, empty) = arrays.at(name), COLUMNS[name]
     if empty == "":
         return np.asarray(node.value)

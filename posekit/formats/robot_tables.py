@@ -83,7 +83,7 @@ def _fits(parts: Mapping[str, Any], columns: Mapping[str, Any]) -> bool:
 
 
 def _names(part: Mapping[str, Any], columns: Mapping[str, Any]) -> list[str]:
-    """Return the names of the arrays or columns of one part, such as the root's position; empty if one is missing."""
+    """Return the names of the arrays or columns of a part (position, rotation or joints); empty if one is missing."""
     if "arrays" in part:  # the first known name
         return [name for name in part["arrays"] if getattr(columns.get(name), "ndim", 0) > 1][:1]
     if "each" in part:  # a name per coordinate
@@ -268,7 +268,7 @@ def time_and_rate(columns: Mapping[str, Any]) -> tuple[Array | None, float | Non
 
 
 def _order(parts: Mapping[str, Any], columns: Mapping[str, Any], count: int) -> str:
-    """Return the name of the layout with the order of unnamed joints: a simulator's breadth-first, or depth-first.
+    """Return the name of the layout that orders unnamed joints: breadth-first, as in simulators, or depth-first.
 
     In breadth-first order, the two bodies after the root are the left and right hip, equally far from the root.
     """
@@ -350,6 +350,7 @@ def root_quaternion(
     q : array (T, 4)
         Unit quaternions x, y, z, w; NaN where the file has zeros.
     up : str
+        Stated up axis, or else the axis along which the robot stands.
     """
     length = np.linalg.norm(values, axis=1)
     zero = length <= ZERO_LENGTH

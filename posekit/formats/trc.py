@@ -107,7 +107,7 @@ def _title_cells(table: Table, line: str) -> list[str]:
 
 
 def _names(cells: Sequence[str], count: int) -> tuple[str, ...]:
-    """Return the markers' names from a header that has each name above three columns once, or above every column."""
+    """Return the markers' names; the header has each name once for three columns, or once for every column."""
     every_third = tuple(cells[::3])
     if all(every_third) and not any(cells[1::3]) and not any(cells[2::3]):
         return every_third
