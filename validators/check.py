@@ -177,7 +177,7 @@ class Check(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FunctionCheck:
-    """A check that applies a function; the decorator `check` makes it.
+    """A check that consists of a function; the decorator `check` returns it.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def check(
     name, unit, reads
         As in `Check`.
     points : sequence of str
-        Names of the points that the check reads, if it reads a few points only.
+        Names of the points that the check reads; needed only if they are few.
     over_time : bool
         Whether the check judges motion.
 

@@ -445,7 +445,7 @@ class Validator:
         still: dict[str, Any] = {"frame": np.zeros(len(values), dtype=np.intp)} if len(values) > 1 else {}
         if values.shape[1:] in ((len(JOINTS), 3), (len(POINTS), 3)):
             if np.nanmax(np.abs(values), initial=0.0) > MOST_METRES:
-                raise refusal("postures", "", "a coordinate of kilometres", "metres", "scale them")
+                raise refusal("postures", "", "a coordinate over 1000 km", "metres", "scale them")
             points = with_head(values, None if head is None else np.asarray(head, dtype=np.float64))
             return Motion(joints=points, joint_names=POINTS, **still)
         body = self.robot

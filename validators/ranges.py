@@ -2,8 +2,8 @@
 
 There are four kinds of table. ``anatomical``: mean and standard deviation over people of the lower and upper limit of
 each angle, and how limits depend on other angles. ``rotation``: limits of the angles of Lee & Chen 1985, §3.2.A,
-defined as rotations from standing. ``projected``: limits of the same angles as printed in the paper. ``joints``: limits
-of a robot's joints.
+defined as rotations from standing. ``projected``: limits of the same angles, defined by projections as in the paper.
+``joints``: limits of a robot's joints.
 """
 
 from __future__ import annotations

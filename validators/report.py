@@ -1,4 +1,4 @@
-"""`Report`: a table of findings, with the masks, spans, decisions about clips and summaries computed from it."""
+"""`Report`: a table of findings, from which it computes verdicts, spans, decisions about clips and summaries."""
 
 from __future__ import annotations
 
@@ -105,8 +105,8 @@ class ClipDecision:
     file, name : str
         File of the clip, and the clip's name in the file; empty strings if unknown.
     decision : str
-        ``keep``; ``repair?`` if `posekit.repair` can remove all findings and at most one check rejects most frames;
-        otherwise ``drop``.
+        ``keep``; ``repair?`` if `posekit.repair` can remove all findings, and at most half of the frames have findings
+        of two or more checks; otherwise ``drop``.
     reason : str
         Name of the check of the first rejected span in `spans`, or ``unknown joints``; empty for clips to keep.
     frames, invalid, undecided : int
@@ -560,7 +560,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def clip_rows(report: Report) -> list[dict[str, Any]]:
-    """Return a table of the clips: file, name, decision, reason, counts of frames, severity, worst span."""
+    """Return a table with a row for each clip: file, name, decision, reason, counts, severity, worst span."""
     rows = []
     for clip in report.clips:
         row = {name: getattr(clip, name) for name in ("decision", "reason", "frames", "invalid", "undecided")}

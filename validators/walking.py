@@ -128,7 +128,7 @@ def _planes(body: Body, left: Array, most: float) -> dict[str, Array]:
 
 
 def _legs(body: Body, down: Array, limits: Mapping[str, float]) -> dict[str, Array]:
-    """Judge rule 5: at most one knee is flexed, and the other leg is then nearly parallel to the body axis."""
+    """Judge rule 5: at most one knee is flexed; if so, the other leg is nearly parallel to the line neck-pelvis."""
     flexion, lean = [], []
     for side in SIDES:
         hip, knee, ankle = (body.joints[:, JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))

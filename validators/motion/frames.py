@@ -249,7 +249,7 @@ def _usual(lengths: Array, share: float) -> Array:
 
 
 def _smooth(lengths: Array) -> Array:
-    """Return running medians of lengths over five slots (S, K); the last known length replaces unknown lengths."""
+    """Return running medians of lengths over five slots (S, K); NaN if the length in the middle slot is unknown."""
     known = np.isfinite(lengths)
     last = np.maximum.accumulate(np.where(known, np.arange(len(lengths))[:, None], 0), axis=0)
     return np.where(known, median_of_five(np.take_along_axis(lengths, last, axis=0)), np.nan)
@@ -368,10 +368,10 @@ def displaced(joints: Array) -> NDArray[np.intp]:
     Notes
     -----
     If frames are out of order, most joints reverse their direction from frame to frame. Each interval of such frames is
-    sorted to shorten the path of the joints from the frame before it to the frame after it. The sorting inserts each
-    frame at the position with the smallest extra path (Rosenkrantz et al. 1977, SIAM J. Comput. 6:563). If the new path
-    is shorter than `SHORTER_SHARE` of the given path, the frames are out of order. Noise also makes joints reverse
-    their direction, but no order of noisy frames has a much shorter path.
+    reordered to shorten the path of the joints through the interval. The algorithm inserts each frame at the position
+    that lengthens the path least (Rosenkrantz et al. 1977, SIAM J. Comput. 6:563). If the new path is shorter than
+    `SHORTER_SHARE` of the given path, the frames are out of order. Noise also makes joints reverse their direction, but
+    no order of noisy frames has a much shorter path.
     """
     count = len(joints)
     places = np.zeros(count, dtype=np.intp)

@@ -118,7 +118,7 @@ class Ground:
     lowest : array (T,)
         Height of the lowest sole or joint above `low`, minus `lifted`.
     resting : bool array (T,)
-        Whether a part of the body that can carry it rests.
+        Whether a part near the lowest point of the body rests and carries the body.
     hanging : bool array (T,)
         Whether a part rests at a level that the body reached neither by a step nor by a jump.
     centre : array (T,)

@@ -35,8 +35,8 @@ JOINT_MISFITS, END_MISFITS = 3.0, 5.0
 def _filter(at: int) -> tuple[Array, Array]:
     """Return linear filters over seven frames: for the jump of one frame (7,), and the other frames' misfit (2, 7).
 
-    A least-squares fit determines a cubic polynomial in time and the jump of frame `at` away from it. The fit leaves
-    two degrees of freedom, which measure the misfit.
+    A least-squares fit determines a cubic polynomial in time, and the jump of frame `at` from this polynomial. The fit
+    leaves two degrees of freedom, which measure the misfit.
     """
     times = np.arange(7.0) - at
     design = np.column_stack([np.vander(times, 4, increasing=True), times == 0])
@@ -135,8 +135,8 @@ def displaced_by(joints: Array, step: float) -> Array:
     Returns
     -------
     array (S,)
-        Displacement in each slot, metres, minus what forces or different motion of the joints may cause; NaN in slots
-        without a displacement.
+        Displacement in each slot, metres, minus the parts explained by forces and by joints that move differently; NaN
+        in slots without a displacement.
     """
     timed = step > 0
     side, apart = (

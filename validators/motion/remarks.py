@@ -1,7 +1,7 @@
 r"""Remarks in addition to the findings: height of the ground, remedies for known causes, doubts about the frame rate.
 
 If a clip is played k times too fast, speeds are multiplied by k and accelerations by :math:`k^2`, but gravity is the
-same. Therefore falls and balance show the frame rate:
+same. Therefore falls and balance reveal a wrong frame rate:
 
 - A body in the air falls with :math:`g`, and nothing accelerates a body downward much faster.
 - The line of the ground reaction force passes near the centre of mass c. It meets the ground at the zero moment point,

@@ -182,7 +182,7 @@ def _continuity(joints: Array, across: Array) -> Array:
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
-    """Return the sequence of states (N,) of lowest energy for energies (N, 64) and evidence of exchanges (N - 1, 6)."""
+    """Return the states (N,) of lowest total energy, given energies (N, 64) and evidence of exchanges (N - 1, 6)."""
     differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]
