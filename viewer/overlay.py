@@ -55,7 +55,7 @@ def overlaid(
         Picture, folder of pictures or film. Each picture is matched to a frame by its name, otherwise
         by its number or time.
     view : View
-        Camera and image points. If the source is a view, the same view.
+        Camera and image points. If the source is a view, pass the source here too.
     frame : int or (int, int), optional
         Frames to draw.
     which : str

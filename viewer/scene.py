@@ -132,7 +132,7 @@ class Stage:
         return np.asarray(windows.mean(axis=-1))
 
     def _loaded(self, k: int, subject: Subject) -> MeshcatVisualizer:
-        """Load the bodies of one subject under a separate node."""
+        """Load the geometries of one subject under its own scene node."""
         robot = subject.robot
         bodies = robot.visuals if robot.visuals.ngeoms else robot.geometry
         coloured = _coloured(robot) if isinstance(robot, Figure) else pin.GeometryModel(bodies)

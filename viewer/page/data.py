@@ -238,7 +238,7 @@ def _grounded(bodies: Sequence[Array]) -> tuple[list[Array], Array]:
 def _packed(
     bodies: Sequence[Array], frames: Sequence[Json], extra: Mapping[str, Sequence[Array]] | None = None
 ) -> Json:
-    """Pack points (H, P, 3) of each frame, and further points, as integers relative to the origin of the frame."""
+    """Pack points (H, P, 3) of each frame, and the points `extra`, as integers relative to the origin of the frame."""
     origins, widest, first = [], 0.0, 0
     for k, body in enumerate(bodies):
         both = np.concatenate([body, *(one[k] for one in (extra or {}).values())]).reshape(-1, 3)
