@@ -236,7 +236,7 @@ def ball_branch(R: Array, branch: int = 0) -> Array:
 
 
 def limb_branch(R_parent: Array, upper: Array, lower: Array) -> Array:
-    """Return a limb's alpha, beta, gamma and epsilon (N, 4), radians; cos beta >= 0 and epsilon >= 0.
+    """Return angles of limbs (N, 4), radians: alpha, beta, gamma with cos beta >= 0, and hinge angle epsilon >= 0.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def resolve_mesh(name: str, package_dirs: Sequence[Path], source: str, place: st
     Parameters
     ----------
     name : str
-        The name in the URDF: ``package://PACKAGE/…``, ``file:///…``, or an absolute or relative path. PACKAGE is
+        The mesh's name in the URDF: ``package://PACKAGE/…``, ``file:///…``, or an absolute or relative path. PACKAGE is
         the name of a package directory or of a folder inside one.
     package_dirs : sequence of Path
         The only directories from which meshes are read.

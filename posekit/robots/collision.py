@@ -103,8 +103,8 @@ class SelfCollision:
     """Self-collision queries for configurations of one robot model.
 
     NumPy excludes pairs whose bounding balls or bounding boxes do not overlap (Gottschalk, Lin and Manocha 1996, §5),
-    and measures capsules and spheres exactly. coal tests the convex hulls of the remaining pairs, and their meshes only
-    if the hulls touch.
+    and measures capsules and spheres exactly. The collision library coal tests the convex hulls of the remaining pairs,
+    and the meshes of a pair only if its hulls touch.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class SelfCollision:
         return row[near], pair[near], distance[near]
 
     def _measure(self, q: Array, row: Ints, pair: Ints, distance: Array, margin: float) -> None:
-        """Compute missing (NaN) distances with coal, in place; without a margin, pairs that do not touch stay NaN."""
+        """Replace NaN in `distance` by distances from coal; without a margin, pairs that do not touch stay NaN."""
         model, data, meshes, mesh_data = self.model, self._data, self._meshes, self._mesh_data
         hulls, hull_data = self._hulls, self._hull_data
         rows, pairs, placed, placed_meshes = row.tolist(), pair.tolist(), -1, -1

@@ -88,8 +88,8 @@ def parse_xml(text: str, source: str | Path) -> Element:
     Raises
     ------
     InputError
-        If the text is malformed (the message gives line and column), declares a DOCTYPE or an entity, or exceeds a
-        bound.
+        If the text is malformed (the message gives line and column), declares a DOCTYPE or an entity, or is too large
+        or too deeply nested.
     """
     check = partial(need, source)
     check(len(text) <= MAX_BYTES, "", f"{len(text):,} bytes", f"at most {MAX_BYTES:,}", "simplify the file")
