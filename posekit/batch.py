@@ -1,8 +1,9 @@
 """`batch`: process every file of an archive of views, key points and motion once, on local cores or on Ray.
 
-Views and key points are recovered to results; motion is validated to reports. Each input has one output file, which is
-written completely or not at all, and one line in `MANIFEST` with the checksums of input and output. If a run stops, the
-next run therefore computes only the remaining inputs. An input is computed again if it or the settings have changed.
+The output of a view or of key points is a recovered result; the output of a motion is a validation report. Each input
+has one output file, which is written completely or not at all, and one line in `MANIFEST` with the checksums of input
+and output. If a run stops, the next run therefore computes only the remaining inputs. An input is computed again if it
+or the settings have changed.
 """
 
 from __future__ import annotations
@@ -97,8 +98,8 @@ def batch(
     Raises
     ------
     InputError
-        If a path does not exist, or the output is not a folder. An input that cannot be processed is an entry of
-        ``failed``.
+        If a path does not exist, or the output is not a folder. An input that cannot be processed raises no error; it
+        is listed in ``failed``.
 
     Examples
     --------
@@ -108,7 +109,7 @@ def batch(
     """
     asked, folder = Settings.of(settings or RecoverSettings()), Path(output)
     if folder.exists() and not folder.is_dir():
-        raise refusal(folder, "", "a file", "a folder", "name another")
+        raise refusal(folder, "", "a file", "a folder", "name another folder")
     inside = folder.resolve()
     if not are_paths(inputs):
         raise refusal("batch", "inputs", shown(type(inputs).__name__), "paths", "name files or folders")

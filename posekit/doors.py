@@ -63,7 +63,7 @@ def recover(
     Parameters
     ----------
     source : path, View, Detections or array
-        File of a view, file or folder of a detector's key points, `View`, `Detections`, or key points (T, P, 2) in
+        File of a view; file or folder of key points; `View`; `Detections`; or an array of key points (T, P, 2) in
         pixels, or (T, P, 3) with confidences, in the order of the `layout`.
     settings : RecoverSettings, optional
         All settings; the arguments below override single settings.
@@ -82,7 +82,8 @@ def recover(
     fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     size : (int, int) or str, optional
-        Width and height of the pictures, pixels, if no file has them; also as ``"1280x720"``.
+        Width and height of the pictures, pixels, if neither the key points nor the calibration have them; also as
+        ``"1280x720"``.
     checks, ranges, deviation, length_deviation, coverage, group, follow : optional
         See the fields of `RecoverSettings`.
     figure : Figure or path, optional
@@ -147,7 +148,8 @@ def view_of(
     person, layout, unit, rate, stature
         As in `recover`; `unit` is the calibration's unit of length.
     size : (int, int) or str, optional
-        Width and height of the pictures, pixels, if neither file has them; also as ``"1280x720"``.
+        Width and height of the pictures, pixels, if neither the key points nor the calibration have them; also as
+        ``"1280x720"``.
     fov : float or str, optional
         Guess of the horizontal field of view, degrees, in place of a calibration.
     min_confidence : float
@@ -261,7 +263,7 @@ def convert(
         Postures of a result that are written to motion files; by default the followed path if it exists, otherwise the
         answer.
     unit, up, rate, urdf
-        Facts that the source does not state, as in `posekit.open`.
+        Facts that the source does not state; see `posekit.open`.
 
     Raises
     ------
@@ -316,7 +318,7 @@ def render(
     size : (int, int) or str
         Width and height, pixels; also as ``"1280x720"``.
     azimuth, elevation : float, optional
-        Viewing direction, degrees; by default from the front and slightly above.
+        Direction from which the body is drawn, degrees; by default from the front and slightly above.
     over : path, optional
         Picture, folder of pictures or film over which the source is drawn, through the view's camera.
 

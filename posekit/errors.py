@@ -93,7 +93,7 @@ def refusal(
     *,
     error: type[InputError] = InputError,
 ) -> InputError:
-    """Build the error ``SOURCE: FIELD: got VALUE; expected …; REMEDY``, always one line.
+    """Build an error with the one-line message ``SOURCE: FIELD: got VALUE; expected …; REMEDY``.
 
     Parameters
     ----------

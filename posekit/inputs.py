@@ -75,7 +75,7 @@ def new_folder(folder: str | os.PathLike[str]) -> Path:
     """Return the path of a folder that does not exist or is empty; raise an error otherwise."""
     path = Path(folder)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise refusal(path, "", "existing content", "a new or empty folder", "name another")
+        raise refusal(path, "", "existing content", "a new or empty folder", "name another folder")
     return path
 
 

@@ -21,7 +21,8 @@ def show_with(bar: Callable[[Iterable[object], str], Iterable[object]] | None) -
     Parameters
     ----------
     bar : callable or None
-        Function of the items of a loop and a label that returns the items, such as ``tqdm``. None shows no progress.
+        Function that takes the items of a loop and a label, shows progress and yields the items, such as ``tqdm``. None
+        shows no progress.
     """
     _shown[:] = [] if bar is None else [bar]
 

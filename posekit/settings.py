@@ -84,7 +84,7 @@ class Tolerance:
     Parameters
     ----------
     rigid : float
-        Tolerance of distances inside torso and hips, metres.
+        Tolerance of shoulder width, hip width and the distances from shoulders to pelvis, metres.
     tangent : float
         Largest gap between the end of a segment and the ray of its image point if the segment is too short, metres. The
         joint is then at the nearest point of the ray.
@@ -137,7 +137,7 @@ class Settings(Record):
         Minimum distance between the collision geometries of two body parts, metres. A negative distance allows
         penetration.
     rigid_tolerance : float, optional
-        Tolerance of distances inside torso and hips, metres.
+        Tolerance of shoulder width, hip width and the distances from shoulders to pelvis, metres.
     angle_tolerance : float, optional
         Tolerance of joint ranges, degrees.
     """

@@ -143,7 +143,7 @@ def probability(value: float) -> str:
 
 
 def explained(recovery: Recovery) -> list[str]:
-    """Return lines with the number of rejected branches by reason, and the reason of each empty frame."""
+    """Return lines with the number of rejected branches by reason, and why frames have no survivor."""
     from collections import Counter
 
     lost: Counter[str] = Counter()

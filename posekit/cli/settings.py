@@ -15,7 +15,7 @@ KINDS = {"recover": RecoverSettings, "validate": ValidateSettings}
 @command("settings", "posekit settings recover", "posekit recover walk.json -o out.json --set coverage=1")
 @click.argument("name", metavar="COMMAND", type=click.Choice(list(KINDS)))
 def settings(name: str) -> None:
-    """List the settings for --set and --settings FILE.toml, in the format of this file."""
+    """List the settings for --set and --settings FILE.toml, in TOML format."""
     kind = KINDS[name]
     described = descriptions(kind)
     for one in fields(kind):
@@ -24,7 +24,7 @@ def settings(name: str) -> None:
 
 
 def _toml(value: object) -> str:
-    """Write a default as TOML; empty for a default that depends on the input."""
+    """Write a default value as TOML; a default that depends on the input is written as …."""
     if value is None:
         return "…"
     if isinstance(value, bool):

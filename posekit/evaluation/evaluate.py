@@ -251,7 +251,7 @@ def evaluate(result: Recovery, truth: Array | View | Motion, *, seed: int = 0) -
 
 
 def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
-    """Return `posture_errors`; if the camera is scaled orthographic, mean positions are aligned for the mean error."""
+    """Return `posture_errors`; for a scaled orthographic camera, ``mpjpe`` is after alignment of mean positions."""
     errors = posture_errors(joints, truth)
     if result.camera.get("model") == "scaled-orthographic":
         errors[:, MEASURES.index("mpjpe")] = errors[:, MEASURES.index("centred")]
@@ -311,7 +311,7 @@ def _regions(result: Recovery, truth: Array, nearest: Ints) -> Array:
 
 
 def _nearer(result: Recovery, truth: Array) -> tuple[Array, Array]:
-    """Return how sure each segment's nearer end is (F, 13), and whether the nearer end is correct (F, 13)."""
+    """Return the probability of each segment's stated nearer end, and whether this end is correct: each (F, 13)."""
     start, end = np.array(TREE_SEGMENTS).T
     deeper = truth[:, end, 2] - truth[:, start, 2]
     true = np.where(deeper > SURE_METRES, -1, np.where(deeper < -SURE_METRES, 1, 0))

@@ -77,6 +77,6 @@ def _figure(width: float, height: float) -> Any:
         from matplotlib.figure import Figure
     except ImportError:
         raise ViewerError(
-            "pictures: matplotlib is not installed; expected it; pip install matplotlib"
+            "pictures: matplotlib is not installed; expected matplotlib; pip install matplotlib"
         ) from None
     return Figure(figsize=(width, height), layout="constrained")

@@ -137,7 +137,7 @@ def count_walks(name: str, effort: str = "quick", tangent: float = TANGENT_METRE
     effort : {"quick", "fine"}
         Key of `GRIDS`.
     tangent : float
-        Allowed shortfall of a segment relative to its image, metres.
+        Largest gap between the end of a segment and the ray of its image point if the segment is too short, metres.
     """
     velocities, leans, phases = GRIDS[effort]
     parts = [_counted(name, v, lean, phases, tangent) for v, lean in product(velocities, leans)]

@@ -93,11 +93,12 @@ def place_cameras(
     Parameters
     ----------
     points : array (N, P, 3)
-        Points of each body, or all points of all frames of one camera, world frame, metres; NaN is ignored.
+        Points of each body, world frame, metres; NaN is ignored. For one camera of many frames, N is 1, and P counts
+        the points of all frames.
     up : array (3,)
         Up direction of the world.
     rng : Generator
-        Seeded by the caller.
+        Random number generator.
     camera : PinholeCamera, optional
         Intrinsics and picture size; `default_camera` if not given.
     distance : (float, float)

@@ -29,7 +29,7 @@ def random_configurations(robot: Robot, n: int, rng: np.random.Generator) -> Arr
     n : int
         Number of configurations.
     rng : Generator
-        Seeded by the caller.
+        Random number generator.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def object_view(
     n : int
         Number of frames.
     rng : Generator
-        Seeded by the caller.
+        Random number generator.
     noise : float
         Standard deviation of each coordinate of the image points, pixels.
 

@@ -89,7 +89,7 @@ def view_of(
     figure : Figure
         The person.
     camera : PinholeCamera or LeeChenCamera
-        Intrinsics; f of a Lee-Chen camera must be given.
+        Intrinsic parameters; f of a Lee-Chen camera must be given.
     points_cam : array (F, 19, 3)
         Joints and head points, OpenCV camera frame, metres; unknown points are NaN.
     time : array (F,), optional
@@ -234,11 +234,11 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator, ranges: st
     Parameters
     ----------
     figure : Figure
-        The person; its limits bound the draws.
+        The person; angles are drawn between the joint limits of this figure.
     n : int
         Number of postures.
     rng : Generator
-        The same seed gives the same postures.
+        Random number generator; the same seed gives the same postures.
     ranges : str
         Joint ranges of the joint range check, in addition to the figure's limits; ``urdf`` selects the figure's limits
         only.
@@ -295,7 +295,7 @@ def random_views(
     n : int
         Number of postures.
     rng : Generator
-        The same seed gives the same views.
+        Random number generator; the same seed gives the same views.
     figure : Figure, optional
         The person; the built-in figure if not given.
     camera, distance
@@ -330,9 +330,9 @@ def mocap_view(
     Parameters
     ----------
     motion : Motion
-        Motion capture with joints and a known up axis.
+        Motion capture with joint positions and a known up axis.
     rng : Generator
-        Draws the camera if `position` is not given.
+        Random number generator for the camera position if `position` is not given.
     clip : str
         Name of the clip; by default the first clip.
     frames : int, optional
@@ -393,7 +393,7 @@ def mocap_views(
         Number of frames with all 14 joints. Equally many frames are chosen in each clip; of a shorter clip, all frames
         are used.
     rng : Generator
-        Draws the cameras.
+        Random number generator for the camera positions.
     camera, distance
         See `place_cameras`. The view of a clip has the person's median segment lengths in this clip.
 
