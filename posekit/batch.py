@@ -165,7 +165,7 @@ def _manifest(folder: Path) -> dict[str, Entry]:
 
 
 def _checksum(path: Path, about: str = "") -> str:
-    """Return the SHA-256 of a text and a file, or of a text and all files of a detector's folder."""
+    """Return the SHA-256 of the text `about` and a file, or of `about` and all files of a folder of key points."""
     digest = hashlib.sha256(about.encode())
     for file in [path] if path.is_file() else sorted(one for one in path.rglob("*") if one.is_file()):
         with file.open("rb") as data:

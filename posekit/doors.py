@@ -229,7 +229,7 @@ def opened_camera(camera: str | PathLike[str] | PinholeCamera | None, unit: str 
 
 
 def frame_range(frame: Any) -> int | tuple[int, int] | None:
-    """Convert a frame, or the first and last frame, to numbers; text is ``"3"`` or ``"0-9"``."""
+    """Convert a frame or a range of frames, such as ``"3"`` or ``"0-9"``, to integers."""
     if frame is None:
         return None
     ends = frame.split("-") if isinstance(frame, str) else list(np.ravel(frame))
@@ -251,7 +251,7 @@ def convert(
     rate: float | None = None,
     urdf: str = "",
 ) -> None:
-    """Convert a file, or write an object, in the format of the target's suffix.
+    """Convert a file, or save an object, to the format that the suffix of the target names.
 
     Parameters
     ----------

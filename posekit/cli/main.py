@@ -74,7 +74,7 @@ class Terminated(BaseException):
 
 
 def main() -> None:
-    """Run the command line. Exit codes: 0 success, 1 invalid postures or failed rows, 2 wrong input."""
+    """Run the command line. Exit codes: 0 success, 1 a negative result such as invalid postures, 2 wrong input."""
     warnings.showwarning = _warn
     signal.signal(signal.SIGTERM, _terminate)
     show_with(progress_bar if sys.stderr.isatty() else None)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.group("synth", no_args_is_help=True)
 def synth() -> None:
-    """Make synthetic views of known postures: a walker, random valid postures, motion capture, or an object."""
+    """Make synthetic views of known postures: a walker, random valid postures, motion capture, or a robot."""
 
 
 def shared(frames: int, noise_unit: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

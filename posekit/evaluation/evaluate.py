@@ -262,8 +262,8 @@ def _errors(result: Recovery, joints: Array, truth: Array) -> Array:
 def true_branch(truth: Array) -> list[str]:
     """Return the branch of each true posture (N, 14, 3), given in the frame of a perspective camera.
 
-    The digit of a joint is ``1`` (far) if the joint is farther along its ray than the point of the ray closest to the
-    parent joint. The branch is empty if a joint is unknown.
+    The digit of a joint is ``1`` (far) if it is beyond the point of its ray that is closest to the parent joint. The
+    branch is empty if a joint is unknown.
     """
     rays = unit(truth)
     far = dot(truth[:, 1:] - truth[:, PARENTS[1:]], rays[:, 1:]) > 0

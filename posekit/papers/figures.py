@@ -17,7 +17,7 @@ from posekit.synthesis.views import SEQUENCES
 
 
 def draw_lee_chen(folder: Path, effort: str = "quick") -> list[Path]:
-    """Draw Lee & Chen's Fig. A.1 (images), Figs. 6 and 8 (one survivor per group in frame 1, from front and side).
+    """Draw Lee & Chen's Figures A.1 (images), 6 and 8 (one survivor per group in frame 1, from front and side).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rows about Lee & Chen 1985: stick figure, camera computed from head points (§2.1, Table 2), lengths (Table A.1)."""
+"""Comparison with Lee & Chen 1985: stick figure, camera from head points (§2.1, Table 2), lengths (Table A.1)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ N_BODIES: Final = 20
 
 
 def camera_rows() -> Iterator[Row]:
-    """Yield the rows about the stick figure, the camera and the lengths of Table A.1."""
+    """Yield a `Row` for each comparison: stick figure, camera, and lengths of Table A.1."""
     yield from _figure_rows()
     yield from _null_space_rows()
     six, eight = (_noisy_error(head) for head in (TABLE_A2, TABLE_A2.with_points(CHIN_AND_CROWN)))
@@ -64,7 +64,7 @@ def camera_rows() -> Iterator[Row]:
 
 
 def exact_image(head: HeadPoints = TABLE_A2) -> Array:
-    """Return exact projections (H, 2) of head points by the camera of SEQ1: metres on the image plane, y down."""
+    """Return exact projections (H, 2) of head points by the camera of sequence SEQ1: metres, y down."""
     points = head.points @ R_CAM_HEAD.T + [0.0, 0.0, CAMERA[0] + F]
     return np.asarray(LeeChenCamera(f=F).project(points[None])[0])
 

@@ -1,4 +1,4 @@
-"""Rows about Lee & Chen 1985: joint ranges (Table 1), joint angles (§3.2.A), collisions and walking rules (§3.3)."""
+"""Comparison with Lee & Chen 1985: joint ranges (Table 1), joint angles (§3.2.A), collisions, rules (§3.3)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ FORMULAS: Final = (
 
 
 def constraint_rows() -> Iterator[Row]:
-    """Yield the rows about the physical constraints and the walking rules."""
+    """Yield a `Row` for each comparison: physical constraints and walking rules."""
     yield from _formula_rows()
     yield from _table_1_rows()
     yield from _knee_and_collision_rows()
@@ -178,7 +178,7 @@ def _named(angles: Mapping[str, float]) -> str:
 
 
 def _formula_rows() -> Iterator[Row]:
-    """Compare joint angles by the printed formulas of §3.2.A with those of the ranges `table1-printed`."""
+    """Compare joint angles by the printed formulas of §3.2.A with the angles that the joint range check computes."""
     figure = load_figure()
     points = figure.forward_kinematics(random_postures(figure, N_FORMULAS, np.random.default_rng(32)))
     judgement = JointRange().judge(body_of(points, ranges="table1-printed"))

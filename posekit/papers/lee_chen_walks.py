@@ -1,4 +1,4 @@
-r"""Rows about Lee & Chen 1985: the binary tree (§3.1), and the counts of survivors in Tables 3 and 4 (§4).
+r"""Comparison with Lee & Chen 1985: the binary tree (§3.1), and the counts of survivors in Tables 3 and 4 (§4).
 
 Lee & Chen do not print the walker's speed, its lean, and the gait phase of frame 1. A setting is one choice of these
 three values, and survivors are counted at each setting of a grid. Each printed count is compared with the counts at all
@@ -108,7 +108,7 @@ class Walks:
 
 
 def walk_rows(effort: str = "quick") -> Iterator[Row]:
-    """Yield the rows about the binary tree and about §4; the effort ``fine`` uses about 16 times as many settings."""
+    """Yield a `Row` for each comparison with §3.1 and §4; `effort` ``fine`` has about 16 times as many settings."""
     walks = [count_walks(name, effort) for name in SEQUENCES]
     chosen = closest(effort)
     setting = walks[0].settings[chosen]
@@ -259,7 +259,7 @@ def _tree_rows(setting: Array) -> Iterator[Row]:
 
 
 def _shoulders_row(view: View) -> Row:
-    """Count the pairs of near or far shoulders in frame 1 of SEQ2 whose distance is the known shoulder width."""
+    """Count the pairs of shoulder candidates (near or far) in SEQ2, frame 1, that have the known shoulder width."""
     truth, lengths = view.truth[0], printed()["lee_chen"]["lengths"]
     places = []
     for joint in (1, 2):
@@ -308,7 +308,7 @@ def _count_row(key: str, walks: Walks, chosen: int, columns: NDArray[np.intp], p
 
 
 def _in_columns(values: Sequence[Any]) -> str:
-    """Write counts as text: frames 1, 3, 5 after the physical checks, then frames 1, 3, 5 after Rules 1 and 2."""
+    """Write counts as text: frames 1, 3, 5 after the physical checks, then after walking rules 1 and 2 as well."""
     half = len(values) // 2
     return "; ".join(" / ".join(map(str, part)) for part in (values[:half], values[half:]) if len(part))
 
@@ -353,7 +353,7 @@ def _remark_rows(walks: Sequence[Walks], chosen: int, effort: str) -> Iterator[R
 
 
 def _beyond(setting: Array) -> Array:
-    r"""Return how far each elbow's ray is out of reach of the wrong shoulder in SEQ1, frame 1: (2,), metres.
+    r"""Return the gap (2,), metres, between each elbow's ray and the reach of the wrong shoulder in SEQ1, frame 1.
 
     The elbow is on a ray with unit direction d, at the length l of the upper arm from the shoulder S. It does not exist
     if the distance of S from the ray, :math:`|S - (S \cdot d) d|`, exceeds l.
@@ -369,7 +369,7 @@ def _beyond(setting: Array) -> Array:
 
 
 def _deciding_row(name: str, setting: Array) -> Row:
-    """Count the survivors of Rules 1 and 2 in frame 1 that Rule 3, Rule 4 and Rule 5 reject, at the given setting."""
+    """Count how many survivors of walking rules 1 and 2 in frame 1 are rejected by rule 3, by rule 4 and by rule 5."""
     trees, head = grown(sequence(name, setting).take([0]))
     kept = allowed(trees, head, (1, 2))
     rejected = [int((kept & ~allowed(trees, head, (rule,))).sum()) for rule in (3, 4, 5)]

@@ -1,4 +1,4 @@
-"""Rows about Taylor 2000: all postures behind one picture, the proportions of Table 1, and the accuracy (§3.2)."""
+"""Comparison with Taylor 2000: all postures of one picture, proportions (Table 1), and accuracy (§3.2)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ SIGNS: Final = np.array(list(product((-1, 1), repeat=11)))
 
 
 def taylor_rows() -> Iterator[Row]:
-    """Yield the rows about Taylor's method, Table 1 and §3.2."""
+    """Yield a `Row` for each comparison with Taylor's method, Table 1 and §3.2."""
     yield from _method_rows()
     yield from _family_rows()
     yield from _proportion_rows()

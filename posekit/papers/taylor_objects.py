@@ -1,11 +1,12 @@
-r"""Rows about Taylor 2000, Figs. 7, 8: the scale of a closed chain and of a flat chain of segments (§2.1, §3.3).
+r"""Comparison with Taylor 2000, Figs. 7 and 8: scale of a closed chain and of a flat chain (§2.1, §3.3).
 
 Taylor prints neither segment lengths nor postures of the two chains; the lengths are those of `urdf/linkages`. The
 chains are recovered from views from random directions. The errors of their joint angles are compared with the errors
 that image noise explains (`sensitivity`). The unknowns are the point positions :math:`X`, with the first point at depth
 0, and the scale :math:`s`. The image points are :math:`u = s\,(X_x, X_y)`. Known lengths and planes are constraints
-:math:`c(X) = 0`, so that errors of :math:`(X, s)` are in :math:`N = \ker \partial c`. Image noise :math:`\sigma` gives
-:math:`(X, s)` the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2` with :math:`H = \partial u / \partial (X, s)`.
+:math:`c(X) = 0`, so small errors of :math:`(X, s)` are in the null space :math:`N = \ker \partial c`. Image noise
+:math:`\sigma` gives :math:`(X, s)` the covariance :math:`N (N^T H^T H N)^{-1} N^T \sigma^2` with :math:`H = \partial u
+/ \partial (X, s)`.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def constrained_objects() -> list[Constrained]:
 
 
 def object_rows() -> Iterator[Row]:
-    """Yield the rows about Figs. 7 and 8."""
+    """Yield a `Row` for each comparison with Figs. 7 and 8."""
     objects = constrained_objects()
     for one in objects:
         yield from _picture_rows(one)
@@ -155,7 +156,7 @@ def _picture_rows(one: Constrained) -> Iterator[Row]:
 
 
 def _views_row(one: Constrained, *, posed: bool) -> Row:
-    """Recover an object from random directions, in its own posture or (`posed`) in random postures."""
+    """Recover an object in many views from random directions, in its own posture or (`posed`) in random postures."""
     rng = np.random.default_rng(SEED)
     chances, worst = np.empty(N_VIEWS), np.full(N_VIEWS, np.inf)
     for k, quaternion in enumerate(rng.normal(size=(N_VIEWS, 4))):
