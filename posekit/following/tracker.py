@@ -97,7 +97,7 @@ class Tracker:
     settings : RecoverSettings, optional
         Settings for each picture.
     camera : PinholeCamera, optional
-        By default a usual webcam with pictures of `size`.
+        By default a webcam with a diagonal angle of view of 78 degrees and pictures of `size`.
     size : (int, int) or str, optional
         Width and height of the pictures, pixels; also as ``"1280x720"``.
     lengths : mapping of str to float, optional

@@ -63,8 +63,8 @@ def validate(
     settings : ValidateSettings, optional
         Settings for the verdicts; for a result, by default the settings with which it was recovered.
     urdf : str, path, Figure or Robot
-        Figure or robot of the postures, as in `posekit.Validator`. By default the robot that a file names, or the
-        figure.
+        Figure or robot of the postures, as in `posekit.Validator`. By default the robot that the file names, otherwise
+        the figure.
     layout, unit, up, rate, person
         Facts that the files or the array do not state: see `posekit.open`. The points of an array (T, J, 3) with a
         `layout` are in the layout's order.

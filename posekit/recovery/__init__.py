@@ -1,4 +1,4 @@
-"""Recovery of every posture behind a view: find the root, grow the tree or solve, certify, rank, answer."""
+"""Recovery of every posture behind a view: locate the neck, find all postures, check them, and rank them."""
 
 from posekit.recovery.recovery import Answer as Answer
 from posekit.recovery.recovery import Frames as Frames

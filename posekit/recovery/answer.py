@@ -1,4 +1,4 @@
-"""The answer of a frame: the expected posture, the probability that it is right, and a few representative postures."""
+"""Answers of frames: the expected posture, the probability that it is right, and a few representative postures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TAIL_SCALE: Final = 1.960 / 2.776
 
 
 def _tailed_draws() -> Array:
-    """Return fixed t-distributed numbers (32, 42); samples also have their negatives, so that their mean is zero."""
+    """Return 32 fixed samples of 42 coordinates from a t distribution."""
     rng = np.random.default_rng(1985)
     normal = rng.normal(size=(N_SAMPLES // 2, 42))
     spread = np.sqrt(TAIL_DEGREES_OF_FREEDOM / rng.chisquare(TAIL_DEGREES_OF_FREEDOM, len(normal)))
@@ -59,9 +59,9 @@ def answers_of(
 ) -> dict[str, Any]:
     r"""Return the answers of K frames; the answer of a frame depends on that frame alone.
 
-    Under noise, the joints of the answer are the probability-weighted mean of the modes, moved to the nearest posture
-    with the person's lengths. `sure` is
-    :math:`\sum_m p_m P(\max_j |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m, \Sigma_m))`, estimated from samples.
+    Under noise, an answer is the probability-weighted mean of the modes, moved to the nearest posture with the person's
+    segment lengths. With samples X of each mode m and the joints a of the answer, `sure` is :math:`\sum_m p_m P(\max_j
+    |X_j - a_j| < 5 cm \mid X \sim t_4(\mu_m, \Sigma_m))`.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def answers_of(
     Returns
     -------
     dict
-        Columns of `posekit.recovery.Answer`; survivors are numbered from the first survivor of each frame.
+        Columns of `posekit.recovery.Answer`; the survivors of each frame are numbered from 0.
     """
     starts = np.flatnonzero(np.diff(frame, prepend=-1))
     weight = probability / np.add.reduceat(probability, starts)[frame]
@@ -134,8 +134,9 @@ def answers_of(
 def joint_radius(covariance: Array) -> Array:
     r"""Return the radii (...) in metres within which joints with covariances (..., 3, 3) lie with 95 % probability.
 
-    The squared distance is a weighted sum of three chi-square variables. It is approximated by a gamma distribution of
-    equal mean and variance (Satterthwaite 1946), whose cube root is nearly normal (Wilson & Hilferty 1931).
+    The squared error of a joint is a weighted sum of three chi-square variables. The sum is approximated by a gamma
+    distribution of equal mean and variance (Satterthwaite 1946). The cube root of a gamma variable is nearly normal
+    (Wilson & Hilferty 1931).
     """
     mean = np.einsum("...ii->...", covariance)
     variance = 2 * np.einsum("...ij,...ij->...", covariance, covariance)

@@ -63,10 +63,11 @@ def noisy_judge(
 ) -> PostureJudge:
     """Return a judge of postures whose tolerances allow for noise.
 
-    The solver treats joint limits as soft, so a posture may exceed them by three standard deviations. A length may have
-    an error of three standard deviations, which include the uncertainty of the body's size, except in a photograph,
-    where the solver estimates the size. Bodies may overlap by the amount that depth errors explain, and the side on
-    which the shoulders lie may be undetermined.
+    The solver treats joint limits as soft, so a posture may exceed a limit by three standard deviations. A segment
+    length may also have an error of three standard deviations. The standard deviation includes the uncertainty of the
+    body's size, except in a photograph, where the solver estimates the size. Bodies may overlap by the amount that
+    depth errors explain. If lengths are too uncertain, it is undecided whether the shoulders lie in front of the neck
+    or behind it.
     """
     deviation = {name: lengths.own[name] if photograph else lengths.total(name) for name in figure.lengths}
     off = max(deviation[name] * length for name, length in figure.lengths.items())

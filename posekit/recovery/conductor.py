@@ -1,4 +1,4 @@
-"""From a view to all of its possible postures: find the root, grow the tree or solve, certify, rank, answer."""
+"""`recover`: locate the neck in a view, find all postures by tree or by solver, check them, and rank them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ NAMED_DEVIATIONS, MOST_NAMED = 3.0, 3
 
 
 def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figure | None = None) -> Recovery:
-    """Recover every posture behind a view that passes the checks.
+    """Recover every posture that fits a view and passes the checks.
 
     The result of a frame depends on that frame alone.
 
@@ -62,7 +62,7 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
     view : View
     settings : RecoverSettings, optional
     figure : Figure, optional
-        The figure to which the view's lengths, stature and head points are applied; by default the built-in figure.
+        Figure that gets the lengths, stature and head points of the view; by default the built-in figure.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def recover(view: View, settings: RecoverSettings | None = None, *, figure: Figu
 
 
 class _Conductor:
-    """Facts that all frames of a view share: person, noise, checks, and the direction up."""
+    """Recovery of one view: the person, noise, checks and up direction that all frames share."""
 
     def __init__(self, view: View, settings: RecoverSettings, figure: Figure | None) -> None:
         person = figure_of_view(view, settings, figure)
@@ -103,7 +103,7 @@ class _Conductor:
         self.photograph = isinstance(view.camera, ScaledOrthographicCamera)
         given = settings.tolerance(PHOTOGRAPH if self.photograph else MEASURED)
         if given is not None and settings.refine:
-            raise refusal("", "refine", "tolerances beside it", "one of them", "leave the tolerances out")
+            raise refusal("", "refine", "refine and tolerances", "one of them", "leave the tolerances out")
         self.judged, self.tolerance = ("exact", EXACT) if given is None else ("tolerated", given)
         self.up = _up_of(view)
         chosen = chosen_checks(settings, of_robot=False, in_time=False)
@@ -116,13 +116,13 @@ class _Conductor:
 
     @cached_property
     def noisy(self) -> PostureJudge:
-        """The judge of postures under noise."""
+        """Judge with tolerances for postures recovered from noisy image points."""
         return noisy_judge(
             self.person, self.settings, self.lengths, self.up.direction, photograph=self.photograph
         )
 
     def stages(self) -> Iterator[tuple[Callable[[Ints], None], int]]:
-        """Yield the stages in order: a function of open frames, and the largest number of frames per call."""
+        """Yield functions that recover frames, in order, and the largest number of frames per call."""
         found = self.found
         if self.judged == "tolerated":
             yield self._grow, GROWN_AT_ONCE
@@ -137,7 +137,7 @@ class _Conductor:
         yield partial(self._solve, sharp=False), SOLVED_AT_ONCE
 
     def _grow(self, part: Ints) -> None:
-        """Grow the exact trees of frames `part`; frames whose points cannot be exact stay open."""
+        """Grow the trees of the frames `part`; frames whose points cannot be exact are left to the solver."""
         whole = np.isfinite(self.sight.root).all(axis=1) & np.isfinite(self.sight.image).all(axis=(1, 2))
         sight = self.sight.take(np.flatnonzero(whole & np.isin(self.sight.frame, part)))
         if not len(sight.frame):
@@ -182,7 +182,7 @@ class _Conductor:
             self.found.frames["levels"][k] = levels[k].tolist()
 
     def _closing(self, frame: Ints, joints: Array, lost: Mapping[int, Mapping[str, int]]) -> set[int]:
-        """Return the frames with exact image points: some branch satisfies all distances of torso and hips."""
+        """Return the frames with exact image points: some branch has the correct lengths in torso and hips."""
         start, end = np.array(RIGID_SEGMENTS).T
         apart = norm(joints[:, start] - joints[:, end])
         off = np.abs(apart - self.found.lengths[-len(RIGID_SEGMENTS) :])
@@ -194,7 +194,7 @@ class _Conductor:
         return closing
 
     def _solve(self, part: Ints, *, sharp: bool) -> None:
-        """Solve frames `part` under noise; if `sharp`, points and lengths are exact and empty frames stay open."""
+        """Solve the frames `part` under noise; if `sharp`, points and lengths are treated as exact."""
         sight = self.sight.take(np.flatnonzero(np.isin(self.sight.frame, part)))
         problem = self._problem(sight, sharp=sharp)
         pulling = [check.residuals for check in self.checks if hasattr(check, "residuals")]
@@ -234,7 +234,7 @@ class _Conductor:
         return found
 
     def _diagnose(self, sight: Sight, problem: Problem, empty: list[int]) -> None:
-        """Store why frames `empty` have no posture: the largest residuals of a solution with larger deviations."""
+        """Store the largest residuals of the frames `empty`, which have no posture, under larger deviations."""
         some = np.flatnonzero(np.isin(sight.frame, empty))
         if not len(some):
             return
@@ -251,7 +251,7 @@ class _Conductor:
             self.found.close(k, judged="noisy", reason=why, rejected={"noise/no_mode": 1})
 
     def _problem(self, sight: Sight, *, sharp: bool) -> Problem:
-        """Return the solver's problem for the rows of a `Sight`; if `sharp`, points and lengths are exact."""
+        """Return the solver's problem for the rows of a `Sight`; if `sharp`, points and lengths count as exact."""
         problem = Problem.seen(
             sight.camera,
             sight.image,
@@ -268,7 +268,7 @@ class _Conductor:
         )
 
     def margins(self, points: Array, noisy: Flags) -> dict[str, Array]:
-        """Return the worst margins (N,) of each check of postures (N, 19, 3), found under noise or exactly."""
+        """Return the worst margin (N,) of postures (N, 19, 3) by check; `noisy` marks postures from noisy points."""
         found: dict[str, Array] = {}
         for rows, judge in ((~noisy, self.exact), (noisy, self.noisy)):
             if rows.any():
@@ -277,7 +277,7 @@ class _Conductor:
         return found
 
     def about(self) -> dict[str, Any]:
-        """Return the settings and tolerances behind the result, as JSON values."""
+        """Return the settings and tolerances that the result depends on, as JSON values."""
         tolerances: dict[str, Any] = {"exact": vars(EXACT), self.judged: vars(self.tolerance)}
         if "noisy" in vars(self):
             tolerances["noisy"] = {
@@ -302,7 +302,7 @@ class _Conductor:
 
 
 def _why(nearest: Modes) -> str:
-    """Return why a frame has no posture: the residuals over three deviations of the nearest posture."""
+    """Return why a frame has no posture: the residuals above three standard deviations in the nearest posture."""
     if not len(nearest):
         return "no posture is near the image points: the camera, the lengths or left and right may be wrong"
     size = {name: float(value[0]) for name, value in nearest.residuals().items()}
@@ -314,7 +314,7 @@ def _why(nearest: Modes) -> str:
 
 
 def _up_of(view: View) -> Up:
-    """Return the up direction of the calibration, or else of a level camera."""
+    """Return the up direction of the calibration; without it, the up direction of a level camera."""
     camera = view.camera
     if isinstance(camera, PinholeCamera) and camera.R is not None and camera.up:
         return Up(direction=camera.R @ up_vector(camera.up), source=f"{camera.up}, as the calibration source")

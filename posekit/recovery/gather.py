@@ -27,18 +27,18 @@ LEVEL_METRES: Final = 1e-6
 
 
 class Gathering:
-    """The frames of a view: open frames, which have no result yet, and the results of closed frames.
+    """Results of the frames of a view; a frame without a result is an open frame.
 
     Parameters
     ----------
     view : View
     sight : Sight
-        The facts of the view before the search.
+        Input of the search for postures.
     person : Figure
     settings : RecoverSettings
     nearer : int array (F, 17)
-        Stated depth order of segments: 1 if the outer end of a segment is farther from the camera, -1 if it is nearer,
-        0 if it is not stated.
+        Stated depth order of segments: 1 if the second end of a segment is farther from the camera, -1 if it is nearer,
+        0 if the order is not stated.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Gathering:
         self.survivors: list[Survivors] = []
 
     def close(self, *frames: int, **about: Any) -> None:
-        """Set columns of `Frames` for given frames, and remove these frames from the open frames."""
+        """Set entries of the given frames in columns of `Frames`; the frames are no longer open."""
         for k in frames:
             for name, value in about.items():
                 self.frames[name][k] = value
@@ -87,12 +87,12 @@ class Gathering:
         columns : dict of str to array
             Columns of `Survivors`, by frame.
         terms : mapping of str to array (N,)
-            Log terms; their sum is the logarithm of the unnormalised probability of each posture.
+            Terms whose sum is the logarithm of the unnormalised probability of each posture.
         reason : str array (N,)
             Reason why each posture fails; empty if it passes.
         covariance : callable, optional
-            Maps rows (n,) of postures under noise to the covariances of their joints (n, 42, 42). Only the likeliest
-            postures, up to the coverage, are then listed.
+            Maps rows (n,) of postures under noise to the covariances of their joints (n, 42, 42). If it is given, only
+            the most probable postures, up to the setting `coverage`, are listed.
         leave : bool
             Whether frames without a passing posture stay open.
         """
@@ -129,7 +129,7 @@ class Gathering:
             self._keep(found, table, None if covariance is None else covariance(rows), improbable[found])
 
     def _keep(self, found: Ints, table: dict[str, Any], covariance: Array | None, unlisted: Array) -> None:
-        """Store the survivors of frames `found` (K,); noisy frames are answered now, exact frames on first access."""
+        """Store the survivors of the frames `found` (K,); the answers of exact frames are computed at first access."""
         frame = np.searchsorted(found, table["frame"])
         starts = np.flatnonzero(np.diff(frame, prepend=-1))
         joints, probability = table["joints"], table["probability"]
@@ -222,7 +222,7 @@ def frozen(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def group_of(joints: Array, within: float) -> Ints:
-    """Return the group of each posture (N, 14, 3); every joint is `within` metres of the group's likeliest posture."""
+    """Return the group of each posture (N, 14, 3); all its joints are `within` metres of the group's first posture."""
     group = np.full(len(joints), -1, dtype=np.intp)
     for k, leader in enumerate(joints):
         if group[k] < 0:

@@ -65,7 +65,7 @@ def _person(
     shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
-    """Return the figure of a person; it is cached, because one person often appears in several views."""
+    """Return the figure of a person; figures are cached, because a person often appears in several views."""
     if stature is None and not lengths and not shoulders and not head_points:
         return figure
     behind = None if shoulders is None else shoulders == "behind"
@@ -74,12 +74,12 @@ def _person(
 
 @lru_cache(maxsize=32)
 def sided(figure: Figure, lengths: LengthUncertainty) -> Figure:
-    """Return the figure with the side of its shoulders undecided if the uncertain lengths allow both sides."""
+    """Return the figure; if lengths are too uncertain, the side of its shoulders (front, behind) is undecided."""
     return figure.with_side_within(lengths)
 
 
 def uncertainty_of(view: View, settings: RecoverSettings, *, own_figure: bool) -> LengthUncertainty:
-    """Return the uncertainty of lengths: stated, or the usual one for their source (view, stature or neither)."""
+    """Return the stated uncertainty of lengths, or the usual one for lengths from the view, a stature or neither."""
     stated = view.length_deviation if settings.length_deviation is None else settings.length_deviation
     if stated is not None:
         return LengthUncertainty.uniform(stated)

@@ -1,4 +1,4 @@
-"""`Recovery`: every survivor of every frame, the rejected branches by reason, and the answers."""
+"""`Recovery`: all survivors and the answer of each frame, and the number of rejected branches by reason."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
 
 def column(*shape: int, fill: Any = np.nan) -> Any:
-    """Declare a column of a table: the shape of one row, and the value that fills the column by default."""
+    """Declare an array column of a `Table` by the shape of one row and the default value."""
     return field(default=None, metadata={"shape": shape, "fill": fill})
 
 
 def listed(fill: Any) -> Any:
-    """Declare a sequence with one entry per row, and the entry that fills it by default."""
+    """Declare a column of a `Table` that is a sequence with one entry per row, and the default entry."""
     return field(default=(), metadata={"entry": fill})
 
 
 class Table(Record):
-    """Base of read-only tables, whose rows are survivors, frames or paths; the first column is required."""
+    """Base class of read-only tables of survivors, frames, answers or paths; the first column is required."""
 
     def __post_init__(self) -> None:
         rows = len(self)
@@ -60,12 +60,12 @@ class Table(Record):
         return len(getattr(self, fields(self)[0].name))  # type: ignore[arg-type]
 
     def columns(self) -> dict[str, Any]:
-        """Return all columns by name, without derived columns."""
+        """Return all columns by name, except columns that are computed at first access."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.metadata}  # type: ignore[arg-type]
 
 
 class Derived:
-    """A field whose value may be a function without arguments, which is called when the field is first read."""
+    """A field that may be set to a function without arguments; the function computes the value at first access."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -140,7 +140,7 @@ class Survivors(Table):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Frames(Table):
-    """F frames: their time and camera, the rejected branches by reason, and why frames are empty.
+    """Table of F frames: time, camera, rejected branches by reason, and why a frame has no survivors.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class Frames(Table):
         Number of rejected branches by reason (``check/place``). In an exact frame, rejected branches and survivors
         together are 8192.
     levels : sequence of F sequences
-        Number of remaining branches after each joint of the tree; empty if no tree was grown.
+        Number of branches that remain after each joint of the kinematic tree; empty if no branches were searched.
     unlisted : int array (F,), optional
         Number of postures that are not listed because they are too unlikely (setting `coverage`).
     unlisted_probability : array (F,), optional
@@ -196,13 +196,13 @@ class Answer(Table):
         Row of the survivor nearest to the answer; -1 if the frame has no survivor.
     representatives : sequence of F int arrays
         Rows of a few survivors. The postures within 5 cm of a representative in every joint have 95 % of the
-        probability. The representative with the largest share of the probability comes first.
+        probability. The first representative represents the largest probability.
     represented : sequence of F arrays
-        Total probability of each representative and of the postures within 5 cm of it, without those within 5 cm of an
-        earlier representative.
+        Total probability of the postures that each representative stands for: those within 5 cm of it, except postures
+        within 5 cm of an earlier representative.
     nearer : int array (F, 13)
-        For each segment of the tree, the most probable depth order: 1 if its outer end is nearer to the camera by more
-        than 5 cm, -1 if it is farther, 0 if neither.
+        Most probable depth order of each segment from a joint to its parent: 1 if the joint is nearer to the camera by
+        more than 5 cm, -1 if it is farther by more than 5 cm, otherwise 0.
     nearer_sure : array (F, 13)
         Probability of `nearer`; NaN if there is no answer.
     """
@@ -238,7 +238,7 @@ class Paths(Table):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Frame(Survivors):
-    """The survivors of one frame, with the frame's entries of `Frames` and `Answer`, which are documented there.
+    """The survivors of one frame, with the frame's entries of `Frames` and `Answer` as attributes.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ class Frame(Survivors):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Recovery(Record):
-    """Every posture behind a view that passes the checks.
+    """Result of `posekit.recover`: every posture that fits a view and passes the checks.
 
     Parameters
     ----------
@@ -364,8 +364,9 @@ class Recovery(Record):
         Parameters
         ----------
         which : {"answer", "path", "all", "first"}
-            Certified survivor nearest to the answer; likeliest followed path; all survivors as alternative postures of
-            their frames; or likeliest survivor. A path has smoothed joints and therefore no configurations.
+            ``answer``: the survivor nearest to the answer of each frame; ``path``: the most probable path; ``all``: all
+            survivors, as alternative postures of their frames; ``first``: the most probable survivor of each frame. A
+            path has smoothed joints and therefore no configurations.
 
         Raises
         ------

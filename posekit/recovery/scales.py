@@ -57,13 +57,13 @@ def point_offsets(points: Array, scale: Array) -> Array:
 def from_usual_distance(problem: Problem, middle: Array, scale_deviation: Array) -> Problem:
     r"""Convert a scaled orthographic problem to a problem of a perspective camera at the usual distance d.
 
-    In every real picture, nearer parts of the body look larger. A point at depth z behind the neck has the image
-    :math:`s (x, y) / (1 + z / d)`. The uncertainty of the scale becomes an uncertainty of the neck's depth.
+    In a real picture, nearer parts of the body look larger. A point at depth z behind the neck has the image :math:`s
+    (x, y) / (1 + z / d)`. The uncertainty of the scale becomes an uncertainty of the neck's depth.
 
     Parameters
     ----------
     problem : Problem
-        A problem whose image points are metres in the plane of the person's middle.
+        A problem whose image points are in metres, at the depth of the person's middle.
     middle : array (F, 2)
         Middle of the person in the image, metres.
     scale_deviation : array (F,)
@@ -92,7 +92,7 @@ def from_near(joints: Array, middle: Array, scale: Array) -> tuple[Array, Array]
     Returns
     -------
     joints, scale : array (N, 14, 3), (N,)
-        Postures whose neck has depth 0, and the scale in the plane of the neck.
+        Postures whose neck has depth 0, and the scale at the depth of the neck.
     """
     depth = joints[:, 0, 2]
     nearer = depth / USUAL_DISTANCE_METRES
@@ -151,14 +151,15 @@ LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
 def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
     r"""Estimate the scale at which a body's segments best match their image, and the deviation of its logarithm.
 
-    Taylor's bound (2000, eq. 3) depends on one segment alone. Here every segment contributes: a segment of length l and
-    random direction has an image of length :math:`e = s\,l\,\sqrt{1 - c^2}` with c uniform, blurred by the errors of
-    lengths and points.
+    Taylor's lower bound of the scale (2000, eq. 3) depends on one segment alone, but this estimate uses every segment.
+    At scale s, a segment of length l and random direction has an image of length :math:`e = s\,l\,\sqrt{1 - c^2}` with
+    c uniform. Errors of lengths and points are added to e.
 
     Parameters
     ----------
     points : array (F, 14, 2)
-        Square pixels, or normalised image points, whose scale is one over the depth; unseen points are NaN.
+        Square pixels or normalised image points; unseen points are NaN. The scale of normalised image points is one
+        over the depth.
     person : Figure
 
     Returns

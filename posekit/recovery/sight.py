@@ -1,4 +1,4 @@
-"""`Sight`: the facts of a view before the search: image points, their noise, and the position of each frame's neck."""
+"""`Sight`: the input of the search for postures: image points, their noise, and the position of each frame's neck."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ENOUGH_HEAD_POINTS: Final = 1 + len(HEAD_POINTS)
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sight(Record):
-    """The facts of a view in rows: one row per frame, or one per scale if a frame has several possible scales.
+    """Input of the search for postures: one row per frame, or one row for each possible scale of a frame.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ class Sight(Record):
     root : array (H, 3)
         Position of the neck, metres; NaN if unknown.
     given : bool array (H,)
-        Whether the position of the neck was given, not estimated from the head.
+        True if the view states the position of the neck, and this position is used.
     head : array (H, 5, 3)
         Head points, metres; NaN if unknown.
     size_deviation : array (H,)
-        Relative standard deviation of the person's size, which all lengths share.
+        Relative standard deviation of the person's size.
     may_be_exact : bool
         True if no deviation is stated and the points are not a detector's.
     reasons, cameras, roots
@@ -99,7 +99,7 @@ class Sight(Record):
 
     @property
     def middle(self) -> Array:
-        """Means of the normalised image points of the trunk (H, 2)."""
+        """Mean normalised image point of the trunk joints in each row (H, 2)."""
         return np.asarray(np.nanmean(self.camera.normalize(self.image)[:, :6], axis=1))
 
 
@@ -129,7 +129,7 @@ def _noise_of(view: View, settings: RecoverSettings) -> tuple[float, bool]:
 
 
 def _unseen(view: View) -> list[str]:
-    """Return for each frame the reason why it cannot be recovered; empty if it can."""
+    """Return the reason why each frame cannot be recovered; empty if it can be recovered."""
     seen = np.isfinite(view.image[:, :, 0])
     trunk = seen[:, 1:4].any(axis=1)
     reasons = {
@@ -196,7 +196,7 @@ def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: 
 def _head_pose(
     view: View, model: PinholeCamera | LeeChenCamera, person: Figure, settings: RecoverSettings
 ) -> tuple[PinholeCamera | LeeChenCamera, HeadPose | None]:
-    """Return the camera of all frames, and the pose of the head in frames that show six points of it."""
+    """Return the camera of all frames, and the pose of the head in frames that show six head points."""
     image = np.concatenate([view.image[:, :1], view.head_image, view.own_head_image], axis=1)
     enough = np.isfinite(image).all(axis=2).sum(axis=1) >= ENOUGH_HEAD_POINTS
     unknown = isinstance(model, LeeChenCamera) and model.f is None
@@ -225,7 +225,7 @@ def _check_root(root: Array, view: View, camera: PinholeCamera | LeeChenCamera) 
 
 
 def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
-    """Return facts about the camera of frame k; for Lee & Chen's camera, rotation and position as in Table 2."""
+    """Return facts about the camera of frame k; for a `LeeChenCamera`, in the convention of Lee & Chen's Table 2."""
     model = view.camera
     record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
     if isinstance(model, LeeChenCamera) and model.f is not None:
@@ -242,7 +242,7 @@ def _camera_record(view: View, pose: HeadPose | None, k: int) -> dict[str, Any]:
 
 
 def _photograph(view: View, person: Figure, settings: RecoverSettings, lengths: LengthUncertainty) -> Sight:
-    """Return the `Sight` of uncalibrated pictures: one row per frame, or one per scale that satisfies constraints."""
+    """Return the `Sight` of uncalibrated pictures: one row per frame, or one row per possible scale of the frame."""
     model, reasons = view.camera, _unseen(view)
     pixels, may_be_exact = _noise_of(view, settings)
     assert isinstance(model, ScaledOrthographicCamera)

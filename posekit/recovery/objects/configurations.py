@@ -1,4 +1,4 @@
-"""Configurations of a robot, within its limits, whose points coincide with the points of a posture."""
+"""Configurations of a robot, within its joint limits, whose points coincide with the points of a recovered posture."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def configurations_of(
         return laid(placed(x)[known], target[known])[0].ravel()
 
     def slope(x: Array, target: Array, known: NDArray[np.bool_]) -> Array:
-        """Return the derivative of `off` minus its component that a rotation of the base cancels (Kaufman 1975)."""
+        """Return the Jacobian of `off`, without the part that a rotation of the base cancels (Kaufman 1975)."""
         pin.computeJointJacobians(model, data, configuration(x))
         left, R = laid(placed(x)[known], target[known])
         every = [pin.getFrameJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED)[:3, base:] for k in ids]
@@ -88,7 +88,7 @@ def configurations_of(
 
 
 def laid(points: Array, target: Array) -> tuple[Array, Array]:
-    """Fit points (..., P, 3) rigidly to a target (P, 3); return the remaining offsets (..., P, 3) and the rotations."""
+    """Fit points (..., P, 3) rigidly to a target (P, 3); return remaining differences (..., P, 3) and rotations."""
     centred = points - points.mean(axis=-2, keepdims=True)
     goal = target - target.mean(axis=0)
     R, _ = best_rotation(np.einsum("pi,...pj->...ij", goal, centred))

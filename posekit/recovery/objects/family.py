@@ -25,9 +25,10 @@ ZERO_COEFFICIENT: Final = 1e-9
 class LinkageFamily(Record):
     r"""All postures of a linkage that have the same image in a scaled orthographic camera.
 
-    At a scale s each segment is foreshortened by :math:`dZ = \sqrt{l^2 - (\Delta u^2 + \Delta v^2)/s^2}` (Taylor 2000,
-    eq. 2), toward the camera or away from it: 2^S flips. The root stays real for
-    :math:`s \ge \sqrt{\Delta u^2 + \Delta v^2}/l` (his eq. 3, printed upside down).
+    At scale s, the depths of a segment's two ends differ by :math:`dZ = \sqrt{l^2 - (\Delta u^2 + \Delta v^2)/s^2}`
+    (Taylor 2000, eq. 2). A *flip* is the sign of this difference: it states which end of the segment is nearer. S
+    segments have 2^S combinations of flips. The square root is real if :math:`s \ge \sqrt{\Delta u^2 + \Delta v^2}/l`
+    (eq. 3, where the paper prints the inverse fraction).
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ class LinkageFamily(Record):
     image : array (P, 2)
         Image points, pixels; unseen points are NaN.
     aspect : float
-        Ratio of a pixel's width to its height: u is multiplied by it, and s is the scale of v.
+        Ratio of a pixel's width to its height. The coordinate u is multiplied by it; the scale s applies to v.
 
     Raises
     ------
@@ -81,12 +82,12 @@ class LinkageFamily(Record):
 
     @property
     def minimum_scale(self) -> float:
-        """Smallest scale that all segments allow; the paper's default (§3.1)."""
+        """Smallest scale that all segments allow; the default scale of Taylor (2000, §3.1)."""
         return float(np.nanmax(self.bounds))
 
     @property
     def bounding_segment(self) -> str:
-        """Name of the segment with the largest bound."""
+        """Name of the segment that determines the smallest scale of the whole linkage."""
         return self.linkage.segment_names[int(np.nanargmax(self.bounds))]
 
     def foreshortening(self, s: ArrayLike) -> Array:
@@ -154,28 +155,28 @@ class LinkageFamily(Record):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Incidence(Record):
-    r"""Incidence matrices of a linkage, or of its seen segments.
+    r"""Incidence matrices of the graph whose nodes are the linkage's nodes, and whose edges are its (seen) segments.
 
     The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
-    where a row of A has -1 and 1 in the columns of a segment's ends (halves for a midpoint). Then
-    :math:`Z = B (\sigma dZ)`, and loops close if :math:`C (\sigma dZ) = 0`. The segments of a basis determine all
-    depths: :math:`Z = T (\sigma dZ)`.
+    where a row of A has -1 and 1 in the columns of a segment's ends (halves for a midpoint). The matrix B solves this
+    for the depths: :math:`Z = B (\sigma dZ)`. Loops close if :math:`C (\sigma dZ) = 0`. A basis of linearly independent
+    segments determines all depths: :math:`Z = T (\sigma dZ)`.
 
     Parameters
     ----------
     depth : array (N, S)
-        Rows of B: the depth of each node relative to the first node of its piece; depths around loops that do not close
-        are averaged.
+        Matrix B, for depths relative to the first node of each connected component. If loops do not close, it is a
+        least-squares solution.
     tree : array (N, S)
-        Rows of T: the depth of each node, computed from the segments of the basis alone.
+        Matrix T, for depths computed from the segments of the basis alone.
     basis : int array (K,)
-        Segments that span the object; each of the other segments closes a loop.
+        Linearly independent segments that determine all depths; each other segment closes a loop.
     loops : array (L, S)
-        C, with one row for each loop; the largest coefficient of a row is 1.
+        Matrix C, with one row for each loop; the largest coefficient of a row is 1.
     part : int array (N,)
-        Piece of each node; nodes of different pieces have no relative depth.
+        Number of each node's connected component; the relative depth of different components is unknown.
     placed : bool array (N,)
-        Nodes of the piece with the most segments.
+        True for the nodes of the connected component with the most segments.
     """
 
     depth: Array
@@ -232,15 +233,15 @@ class Incidence(Record):
 
 
 def with_depth(place: Array, depth: Array) -> Array:
-    """Return points (..., N, 3) from their places (..., N, 2) and depths (..., N)."""
+    """Return points (..., N, 3) with coordinates x, y (..., N, 2) and depths (..., N)."""
     return np.concatenate([np.broadcast_to(place, (*depth.shape, 2)), depth[..., None]], axis=-1)
 
 
 def off_flat(points: Array, rank: int) -> Array:
     """Return the distances (..., N, 3 - rank) of points (..., N, 3) from their best plane (rank 2) or line (rank 1).
 
-    The plane is fitted to the real parts of complex points, because at the best plane the derivative of the plane has
-    no effect.
+    For complex points, the plane is fitted to the real parts: the derivative of the residual does not depend on the
+    derivative of the best plane.
     """
     centred = points - points.mean(axis=-2, keepdims=True)
     _, axes = np.linalg.eigh(np.swapaxes(centred.real, -1, -2) @ centred.real)

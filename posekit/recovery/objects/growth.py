@@ -1,4 +1,4 @@
-"""The interpretation tree of any articulated object: all flips of its segments, pruned by loops and shape."""
+"""Search tree over the flips of an object's segments; loops, stated flips and shape constraints prune branches."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from posekit.recovery.objects.family import LinkageFamily, off_flat, with_depth
 
 
 class Tolerance(NamedTuple):
-    """Allowed errors, units of length: of lengths that close a loop, of too short segments, of image points."""
+    """Allowed errors, units of length: of segments that close loops, of too short segments, of image points."""
 
     rigid: float
     tangent: float
@@ -38,7 +38,7 @@ MAX_POSTURES: Final = 200_000
 
 
 class Check(NamedTuple):
-    """A test of postures, applied once all segments that it depends on have a flip.
+    """Test of postures; it is applied as soon as all segments that it depends on have a flip.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ def grow_best(
     given: Tolerance | None,
     about: dict[str, Any],
 ) -> tuple[Array, Array, Array]:
-    """Grow the tree of one frame with the exact tolerance or, if the points are not exact, the measured tolerance.
+    """Grow the tree of one frame with the tolerance for exact points and, if they are not exact, for measured points.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def grow_best(
     apart = np.isfinite(family.place[:, 0]) & ~incidence.placed
     if apart[: len(linkage.points)].any():
         names = [linkage.nodes[np.flatnonzero(which)[0]] for which in (incidence.placed, apart)]
-        got = f"{' and '.join(names)} in parts that nothing seen joins"
+        got = f"{' and '.join(names)} in parts without a seen connection"
         raise refusal(f"linkage {linkage.name}", "image", got, "one connected part", "add image points")
     longest = float(linkage.lengths.max())
     usual = {"exact": EXACT, "measured": MEASURED}
@@ -97,9 +97,9 @@ def grow_best(
 def grow(
     family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance, rejected: Counter[str]
 ) -> tuple[Array, Array]:
-    """Flip the segments of the basis one by one, and return postures (N, P, 3) and flips (N, S) at one scale.
+    """Give each segment of the basis both flips in turn; return postures (N, P, 3) and flips (N, S).
 
-    Rejected leaves are counted by reason.
+    The rejected leaves of the tree are counted by reason.
     """
     linkage, basis = family.linkage, family.incidence.basis
     extent, lengths, names = family.extent / s, linkage.lengths, linkage.segment_names
@@ -133,7 +133,7 @@ def grow(
 
 
 def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: Tolerance) -> Iterator[Check]:
-    r"""Yield the tests of one frame: closure of loops, stated flips, and shape.
+    r"""Yield the tests of one frame: closure of loops, stated flips, and shape constraints.
 
     If image points have errors of at most p, a segment of length l with an image of length e has a depth between
     :math:`\sqrt{l^2 - (e + 2p)^2}` and :math:`\sqrt{l^2 - (e - 2p)^2}`. The error of the depth between two points is at
@@ -168,7 +168,7 @@ def _checks(family: LinkageFamily, s: float, hand: NDArray[np.int8], allowed: To
 
 
 def _gap(extent: float, length: float, beside: float, off: float, depths: Array) -> Array:
-    """Return the least error (N,) of a closing segment's length that errors of its end points do not explain."""
+    """Return the error (N,) of the length of a segment that closes a loop, beyond the errors of its end points."""
     depth = np.abs(depths[:, 0])
     far = np.hypot(extent + beside, depth + off)
     near = np.hypot(max(extent - beside, 0.0), np.maximum(depth - off, 0.0))
@@ -176,7 +176,7 @@ def _gap(extent: float, length: float, beside: float, off: float, depths: Array)
 
 
 def _bend(place: Array, rank: int, depths: Array) -> Array:
-    """Return the root mean square distance of points from their best plane (rank 2) or line (rank 1)."""
+    """Return the root mean square distance of points from their best-fitting plane (rank 2) or line (rank 1)."""
     off = off_flat(with_depth(place, depths), rank)
     return np.asarray(np.sqrt((off**2).sum(axis=(1, 2)) / len(place)))
 

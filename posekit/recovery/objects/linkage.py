@@ -59,7 +59,7 @@ class Linkage(Record):
     Raises
     ------
     InputError
-        If a length is not positive, a name is unknown or repeated, the segments do not connect the object, or a loop
+        If a length is not positive, a name is unknown or repeated, some points are not connected by segments, or a loop
         cannot close.
     """
 
@@ -117,7 +117,7 @@ class Linkage(Record):
                 raise self._wrong(field, f"{value:g}", "a finite positive number", "leave it out")
 
     def _check_shape(self) -> None:
-        """Refuse an object whose segments do not connect all points, or a loop that cannot close."""
+        """Refuse a linkage with points that no segments connect, or with a loop that cannot close."""
         from scipy.sparse.csgraph import shortest_path
 
         edges = [(*pair, float(size)) for pair, size in zip(self.segments, self.lengths, strict=True)]
@@ -146,7 +146,7 @@ class Linkage(Record):
 
     @property
     def halves(self) -> tuple[tuple[int, int, int], ...]:
-        """Both halves of each segment with a midpoint: indices of end, midpoint and segment."""
+        """Indices (end, midpoint, segment) of both halves of each segment that has a midpoint."""
         index = {frozenset(ends): number for number, ends in enumerate(self.segments)}
         return tuple(
             (end, len(self.points) + number, index[frozenset(ends)])
@@ -170,7 +170,7 @@ class Linkage(Record):
         return known.index(name) % len(turned)
 
     def place_nodes(self, points: Array) -> Array:
-        """Append the midpoints to points or image points: (..., P, D) to (..., N, D)."""
+        """Append the midpoints to points (..., P, D) in space or in the image; return nodes (..., N, D)."""
         middles = [points[..., list(ends), :].mean(axis=-2) for _, ends in self.midpoints]
         return np.concatenate([points, np.stack(middles, axis=-2)], axis=-2) if middles else points
 
@@ -195,7 +195,7 @@ class Linkage(Record):
         segments : mapping
             Segment, as ``"a-b"`` or ``("a", "b")``, to its length.
         points : sequence of str, optional
-            Names of the points in order; by default in the order of the segments.
+            Names of the points in their order; by default in the order in which `segments` names them.
         midpoints : mapping, optional
             Name of a midpoint to the ends of its segment.
         coplanar, perpendicular, collinear
@@ -292,10 +292,10 @@ MIN_POINT_DISTANCE_METRES: Final = 5e-3
 
 
 def linkage_of_robot(robot: Any) -> Linkage:
-    """Return the linkage of a robot; its points are the revolute joints, the base and the ends of limbs.
+    """Return a linkage whose points are the revolute joints, the base and the ends of limbs of a robot.
 
-    A segment joins two points whose distance is the same in several random configurations. A body with three or more
-    points is therefore a set of rigid triangles.
+    A segment joins two points whose distance is the same in several random configurations. A rigid body with three or
+    more points therefore becomes a set of triangles.
 
     Parameters
     ----------
@@ -357,7 +357,7 @@ def read_nearer(
     ----------
     linkage : Linkage
     nearer : mapping or sequence of mappings, optional
-        Name of the nearer end by segment: one mapping for all frames, or one per frame.
+        Mapping from the name of a segment to the name of its nearer end: one mapping for all frames, or one per frame.
     count : int
         Number of frames.
 
@@ -369,7 +369,7 @@ def read_nearer(
     hands = [nearer] if isinstance(nearer, Mapping) else list(nearer or [{}])
     if len(hands) not in (1, count):
         expected = f"{count}, or one for all"
-        raise refusal("", "nearer", f"{len(hands)} frames", expected, "give one a frame")
+        raise refusal("", "nearer", f"{len(hands)} frames", expected, "give one per frame")
     flips = np.zeros((len(hands), len(linkage.segments)), dtype=np.int8)
     for own, choices in zip(flips, hands, strict=True):
         for name, end in choices.items():

@@ -23,7 +23,7 @@ MAX_SCALES: Final = 128
 
 
 def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
-    """Parse the setting of the scale: return its kind, its number, and the weights of constraints.
+    """Parse the setting `scale`: return its kind, its number, and the weights of constraints.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def parse_scale(text: str) -> tuple[str, float, dict[str, float]]:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ObjectRecovery(Record):
-    """Every posture of an object behind a view.
+    """Result of `recover_object`: every posture of an object that fits a view.
 
     Parameters
     ----------
@@ -77,10 +77,11 @@ class ObjectRecovery(Record):
     q : array (N, nq), optional
         Configurations of the robot; NaN if none was computed.
     distance : array (N,), optional
-        Largest distance between a point of the configuration and the same point of the posture, metres or units.
+        Largest distance between a point of the configuration and the same point of the posture, in metres if the
+        linkage states its unit.
     certified : bool array (N,), optional
-        True if a configuration within limits reaches the posture. False means undecided, because no such configuration
-        was found.
+        True if a configuration within the joint limits has the posture. False means undecided: the search found no such
+        configuration.
     frames : sequence of mapping
         ``time``, ``judged``, ``reason``, ``rejected`` and ``family`` (``how``, ``bound``, ``segment``, ``chosen``,
         ``minima``, ``curve``) of each frame.
@@ -105,7 +106,7 @@ class ObjectRecovery(Record):
         return len(self.frames)
 
     def document(self) -> dict[str, Any]:
-        """Return the result as JSON values, ``posekit.object/1``: metres where the linkage has a unit."""
+        """Return the result as JSON values (``posekit.object/1``), in metres if the linkage states its unit."""
         linkage, factor = self.linkage, self.linkage.unit or 1.0
         frames = []
         for k, about in enumerate(self.frames):
@@ -164,8 +165,8 @@ def recover_object(
         Stated flips: the nearer end by segment.
     tolerance : (float, float), optional
         Allowed error of lengths that close a loop, and allowed shortfall of segments, in the linkage's unit. By default
-        zero up to rounding if a loop or shape shows that the frame's points are exact, otherwise 1 and 2 % of the
-        longest segment.
+        zero up to rounding if the points of the frame are exact, otherwise 1 and 2 % of the longest segment. Closed
+        loops, coplanar or collinear points show that points are exact.
     robot : Robot, optional
         `posekit.robots.Robot` whose frames include the linkage's points; configurations within its limits are computed.
 
@@ -227,7 +228,7 @@ def recover_object(
 def _scales(
     family: LinkageFamily, scale: str | float | None, hand: NDArray[np.int8], given: Tolerance | None
 ) -> tuple[dict[str, Any], Array]:
-    """Return the scales (K,) of one frame, and the facts about them for the result."""
+    """Return the scales (K,) of one frame, and the entries of `family` in the result that describe them."""
     linkage = family.linkage
     longest = float(linkage.lengths.max())
     bound = family.minimum_scale

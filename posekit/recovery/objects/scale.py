@@ -1,11 +1,11 @@
-r"""The scales that satisfy constraints: a search over the scale and all relevant flips (Taylor 2000, §2.1).
+r"""Search over the scale and the flips of segments for postures that satisfy constraints (Taylor 2000, §2.1).
 
-The scale is parametrised by an angle, :math:`s = s_{min} / \cos\psi`. As a function of s, dZ has a vertical tangent at
-the bound. As a function of :math:`\psi` it is smooth: :math:`dZ = l \sin\psi` for the segment that determines the
-bound. Residuals are dimensionless: lengths are in units of the mean segment. A minimum is found as a root of the exact
-derivative, which determines the angle to full precision. The residual is a sum of squares and would determine it to
-half the digits. The derivative is the imaginary part of the residual after an imaginary step of the angle (Squire &
-Trapp 1998).
+The scale is parametrised by an angle, :math:`s = s_{min} / \cos\psi`. As a function of s, the foreshortening dZ has a
+vertical tangent at the smallest scale :math:`s_{min}`. As a function of :math:`\psi`, dZ is smooth: :math:`dZ = l
+\sin\psi` for the segment that determines :math:`s_{min}`. Residuals are dimensionless: lengths are in units of the mean
+segment. A minimum is found as a root of the exact derivative, which determines the angle to full precision. Minimising
+the sum of squared residuals itself would determine the angle to half the digits only. The derivative is the imaginary
+part of the residual after an imaginary step of the angle (Squire & Trapp 1998).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ Residual = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Minima(Record):
-    """Local minima of the constraints' residual over scale and flips, best first.
+    """Local minima of the constraints' residual over scale and flips, sorted by increasing residual.
 
     Each minimum also represents its mirror image in depth, unless flips are stated.
 
@@ -74,8 +74,8 @@ class Minima(Record):
         1 if the first end of a segment is nearer, -1 if the second end is nearer, 0 if the residual does not depend on
         it.
     curve_s, curve_residual : array (G,)
-        Scales from the bound upward, and the least residual over all flips at each scale (Taylor 2000, Figs. 7b and
-        8b).
+        Scales from the smallest possible scale upward, and the least residual over all flips at each of these scales
+        (Taylor 2000, figures 7b and 8b).
     """
 
     s: Array
@@ -90,7 +90,7 @@ class Minima(Record):
 
 
 class Constraints:
-    """The weighted residuals of one image, and the assignments of flips to search.
+    """Weighted residuals of the constraints on one image, and the combinations of flips to search.
 
     Parameters
     ----------
@@ -103,11 +103,11 @@ class Constraints:
     Attributes
     ----------
     bounding : bool array (S,)
-        Segments that determine the bound of the scale.
+        True for segments that determine the smallest possible scale.
     matter : list of int
         Segments whose flips influence the residual.
     signs : array (K, S)
-        Assignments of flips; of two mirror images only one is listed.
+        Combinations of flips; of two combinations with opposite signs, only one is listed.
     """
 
     def __init__(self, family: LinkageFamily, weights: Mapping[str, float], given: NDArray[np.int8]) -> None:
@@ -149,7 +149,7 @@ class Constraints:
         self.terms = [(weight, term) for weight, segments, term in every if segments[0] in self.matter]
 
     def _terms(self, kind: str, unit: float) -> list[tuple[NDArray[np.intp], Residual]]:
-        """Return the residuals of one kind, each with the segments that it depends on."""
+        """Return the residuals of one kind of constraint, each with the segments that it depends on."""
         family, linkage, incidence = self.family, self.family.linkage, self.family.incidence
         place = family.place / self.minimum
         found: list[tuple[NDArray[np.intp], Residual]] = []
@@ -181,7 +181,7 @@ class Constraints:
 def search(
     family: LinkageFamily, weights: Mapping[str, float], given: NDArray[np.int8] | None = None
 ) -> Minima:
-    """Find all local minima of the constraints' residual, over the scale and the flips that matter.
+    """Find all local minima of the constraints' residual over the scale and the flips that change the residual.
 
     Parameters
     ----------
@@ -195,7 +195,8 @@ def search(
     Raises
     ------
     InputError
-        If the linkage has no such constraint, too few of its points are seen, or too many flips share constraints.
+        If the linkage has no constraint of a kind in `weights`, too few of its points are seen, or too many flips share
+        constraints.
 
     Examples
     --------
@@ -209,7 +210,7 @@ def search(
     """
     if family.minimum_scale == 0:
         got = "all segments seen end on"
-        raise refusal("", "scale", got, "an image that fixes a scale", "give the scale")
+        raise refusal("", "scale", got, "an image that determines a scale", "give the scale")
     none = np.zeros(len(family.linkage.segments), dtype=np.int8)
     constraints = Constraints(family, weights, none if given is None else given)
     signs, psi, envelope = _minima(constraints)
@@ -235,16 +236,16 @@ def search(
 
 
 def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
-    """Return the minima of every assignment of flips: roots of the derivative, and minima at the bound.
+    """Return the minima of every combination of flips: roots of the derivative, and minima at the smallest scale.
 
-    Assignments whose residual is zero at every scale have no minimum.
+    Combinations whose residual is zero at every scale have no minimum.
 
     Returns
     -------
     signs, psi : array (M, S), (M,)
-        Assignment and angle of each minimum.
+        Combination of flips and angle of each minimum.
     envelope : array (G,)
-        Least residual over all assignments at the angles of `GRID`.
+        Least residual over all combinations at the angles of `GRID`.
     """
     from scipy.optimize import elementwise
 
@@ -279,7 +280,7 @@ def _minima(constraints: Constraints) -> tuple[Array, Array, Array]:
 
 
 def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
-    """Return blocks of segments such that residuals of different blocks share no segment."""
+    """Return groups of segments; each residual depends on the segments of one group only."""
     from scipy.sparse.csgraph import connected_components
 
     graph = np.zeros((count, count))
@@ -291,12 +292,12 @@ def _blocks(terms: Sequence[NDArray[np.intp]], count: int) -> list[list[int]]:
 
 
 def _closure(loop: Array, signed: Array, shrink: Array) -> Array:
-    """Return the squared gap in depth around a loop."""
+    """Return the squared sum of signed depths around a loop; zero if the loop closes."""
     return np.asarray((signed @ loop) ** 2)
 
 
 def _flatness(rank: int, place: Array, depth: Array, signed: Array, shrink: Array) -> Array:
-    """Return the sum of squared distances of points from their best plane (rank 2) or line (rank 1)."""
+    """Return the sum of squared distances of points from their best-fitting plane (rank 2) or line (rank 1)."""
     points = with_depth(shrink[..., None, None] * place, signed @ depth.T)
     return np.asarray((off_flat(points, rank) ** 2).sum(axis=(-1, -2)))
 
