@@ -51,7 +51,7 @@ def check_pictures(camera: PinholeCamera, points: Array, size: tuple[int, int] |
 
 
 def contradictions(camera: CameraModel, points: Array) -> list[str]:
-    """List contradictions: a person who is not upright according to the calibration, or is upside down in the picture.
+    """List contradictions: the calibration implies that the person is not upright, or the person is upside down.
 
     The mean direction from feet to head in the pictures is compared with the projection of the world's up axis. Usual
     causes of a difference are a rotation from camera to world instead of world to camera, a camera axis y that points

@@ -205,8 +205,8 @@ class Detections(Record):
     ) -> View:
         """Make the view of one person.
 
-        A contradiction between the person and the calibration causes a warning. A point outside the picture counts as
-        unseen if its confidence is below 0.3.
+        A warning is issued if the person contradicts the calibration, for example is upside down. A point outside the
+        picture counts as unseen if its confidence is below 0.3.
 
         Parameters
         ----------

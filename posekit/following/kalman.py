@@ -96,7 +96,7 @@ def steps(seconds: float) -> tuple[Array, Array]:
 
 
 def smooth(time: Array, joints: Array, covariance: Array) -> Array:
-    """Return the joints (T, 14, 3) of a smoothed path; NaN where a joint is never known.
+    """Return the joints (T, 14, 3) of a smoothed path; NaN for a joint that is unknown in all frames.
 
     Parameters
     ----------

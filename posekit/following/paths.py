@@ -70,7 +70,7 @@ ACROSS: Final = 0.2
 
 
 class Candidates(NamedTuple):
-    """The survivors of one frame as candidates of a path.
+    """The survivors of one frame, each of which may extend a path.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Stage(NamedTuple):
     cost : array (P, S)
         Cost of each step plus the cost of the survivor that it leads to; infinite if the step is impossible.
     forward : array (S,)
-        Logarithm of the summed likelihoods of all paths to each end, up to a constant.
+        Logarithm of the sum of the likelihoods of all paths that lead to each end, up to a constant.
     """
 
     survivor: NDArray[np.intp]
@@ -282,7 +282,7 @@ def follow(recovery: Recovery, *, paths: int = 2) -> Recovery:
 
 
 def candidates(recovery: Recovery, k: int) -> Candidates:
-    """Return the survivors of frame k as candidates of paths, with covariances that are largest along the rays."""
+    """Return the survivors of frame k as `Candidates`, with covariances that are largest along the rays."""
     rows = recovery.rows(k)
     table = recovery.survivors
     joints, radius = table.joints[rows], np.asarray(table.radius)[rows]

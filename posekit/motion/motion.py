@@ -122,7 +122,7 @@ class Motion(Record):
         return refusal(self.source or "motion", field_name, got, expected, remedy)
 
     def _store(self, name: str, given: Any, shape: tuple[int | None, ...], dtype: Any = np.float64) -> None:
-        """Store a read-only copy of an array after checking its shape; None stays None."""
+        """Store a read-only copy of an array after checking its shape; None is stored unchanged."""
         if given is None:
             return
         values = numbers(given, self.source or "motion", name, remedy="give one row per frame")
@@ -171,7 +171,7 @@ class Motion(Record):
 
     @property
     def in_time(self) -> bool:
-        """Whether the frames are successive in time: there are several, and no frame has alternative postures."""
+        """Whether the frames are successive in time: there are several frames, each with only one posture."""
         clip, frame = np.asarray(self.clip), np.asarray(self.frame)
         return len(self) > 1 and len(np.unique(clip * (frame.max() + 1) + frame)) == len(self)
 

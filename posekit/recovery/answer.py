@@ -77,7 +77,7 @@ def answers_of(
         The person's segment lengths, in the order of `posekit.skeleton.SEGMENTS`, metres. An answer has these lengths,
         scaled to the mean size of its survivors.
     relative : bool array (K,)
-        Whether distances are measured relative to the neck, because its depth is not known.
+        True for frames in which distances are relative to the neck, because the depth of the neck is unknown.
     unlisted : array (K,)
         Probability of postures that are not listed.
 

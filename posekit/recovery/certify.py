@@ -80,7 +80,7 @@ def noisy_judge(
 
 
 def solver_limits(figure: Figure, checks: Iterable[Check], ranges: str) -> Limits | None:
-    """Return the joint ranges that the solver uses as soft limits; None if joint ranges are not checked."""
+    """Return the joint limits that the solver applies as soft limits; None if joint limits are not checked."""
     table = load_ranges(ranges)
     asked = "joint-range" in [check.name for check in checks]
     return limits_of(figure, table) if asked and (table is None or table["kind"] == "anatomical") else None

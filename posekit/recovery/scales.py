@@ -43,7 +43,7 @@ LONGEST_TOO_SHORT: Final = 0.3
 
 
 def point_offsets(points: Array, scale: Array) -> Array:
-    """Return the standard deviations (N, 14), metres, of the points (N, 14, 2) of photographs at scales (N,).
+    """Return the standard deviations (N, 14), metres, of image points (N, 14, 2) of photographs with scales (N,).
 
     Body parts that are nearer to the camera look larger. The distance of the camera is unknown, so the deviation grows
     with the distance of a point from the middle of the body.

@@ -140,7 +140,7 @@ class Clip:
         )
 
     def checks(self, *, over_time: bool) -> list[Check]:
-        """Return the selected checks of motion if `over_time`, otherwise the selected checks of postures."""
+        """Return the selected checks of motion if `over_time` is true, otherwise the selected checks of postures."""
         of_robot = self.validator.figure is None
         asked = chosen_checks(self.validator.settings, of_robot=of_robot, in_time=self.motion.in_time)
         return [one for one in asked if bool(getattr(one, "over_time", False)) == over_time]
@@ -208,9 +208,9 @@ class Clip:
     def legal(self) -> Self:
         """Return the clip with rejected postures replaced by postures that pass the checks of postures.
 
-        Three goals are tried in turn: the posture moved inside the bounds that it violates, a posture interpolated
-        between the nearest valid frames, and the nearest valid frame. The rejected posture is interpolated toward the
-        first goal that passes, only as far as necessary.
+        Three postures are tried in turn as a goal: the rejected posture moved inside its bounds, a posture interpolated
+        between the nearest valid frames, and the posture of the nearest valid frame. The rejected posture is
+        interpolated toward the first goal that passes, only as far as necessary.
         """
         if not self.checks(over_time=False):
             return self
@@ -276,7 +276,7 @@ class Clip:
         return self.with_rows(rows[passing], self.halfway(start, goal, high)[passing])
 
     def restored(self, rows: Ints, given: Array) -> Self:
-        """Restore the given directions (n, P, 3) of trunk, head and limbs in some frames, if all checks still pass."""
+        """Restore the directions of trunk, head and limbs in `given` (n, P, 3) if all checks still pass."""
         clip = self
         for pieces in ({TORSO_PIECE, HIPS_PIECE}, {HEAD_PIECE}, *LIMB_PIECES):
             own = [k for k, piece in enumerate(PIECE_OF_POINT) if piece in pieces]
@@ -293,7 +293,7 @@ class Clip:
         return replace(self, state=out)
 
     def invalid(self, rows: Ints) -> Flags:
-        """Return whether checks of postures reject each of some frames (n,); lengths are measured in all frames."""
+        """Return whether checks of postures reject each frame of `rows` (n,); lengths are measured in all frames."""
         return self.report(over_time=False).invalid[rows]
 
     def good(self, rows: Ints, passing: Flags) -> tuple[Array, Array]:
@@ -425,7 +425,7 @@ class RobotClip(Clip):
         return replace(self, state=np.where(loose.any(axis=1, keepdims=True), out, self.state))
 
     def invalid(self, rows: Ints) -> Flags:
-        """Return whether checks of postures reject each of some frames (n,); only these frames are judged."""
+        """Return whether checks of postures reject each frame of `rows` (n,); no other frames are judged."""
         return super(RobotClip, self.taken(rows, self.time[rows])).invalid(np.arange(len(rows)))
 
     def rest(self) -> Array:

@@ -52,7 +52,7 @@ def in_bvh(clip: Clip, document: Bvh, options: Options) -> bytes:
 def _landmarks(document: Bvh, motion: Motion) -> dict[str, int]:
     """Return the index of the node in the file for each point of the motion.
 
-    If several nodes lie at one point, the node nearest to the next joint of the limb is chosen.
+    If several nodes have the same position, the node nearest to the next joint of the limb is chosen.
     """
     sample = slice(None, None, max(1, len(motion) // 20))
     absolute = positions_are_absolute(document)

@@ -46,7 +46,7 @@ def in_own_file(
     """Return the user's table or arrays with the numbers that a repair changed.
 
     Columns are recognised by their numbers: a column, or the mean of the columns of two markers, equals an entry of the
-    motion times a factor. The change of the entry is added to this column. All other columns and all names are
+    motion times a unit factor. The change of the entry is then added to the column. All other columns and all names are
     unchanged. Gaps in a column are filled, except gaps of a joint that is the mean of two markers.
 
     Parameters
@@ -161,7 +161,7 @@ def _apart(values: Array, wanted: Array) -> Array:
 
 
 def _euler(motion: Motion) -> dict[str, Any]:
-    """Return the layout's description of the root's Euler angles; empty if the file has none."""
+    """Return how the layout describes the Euler angles of the root; empty if the file has no Euler angles."""
     if motion.q is None or not motion.layout:
         return {}
     turn: dict[str, Any] = load_layout(motion.layout).fields.get("rotation", {})

@@ -44,7 +44,7 @@ class Check(NamedTuple):
     ----------
     reason : str
     rows : array (R, S)
-        Matrix from signed foreshortenings (S,) to the depths (R,) that the test reads.
+        Matrix that maps signed foreshortenings (S,) to the R depths that the test uses.
     measure : callable
         Maps depths (N, R) to errors (N,), units of length.
     most : float

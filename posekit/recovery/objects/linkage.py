@@ -27,7 +27,8 @@ LOOP_ROUNDING: Final = 1e-9
 class Linkage(Record):
     """An articulated object: points joined by rigid segments whose lengths are known up to one factor.
 
-    A *node* is a point or, after the points, a midpoint. `Linkage.from_names` makes a linkage from names.
+    A *node* is a point or a midpoint; nodes are numbered from 0, points before midpoints. `Linkage.from_names` makes a
+    linkage from names.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ Residual = Callable[[Array, Array], Array]
 class Minima(Record):
     """Local minima of the constraints' residual over scale and flips, sorted by increasing residual.
 
-    Each minimum also represents its mirror image in depth, unless flips are stated.
+    If no flips are stated, each minimum also represents its mirror image in depth.
 
     Parameters
     ----------
