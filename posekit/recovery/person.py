@@ -22,7 +22,7 @@ PROPORTIONS: Final = tomllib.loads((DATA / "priors" / "proportions.toml").read_t
 
 
 def by_segment(table: Mapping[str, float]) -> dict[str, float]:
-    """Expand a table of segments without sides: the left and the right segment have the same value."""
+    """Expand a table by segment name without side, so that left and right segments have the same value."""
     sideless = {name: name.replace("right_", "").replace("left_", "") for name in SEGMENT_NAMES}
     return {name: table[bare] for name, bare in sideless.items() if bare in table}
 

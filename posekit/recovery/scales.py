@@ -112,7 +112,7 @@ def scales_of(
         least = float(found.residual[:1].max(initial=0.0))
         chosen = np.unique(found.s[found.residual <= max(least, 1e-16)]).tolist() or [bound]
     if not all(np.isfinite(chosen)) or min(chosen) <= 0:
-        raise refusal("", "scale", "no scale", "two ends of some segment in the image", "add image points")
+        raise refusal("", "scale", "no scale", "both ends of a segment in the image", "add image points")
     lost = (bound / min(chosen) - 1) * float(linkage.lengths.max())
     if strict and lost > LONGEST_TOO_SHORT:
         needs = f"at least {bound:.6g} px/m, which {segment} needs"
@@ -149,7 +149,7 @@ LOG_SCALES: Final = np.arange(-0.4, 0.6, 0.03)
 
 
 def likely_scale(points: Array, person: Figure) -> tuple[Array, Array]:
-    r"""Estimate the scale at which a body's segments best match their image, and the deviation of its logarithm.
+    r"""Estimate the scale at which a body's segments best match their image, and the deviation of the log scale.
 
     Taylor's lower bound of the scale (2000, eq. 3) depends on one segment alone, but this estimate uses every segment.
     At scale s, a segment of length l and random direction has an image of length :math:`e = s\,l\,\sqrt{1 - c^2}` with

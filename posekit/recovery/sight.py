@@ -66,7 +66,7 @@ class Sight(Record):
     size_deviation : array (H,)
         Relative standard deviation of the person's size.
     may_be_exact : bool
-        True if no deviation is stated and the points are not a detector's.
+        True if no deviation is stated and the points do not come from a detector.
     reasons, cameras, roots
         By frame: the reason why no posture can be recovered, facts about the camera, and the method that located the
         neck.
@@ -151,7 +151,7 @@ def _calibrated(view: View, person: Figure, settings: RecoverSettings, lengths: 
     given = np.asarray(np.isfinite(root).all(axis=1))
     if settings.root == "given" and not given.any():
         raise refusal(
-            view.source, "root", "no root in the view", "one a frame", "add it, or leave --root out"
+            view.source, "root", "no root in the view", "one per frame", "add it, or leave --root out"
         )
     _check_root(root, view, camera)
     roots: list[dict[str, Any] | None] = [None] * count

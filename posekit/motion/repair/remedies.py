@@ -199,7 +199,7 @@ def _smooth(clip: Clip, report: Report) -> Iterator[Clip]:
 
 
 def _shift(clip: Clip, report: Report) -> Iterator[Clip]:
-    """Lift a body from below the ground, or lower a floating body, by one shift per span or by a shift per frame."""
+    """Lift a body from below the ground, or lower a floating body: by one shift for a whole span, or frame by frame."""
     up = clip.motion.up_vector
     low, high = (_numbers(report, check, "lowest") for check in ("penetration", "floating"))
     beyond = [_numbers(report, check, "lowest", "margin") for check in ("penetration", "floating")]

@@ -57,7 +57,7 @@ class Repaired(Record):
     before, report : Report
         Reports about the given motion, and about the repaired motion as it is read from its file.
     notes : tuple of str
-        Sentences about changes, invented frames and remaining defects.
+        Sentences about changes, interpolated frames and remaining defects.
     data : bytes
         Contents of the repaired file, with the user's names and columns; empty if `posekit.save` writes the motion.
     """
@@ -292,7 +292,7 @@ def _in_its_file(
 
 
 def _told(given: Clip, clip: Clip) -> list[str]:
-    """Return notes about changes and invented frames, preceded by the name of the clip if it has one."""
+    """Return notes about changes and interpolated frames, preceded by the name of the clip if it has one."""
     rows, inserted, filled = clip.own_rows, clip.rows < 0, clip.filled
     moved = np.nan_to_num(clip.state - given.state[rows])
     changed = (np.abs(moved) > SEEN).reshape(len(clip), -1).any(axis=1) | inserted
