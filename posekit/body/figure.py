@@ -145,7 +145,7 @@ class Figure(Robot):
 
     @cached_property
     def neutral_points(self) -> Array:
-        """The 19 points at the neutral configuration (19, 3), metres, torso frame."""
+        """Positions (19, 3) of 14 joints and 5 head points at the neutral configuration, metres, torso frame."""
         return read_only(self._placed(self.neutral))
 
     def _placed(self, q: Array) -> Array:

@@ -115,7 +115,7 @@ def _first_root(ascending: list[Array]) -> float:
 
 
 def _bent(x: Numbers, y: Numbers, distortion: Array, fisheye: bool) -> tuple[Numbers, Numbers]:
-    """Distort coordinates x, y (...), real or complex."""
+    """Return the distorted coordinates of undistorted ones x, y (...); each may be a real or a complex array."""
     q = x * x + y * y
     if fisheye:
         k = np.pad(distortion, (0, 4 - len(distortion)))

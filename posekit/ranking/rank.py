@@ -63,7 +63,7 @@ class Up(Record):
 
 
 def deviation_of_tolerance(rigid: float) -> float:
-    """Convert the tolerance of rigid distances in torso and hips to a standard deviation of survivors' joints (m)."""
+    """Return the error (standard deviation, m) of each joint that a tolerance (m) of distances in the torso allows."""
     return max(rigid / PER_TOLERANCE, MIN_DEVIATION_METRES)
 
 

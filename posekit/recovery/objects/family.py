@@ -159,8 +159,8 @@ class Incidence(Record):
 
     The signed foreshortenings :math:`\sigma_i dZ_i` and the depths Z of the points satisfy :math:`A Z = \sigma dZ`,
     where a row of A has -1 and 1 in the columns of a segment's ends (halves for a midpoint). The matrix B solves this
-    for the depths: :math:`Z = B (\sigma dZ)`. Loops close if :math:`C (\sigma dZ) = 0`. A basis of linearly independent
-    segments determines all depths: :math:`Z = T (\sigma dZ)`.
+    for the depths: :math:`Z = B (\sigma dZ)`. A third matrix C gives the gaps of loops: all loops close if :math:`C
+    (\sigma dZ) = 0`. A basis of linearly independent segments determines all depths: :math:`Z = T (\sigma dZ)`.
 
     Parameters
     ----------
