@@ -392,7 +392,7 @@ class Figure(Robot):
         return Configurations(q, np.where(placed, np.fmax.reduce(gap, axis=1), np.nan))
 
     def inverse_kinematics(self, points: Array) -> Array:
-        """Return only the configurations (N, nq) of postures (N, 19, 3); see `configurations`."""
+        """Return the configurations (N, nq) of joints and head points (N, 19, 3); see `configurations`."""
         if len(points) > ROWS_AT_ONCE:
             rows = range(0, len(points), ROWS_AT_ONCE)
             return np.concatenate([self.inverse_kinematics(points[k : k + ROWS_AT_ONCE]) for k in rows])

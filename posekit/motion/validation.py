@@ -127,7 +127,7 @@ class Judge:
         return "" if name in ("figure", "stick_figure") else name
 
     def validator(self, robot: str) -> Validator:
-        """Return the validator of the given robot or figure, or else of the robot that the file names."""
+        """Return the validator of the stated body (`urdf`), or else of the robot that a file names."""
         body = self.urdf or robot or "figure"
         if str(body) not in self._made:
             self._made[str(body)] = Validator(body, self.settings, **self.changes)

@@ -69,7 +69,7 @@ class Rows(list[Row]):
 
     @property
     def passed(self) -> bool:
-        """Whether every row that differs has an explanation."""
+        """Whether every row whose value differs from the printed one has an explanation."""
         return all(one.why != UNEXPLAINED for one in self)
 
     def counts(self) -> str:

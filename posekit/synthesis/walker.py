@@ -84,7 +84,7 @@ class Walker:
 
     @property
     def cycle_duration(self) -> float:
-        """Duration of one gait cycle (two steps), seconds; in one cycle, the walker moves 1.346 sqrt(v) leg lengths."""
+        """Duration of one gait cycle (two steps), seconds; it covers 1.346 sqrt(`velocity`) leg lengths."""
         return 1.346 * math.sqrt(self.velocity) / self.velocity
 
     @property

@@ -45,9 +45,10 @@ def in_own_file(
 ) -> tuple[bytes, list[str]]:
     """Return the user's table or arrays with the numbers that a repair changed.
 
-    Columns are recognised by their numbers: a column, or the mean of the columns of two markers, equals an entry of the
-    motion times a unit factor. The change of the entry is then added to the column. All other columns and all names are
-    unchanged. Gaps in a column are filled, except gaps of a joint that is the mean of two markers.
+    Columns are recognised by their values: the values of a column, or the mean of two markers' columns, equal one
+    coordinate or angle of the motion times a unit factor. The change of the entry is then added to the column. All
+    other columns and all names are unchanged. Gaps in a column are filled, except gaps of a joint that is the mean of
+    two markers.
 
     Parameters
     ----------
