@@ -6,7 +6,7 @@ import difflib
 import inspect
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from functools import wraps
 from os import PathLike
 from typing import Final, ParamSpec, TypeVar
@@ -151,10 +151,11 @@ def cut(text: str) -> str:
     return text if len(text) <= MAX_SHOWN_CHARACTERS else text[: MAX_SHOWN_CHARACTERS - 1] + "…"
 
 
-def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
+def nearest(name: str, names: Iterable[str], otherwise: str = "", mark: str = "") -> str:
     """Suggest valid names for an unknown name: names with similar spelling, or synonyms (`MEANT`).
 
     If no valid name is similar, return `otherwise`; if `otherwise` is empty, return a list of all valid names.
+    `mark` stands before each suggestion, as ``--`` before options.
     """
     valid = list(names)
     given = name[:MAX_SHOWN_CHARACTERS]
@@ -169,22 +170,28 @@ def nearest(name: str, names: Iterable[str], otherwise: str = "") -> str:
             one for word in difflib.get_close_matches(given.lower(), words) for one in words[word]
         )
     )
-    return (
-        f"did you mean {' or '.join(near)}?" if near else otherwise or f"valid names are {', '.join(valid)}"
-    )
+    if near:
+        return f"did you mean {' or '.join(mark + one for one in near)}?"
+    return otherwise or f"valid names are {', '.join(valid)}"
+
+
+def check_names(
+    owner: str, given: Iterable[str], known: Collection[str], *, kind: str, expected: str
+) -> None:
+    """Raise an error that suggests the right name if a given name is not known."""
+    for name in given:
+        if name not in known:
+            raise refusal(owner, name, f"an unknown {kind}", expected, nearest(name, known))
 
 
 def names_checked(function: Callable[P, T]) -> Callable[P, T]:
     """Decorate a public function, so that an unknown keyword argument raises an error that suggests the right name."""
-    known = inspect.signature(function).parameters
+    known = [name for name in inspect.signature(function).parameters if name != "self"]
     public = function.__qualname__.removesuffix(".__init__")
 
     @wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> T:
-        for name in kwargs:
-            if name not in known:
-                remedy = nearest(name, (one for one in known if one != "self"))
-                raise refusal(public, name, "an unknown argument", "a known argument", remedy)
+        check_names(public, kwargs, known, kind="argument", expected="a known argument")
         return function(*args, **kwargs)
 
     return called

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
-from posekit.errors import nearest, refusal, shown
+from posekit.errors import check_names, refusal, shown
 from posekit.files import parse_toml, read_bytes
 from posekit.geometry import PER_METRE, UNIT_WORDS, Record
 
@@ -195,10 +195,8 @@ class Settings(Record):
             If a field is unknown or its value is impossible.
         """
         known = [one.name for one in fields(self)]
-        for name in fields_given:
-            if name not in known:
-                expected = f"a field of {type(self).__name__}"
-                raise refusal("settings", name, "an unknown field", expected, nearest(name, known))
+        expected = f"a field of {type(self).__name__}"
+        check_names("settings", fields_given, known, kind="field", expected=expected)
         return replace(self, **fields_given) if fields_given else self
 
     @classmethod

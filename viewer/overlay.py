@@ -73,7 +73,7 @@ def overlaid(
         raise refusal("render", "--over", "a report", "a result, a view or a motion", "choose one of these")
     if view is None or isinstance(view.camera, LeeChenCamera):
         got = "no view" if view is None else "a camera whose image is in metres"
-        raise refusal("render", "--over", got, "a view with image points in pixels", "state it with --view")
+        raise refusal("render", "--over", got, "a view with image points in pixels", "give it with --view")
     if isinstance(source, Recovery):
         figure, postures = load_figure().scaled(source.lengths), _of_recovery(source, which)
         if frame is None and not moving:
@@ -82,7 +82,7 @@ def overlaid(
         figure, postures = _of_joints(source, view)
     if len(postures) != len(view):
         raise refusal(
-            "render", "--view", f"{len(view)} frames", f"{len(postures)}", "state the view of the source"
+            "render", "--view", f"{len(view)} frames", f"{len(postures)}", "give the view of the source"
         )
     rows = frame_rows(len(view), frame, view.source)
     numbers, read = _matched(pictures, view)
@@ -203,7 +203,7 @@ def _matched(path: Path, view: View) -> tuple[list[int], Any]:
             numbers = np.rint((view.time - min(float(view.time[0]), 0.0)) * rate).astype(int).tolist()
         if max(numbers) >= count or len(set(numbers)) < len(numbers):
             expected = f"{len(view)}, one per frame"
-            raise refusal(path, "", f"{count} pictures", expected, "state the film of the view")
+            raise refusal(path, "", f"{count} pictures", expected, "give the film of the view")
         return numbers, lambda wanted: _film(path, wanted)
     given = path.iterdir() if path.is_dir() else [path]
     files = sorted((one for one in given if one.suffix.lower() in IMAGES), key=_order)
@@ -215,7 +215,7 @@ def _matched(path: Path, view: View) -> tuple[list[int], Any]:
         numbers = [0] * len(view)
     elif max(numbers) >= len(files):
         expected = f"{len(view)}, one per frame"
-        raise refusal(path, "", f"{len(files)} pictures", expected, "state the pictures of the view")
+        raise refusal(path, "", f"{len(files)} pictures", expected, "give the pictures of the view")
     return numbers, lambda wanted: (_photograph(files[number]) for number in wanted)
 
 

@@ -39,8 +39,8 @@ class Command(click.Command):
             rest = super().parse_args(ctx, args)
         except click.NoSuchOption as error:
             known = [name[2:] for option in self.params for name in option.opts if name.startswith("--")]
-            hint = nearest(error.option_name.lstrip("-"), known, f"see posekit {self.name} --help")
-            hint = hint.replace("mean ", "mean --").replace(" or ", " or --")
+            otherwise = f"see posekit {self.name} --help"
+            hint = nearest(error.option_name.lstrip("-"), known, otherwise, mark="--")
             raise refusal(
                 "", error.option_name, "an unknown option", f"an option of {self.name}", hint
             ) from None

@@ -9,7 +9,7 @@ from typing import Any, Final, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.errors import nearest, refusal
+from posekit.errors import check_names
 from posekit.geometry.vectors import Array
 
 S = TypeVar("S", bound=np.generic)
@@ -29,11 +29,7 @@ class Record:
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Make an instance; for a name that is not a field, the error suggests the most similar field."""
         known = getattr(cls, "__dataclass_fields__", given)
-        for name in given:
-            if name not in known:
-                raise refusal(
-                    cls.__name__, name, "an unknown field", "a field of the class", nearest(name, known)
-                )
+        check_names(cls.__name__, given, known, kind="field", expected="a field of the class")
         return super().__new__(cls)
 
     def __repr__(self) -> str:

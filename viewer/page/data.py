@@ -363,7 +363,7 @@ def _of_result(
     chosen: list[int] = drawn.frame_rows(len(recovery), frame, recovery.source).tolist()
     if view is not None and len(view) != len(recovery):
         expected = f"{len(recovery)} as in the result"
-        raise refusal("render", "--view", f"{len(view)} frames", expected, "state the view of the result")
+        raise refusal("render", "--view", f"{len(view)} frames", expected, "give the view of the result")
     table, answer = recovery.survivors, recovery.answer
     most = min(MOST_OF_FRAME, max(20, MOST_POSTURES // len(chosen)))
     points = np.concatenate([table.joints, np.asarray(table.head)], axis=1)
